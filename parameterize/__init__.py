@@ -1,0 +1,1 @@
+"""From a closed surface to a trivariate B-spline volume."""

@@ -1,0 +1,160 @@
+"""BSplineVolume: a trivariate tensor-product B-spline F from the unit cube to space (paper, eq. 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .bspline import (
+    Array,
+    basis_derivatives,
+    check_knots,
+    collocation,
+    insert_knots,
+    midpoints,
+    open_uniform_knots,
+)
+from .files import load_arrays, save_arrays
+
+AXES = "uvw"
+FACE_NAMES = ("u0", "u1", "v0", "v1", "w0", "w1")
+
+
+@dataclass(frozen=True, eq=False)
+class BSplineVolume:
+    """A trivariate B-spline.
+
+    degrees: one per parametric direction.
+    knots: three open knot vectors on [0, 1].
+    control_points: (n_u, n_v, n_w, 3), in the user's units.
+
+    Raises ValueError where the parts do not fit together.
+    """
+
+    degrees: tuple[int, int, int]
+    knots: tuple[Array, Array, Array]
+    control_points: Array
+
+    def __post_init__(self) -> None:
+        if len(self.degrees) != 3 or len(self.knots) != 3:
+            raise ValueError("a volume has three degrees and three knot vectors")
+        points = np.asarray(self.control_points, dtype=np.float64)
+        if points.ndim != 4 or points.shape[3] != 3:
+            raise ValueError(f"control_points must have shape (n_u, n_v, n_w, 3), got {points.shape}")
+        if not np.all(np.isfinite(points)):
+            raise ValueError("control_points must be finite")
+        checked = []
+        for axis, degree, knots, n in zip(AXES, self.degrees, self.knots, points.shape, strict=False):
+            values = check_knots(knots, int(degree))
+            if len(values) != n + degree + 1:
+                raise ValueError(f"direction {axis}: {n} control points of degree {degree} need {n + degree + 1} knots")
+            if values[0] != 0.0 or values[-1] != 1.0:
+                raise ValueError(f"direction {axis}: knots must run from 0 to 1, got {values[0]} to {values[-1]}")
+            checked.append(values)
+        object.__setattr__(self, "degrees", tuple(int(p) for p in self.degrees))
+        object.__setattr__(self, "knots", tuple(checked))
+        object.__setattr__(self, "control_points", points)
+
+    @classmethod
+    def uniform(cls, control_points: ArrayLike, degree: int = 3) -> BSplineVolume:
+        """Volume with the same degree and equal spans in the three directions."""
+        points = np.asarray(control_points, dtype=np.float64)
+        knots = tuple(open_uniform_knots(n, degree) for n in points.shape[:3])
+        return cls((degree, degree, degree), knots, points)  # type: ignore[arg-type]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of control points per direction."""
+        return self.control_points.shape[:3]  # type: ignore[return-value]
+
+    def __call__(self, points: ArrayLike) -> Array:
+        """F at points (m, 3) of the unit cube: (m, 3)."""
+        return self._at(points, (0, 0, 0))
+
+    def jacobian(self, points: ArrayLike) -> Array:
+        """J[i, a, b] = dF_a / du_b at points (m, 3): (m, 3, 3)."""
+        units = np.eye(3, dtype=int)
+        return np.stack([self._at(points, tuple(row)) for row in units], axis=-1)
+
+    def hessian(self, points: ArrayLike) -> Array:
+        """H[i, a, b, c] = d2F_a / du_b du_c at points (m, 3): (m, 3, 3, 3)."""
+        units = np.eye(3, dtype=int)
+        rows = [[self._at(points, tuple(units[b] + units[c])) for c in range(3)] for b in range(3)]
+        return np.moveaxis(np.array(rows), (0, 1), (2, 3))
+
+    def _at(self, points: ArrayLike, derivative: tuple[int, ...]) -> Array:
+        where = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        if where.ndim != 2 or where.shape[1] != 3:
+            raise ValueError(f"points must have shape (m, 3), got {where.shape}")
+        windows, values = [], []
+        for a in range(3):
+            first, table = basis_derivatives(self.knots[a], self.degrees[a], where[:, a], derivative[a])
+            windows.append(first[:, None] + np.arange(self.degrees[a] + 1))
+            values.append(table[derivative[a]])
+        result = np.zeros((len(where), 3))
+        for i in range(self.degrees[0] + 1):  # (m, 3) at a time: memory stays linear in m
+            for j in range(self.degrees[1] + 1):
+                pair = (values[0][:, i] * values[1][:, j])[:, None]
+                net = self.control_points[windows[0][:, i, None], windows[1][:, j, None], windows[2]]
+                result += pair * np.einsum("mk,mkc->mc", values[2], net)
+        return result
+
+    def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: tuple[int, int, int] = (0, 0, 0)) -> Array:
+        """F or one of its partial derivatives on a tensor grid: (len(u), len(v), len(w), 3)."""
+        field = self.control_points
+        for a, x in enumerate((u, v, w)):
+            matrix = collocation(self.knots[a], self.degrees[a], x, derivative[a])
+            field = np.moveaxis(_apply(matrix, np.moveaxis(field, a, 0)), 0, a)
+        return field
+
+    def grid_jacobian(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
+        """Jacobian on a tensor grid: (len(u), len(v), len(w), 3, 3), last index the parametric direction."""
+        return np.stack([self.grid(u, v, w, d) for d in ((1, 0, 0), (0, 1, 0), (0, 0, 1))], axis=-1)
+
+    def refined(self, levels: int = 1) -> BSplineVolume:
+        """The same map with every span halved `levels` times, exactly (knot insertion)."""
+        if levels < 0:
+            raise ValueError(f"levels must be non-negative, got {levels}")
+        volume = self
+        for _ in range(levels):
+            knots, points = [], volume.control_points
+            for a in range(3):
+                finer, matrix = insert_knots(volume.knots[a], volume.degrees[a], midpoints(volume.knots[a]))
+                points = np.moveaxis(_apply(matrix, np.moveaxis(points, a, 0)), 0, a)
+                knots.append(finer)
+            volume = BSplineVolume(self.degrees, tuple(knots), points)  # type: ignore[arg-type]
+        return volume
+
+    def face(self, axis: int, side: int) -> Array:
+        """Control points of a boundary face, e.g. (n_v, n_w, 3) for axis 0; side 0 or 1."""
+        return np.take(self.control_points, 0 if side == 0 else -1, axis=axis)
+
+    def transformed(self, scale: float, offset: ArrayLike) -> BSplineVolume:
+        """The map scale * F + offset."""
+        return BSplineVolume(self.degrees, self.knots, scale * self.control_points + np.asarray(offset))
+
+    def save(self, path: str | Path) -> None:
+        """Write volume.npz (design: degrees, knots_u, knots_v, knots_w, control_points); atomic."""
+        named = {f"knots_{a}": k for a, k in zip(AXES, self.knots, strict=True)}
+        save_arrays(path, degrees=np.array(self.degrees), **named, control_points=self.control_points)
+
+    @classmethod
+    def load(cls, path: str | Path) -> BSplineVolume:
+        """Read volume.npz. Raises FileNotFoundError, or ValueError naming what is wrong with the file."""
+        data = load_arrays(path, ("degrees", "knots_u", "knots_v", "knots_w", "control_points"))
+        degrees = data["degrees"]
+        if degrees.shape != (3,) or degrees.dtype.kind not in "iu":
+            raise ValueError(f"{path}: degrees must be three integers")
+        try:
+            return cls(tuple(degrees.tolist()), tuple(data[f"knots_{a}"] for a in AXES), data["control_points"])  # type: ignore[arg-type]
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{path}: {error}") from None
+
+
+def _apply(matrix: object, field: Array) -> Array:
+    """Sparse (m, n) times field (n, ...) -> (m, ...)."""
+    flat = matrix @ field.reshape(field.shape[0], -1)  # type: ignore[operator]
+    return np.asarray(flat).reshape(-1, *field.shape[1:])

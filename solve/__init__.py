@@ -1,0 +1,1 @@
+"""Isogeometric solver on a B-spline volume."""
