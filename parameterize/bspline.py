@@ -1,10 +1,12 @@
-"""Univariate B-splines: knot vectors, basis values and derivatives, collocation, knot insertion.
+"""B-splines: knot vectors, basis values and derivatives, collocation, knot insertion, tensor-product evaluation.
 
 A knot vector is *open*: its first and last `degree + 1` knots coincide. The basis has `len(knots) - degree - 1`
 functions. Recurrences are those of Piegl and Tiller, *The NURBS Book* (2nd ed.), chapter 2.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,9 +65,7 @@ def find_spans(knots: Array, degree: int, x: ArrayLike) -> NDArray[np.int64]:
     return np.clip(spans, degree, last)
 
 
-def basis_derivatives(
-    knots: Array, degree: int, x: ArrayLike, derivatives: int = 0
-) -> tuple[NDArray[np.int64], Array]:
+def basis_derivatives(knots: Array, degree: int, x: ArrayLike, derivatives: int = 0) -> tuple[NDArray[np.int64], Array]:
     """Values and derivatives of the `degree + 1` basis functions that are nonzero at each point.
 
     Returns `first` (m,), the index of the first such function, and `values` (derivatives + 1, m, degree + 1).
@@ -158,3 +158,51 @@ def midpoints(knots: Array) -> Array:
     breaks = breakpoints(knots)
     middles: Array = (breaks[:-1] + breaks[1:]) / 2.0
     return middles
+
+
+def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
+    """Sparse matrix (m, n) times one axis of length n of `field`; that axis then has length m."""
+    moved = np.moveaxis(field, axis, 0)
+    flat = np.asarray(matrix @ moved.reshape(moved.shape[0], -1))
+    return np.moveaxis(flat.reshape(-1, *moved.shape[1:]), 0, axis)
+
+
+def evaluate_at(
+    degrees: Sequence[int],
+    knots: Sequence[Array],
+    coefficients: Array,
+    points: ArrayLike,
+    derivative: Sequence[int] = (0, 0, 0),
+) -> Array:
+    """A trivariate spline, or one of its partial derivatives, at points (m, 3).
+
+    coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
+    """
+    where = np.atleast_2d(np.asarray(points, dtype=np.float64))
+    if where.ndim != 2 or where.shape[1] != 3:
+        raise ValueError(f"points must have shape (m, 3), got {where.shape}")
+    windows, values = [], []
+    for a in range(3):
+        first, table = basis_derivatives(knots[a], degrees[a], where[:, a], derivative[a])
+        windows.append(first[:, None] + np.arange(degrees[a] + 1))
+        values.append(table[derivative[a]])
+    result = np.zeros((*coefficients.shape[3:], len(where)))  # components first, so that weights (m,) broadcast
+    for i in range(degrees[0] + 1):  # one row of the support at a time: memory stays linear in m
+        for j in range(degrees[1] + 1):
+            net = coefficients[windows[0][:, i, None], windows[1][:, j, None], windows[2]]  # (m, degree + 1, ...)
+            result += values[0][:, i] * values[1][:, j] * np.einsum("mk,mk...->...m", values[2], net)
+    return np.moveaxis(result, -1, 0)
+
+
+def evaluate_grid(
+    degrees: Sequence[int],
+    knots: Sequence[Array],
+    coefficients: Array,
+    points: Sequence[ArrayLike],
+    derivative: Sequence[int] = (0, 0, 0),
+) -> Array:
+    """The same on the tensor grid of three point rows: (len(u), len(v), len(w)) or (len(u), len(v), len(w), c)."""
+    field = coefficients
+    for a in range(3):
+        field = apply_along(collocation(knots[a], degrees[a], points[a], derivative[a]), field, a)
+    return field

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from .bspline import (
     Array,
-    basis_derivatives,
+    apply_along,
     check_knots,
-    collocation,
+    evaluate_at,
+    evaluate_grid,
     insert_knots,
     midpoints,
     open_uniform_knots,
@@ -86,29 +87,11 @@ class BSplineVolume:
         return np.moveaxis(np.array(rows), (0, 1), (2, 3))
 
     def _at(self, points: ArrayLike, derivative: tuple[int, ...]) -> Array:
-        where = np.atleast_2d(np.asarray(points, dtype=np.float64))
-        if where.ndim != 2 or where.shape[1] != 3:
-            raise ValueError(f"points must have shape (m, 3), got {where.shape}")
-        windows, values = [], []
-        for a in range(3):
-            first, table = basis_derivatives(self.knots[a], self.degrees[a], where[:, a], derivative[a])
-            windows.append(first[:, None] + np.arange(self.degrees[a] + 1))
-            values.append(table[derivative[a]])
-        result = np.zeros((len(where), 3))
-        for i in range(self.degrees[0] + 1):  # (m, 3) at a time: memory stays linear in m
-            for j in range(self.degrees[1] + 1):
-                pair = (values[0][:, i] * values[1][:, j])[:, None]
-                net = self.control_points[windows[0][:, i, None], windows[1][:, j, None], windows[2]]
-                result += pair * np.einsum("mk,mkc->mc", values[2], net)
-        return result
+        return evaluate_at(self.degrees, self.knots, self.control_points, points, derivative)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: tuple[int, int, int] = (0, 0, 0)) -> Array:
         """F or one of its partial derivatives on a tensor grid: (len(u), len(v), len(w), 3)."""
-        field = self.control_points
-        for a, x in enumerate((u, v, w)):
-            matrix = collocation(self.knots[a], self.degrees[a], x, derivative[a])
-            field = np.moveaxis(_apply(matrix, np.moveaxis(field, a, 0)), 0, a)
-        return field
+        return evaluate_grid(self.degrees, self.knots, self.control_points, (u, v, w), derivative)
 
     def grid_jacobian(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Jacobian on a tensor grid: (len(u), len(v), len(w), 3, 3), last index the parametric direction."""
@@ -123,7 +106,7 @@ class BSplineVolume:
             knots, points = [], volume.control_points
             for a in range(3):
                 finer, matrix = insert_knots(volume.knots[a], volume.degrees[a], midpoints(volume.knots[a]))
-                points = np.moveaxis(_apply(matrix, np.moveaxis(points, a, 0)), 0, a)
+                points = apply_along(matrix, points, a)
                 knots.append(finer)
             volume = BSplineVolume(self.degrees, tuple(knots), points)  # type: ignore[arg-type]
         return volume
@@ -152,9 +135,3 @@ class BSplineVolume:
             return cls(tuple(degrees.tolist()), tuple(data[f"knots_{a}"] for a in AXES), data["control_points"])  # type: ignore[arg-type]
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: {error}") from None
-
-
-def _apply(matrix: object, field: Array) -> Array:
-    """Sparse (m, n) times field (n, ...) -> (m, ...)."""
-    flat = matrix @ field.reshape(field.shape[0], -1)  # type: ignore[operator]
-    return np.asarray(flat).reshape(-1, *field.shape[1:])
