@@ -1,0 +1,131 @@
+"""Options of a parameterization: frozen dataclasses, and the two presets.
+
+Lengths are in units of the domain scaled to volume 1. Loss weights are those of the paper's Table 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Target = Literal["S(2)", "S(1)", "cube"]
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Positional encoding and residual MLP (paper, section 4.2)."""
+
+    width: int = 128
+    modules: int = 4
+    frequencies: int = 10
+
+
+@dataclass(frozen=True)
+class StageWeights:
+    """One row of the paper's Table 1."""
+
+    bij: float = 1e6
+    arap: float = 1.0
+    fair: float = 2e-3
+    dist: float = 1e3
+    norm: float = 10.0
+    star: float = 1e3
+    cor: float = 0.0
+    edge: float = 0.0
+
+
+@dataclass(frozen=True)
+class StageConfig:
+    """One training stage: its name, the shape to reach, its length and its weights."""
+
+    name: str
+    target: Target
+    steps: int
+    weights: StageWeights
+    given_corner_weight: float = 1e2  # used from the first stage on where the user gives corners (section 5.4)
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """What the four stages share."""
+
+    learning_rate: float = 1e-3
+    final_learning_rate: float = 2e-5  # reached by cosine decay at the end of each stage
+    cell: float = 0.08  # edge h of the interior cells (section 4.4.2)
+    triangles: int = 2000  # surface triangles sampled a step
+    min_det: float = 0.1  # alpha of the bijectivity term
+    wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
+
+
+@dataclass(frozen=True)
+class SplineConfig:
+    """Fit and control-point optimisation (section 4.3.2); weights refer to a domain of volume 1."""
+
+    control_points: int = 30
+    degree: int = 3
+    fit_cell: float = 0.035  # lattice of inverse samples
+    fit_fairness: float = 1e-5
+    gauss: int = 2  # Gauss points a span and direction in the distortion term
+    fairness: float = 1e-3
+    vertex: float = 5e4  # squared distance along the surface normal
+    tangential: float = 0.02  # share of `vertex` for the distance within the tangent plane
+    barrier: float = 30.0  # squared shortfall of the Bernstein coefficients of det J
+    barrier_floor: float = 0.045  # coefficients below this are penalised; mean det J is 1
+    steps: int = 100
+    slide_every: int = 4
+    history: int = 12  # L-BFGS pairs
+    rounds: int = 4  # certificate, then optimisation again with the spans it could not prove
+
+
+@dataclass(frozen=True)
+class Config:
+    """All options of `parameterize.parameterize`."""
+
+    name: str
+    network: NetworkConfig
+    train: TrainConfig
+    stages: tuple[StageConfig, ...]
+    spline: SplineConfig
+
+    def scaled(self, factor: float) -> Config:
+        """The same run with every stage shortened (or lengthened) by `factor`; at least one step each."""
+        if not factor > 0.0:
+            raise ValueError(f"steps factor must be positive, got {factor}")
+        stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
+        spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
+        return replace(self, stages=stages, spline=spline)
+
+    def with_control_points(self, n: int) -> Config:
+        """The same run with n x n x n control points."""
+        return replace(self, spline=replace(self.spline, control_points=n))
+
+
+def _stages(steps: tuple[int, int, int, int, int]) -> tuple[StageConfig, ...]:
+    """Section 4.3.1 with Table 1's weights; S(2) and S(1) together are the paper's first stage."""
+    free, tight = StageWeights(), StageWeights(dist=1e4, cor=1e3)
+    return (
+        StageConfig("S(2)", "S(2)", steps[0], free),
+        StageConfig("S(1)", "S(1)", steps[1], free),
+        StageConfig("cube", "cube", steps[2], free),
+        StageConfig("corners", "cube", steps[3], tight),
+        StageConfig("edges", "cube", steps[4], replace(tight, edge=1e4)),
+    )
+
+
+PRESETS = {
+    "fast": Config("fast", NetworkConfig(), TrainConfig(), _stages((300, 200, 400, 200, 400)), SplineConfig()),
+    "paper": Config(
+        "paper",
+        NetworkConfig(width=512, modules=6),
+        TrainConfig(learning_rate=5e-4, final_learning_rate=5e-4, cell=0.04, triangles=20_000),
+        _stages((600, 400, 1000, 500, 1000)),
+        SplineConfig(),
+    ),
+}
+
+
+def preset(name: str) -> Config:
+    """The named preset: "fast" (default, made for two CPU cores) or "paper". Raises ValueError for another name."""
+    if name not in PRESETS:
+        raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")
+    return PRESETS[name]

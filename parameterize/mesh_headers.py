@@ -1,0 +1,178 @@
+"""Cheap checks of a surface file before a parser sees it: counts against the file's size, truncation, the format's marks.
+
+Parsers allocate what a header promises and return what they could read; these checks refuse such a file first.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .mesh_error import MeshError
+
+PLY_BYTES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
+PLY_BYTES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
+DAMAGED = "the file is truncated or damaged, export it again"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What the file promises: its number of polygons (None where the format does not say), and what to tell the user."""
+
+    polygons: int | None = None
+    notices: tuple[str, ...] = ()
+
+
+def check_header(data: bytes, suffix: str, max_faces: int) -> Header:
+    """Check the bytes of a file by its format (".stl", ".ply", ".off", ".mesh", ".msh", ".vtu").
+
+    Raises MeshError, without the file's name, for a file that is no such format, promises more than it holds, or has
+    more than max_faces faces.
+    """
+    if suffix not in CHECKS:
+        return Header()
+    header = CHECKS[suffix](data)
+    if header.polygons is not None:
+        check_face_count(header.polygons, max_faces)
+    return header
+
+
+def check_face_count(count: int, max_faces: int) -> None:
+    """Raise MeshError where a surface has more faces than allowed."""
+    if count > max_faces:
+        raise MeshError(
+            f"{count} faces, more than max_faces={max_faces}: decimate the surface or raise the limit with --max-faces"
+        )
+
+
+def _check_stl(data: bytes) -> Header:
+    says_solid = data[:512].lstrip().lower().startswith(b"solid")
+    promised = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
+    if len(data) >= 84 and len(data) == 84 + 50 * promised:
+        notice = ("binary STL although it starts with 'solid'",) if says_solid else ()
+        return Header(promised, notice)
+    if says_solid and b"\0" not in data:
+        return _check_ascii_stl(data)
+    if len(data) < 84:
+        raise MeshError(f"not an STL: {len(data)} bytes, the header alone takes 84; {DAMAGED}")
+    expected = 84 + 50 * promised
+    raise MeshError(f"STL of {promised} triangles must have {expected} bytes, this one has {len(data)}; {DAMAGED}")
+
+
+def _check_ascii_stl(data: bytes) -> Header:
+    lower = data.lower()
+    facets = len(re.findall(rb"\bendfacet\b", lower))
+    opened = len(re.findall(rb"\bfacet\s+normal\b", lower))
+    corners = len(re.findall(rb"\bvertex\s", lower))
+    if b"endsolid" not in lower or opened != facets or corners != 3 * facets:
+        raise MeshError(f"STL text with {opened} facets begun, {facets} ended and {corners} corners; {DAMAGED}")
+    return Header(facets)
+
+
+def _check_ply(data: bytes) -> Header:
+    head, mark, _ = data.partition(b"end_header")
+    if not data.startswith(b"ply") or not mark:
+        raise MeshError(f"not a PLY: no header from 'ply' to 'end_header'; {DAMAGED}")
+    body = data[len(head) + len(mark) :]
+    lines = [line.split() for line in head.decode("latin-1").splitlines()]
+    is_text = ["format", "ascii"] in [words[:2] for words in lines]
+    counts: dict[str, int] = {}
+    least = 0  # bytes the elements take at the least: a list may be empty, a text element needs one digit and a break
+    for words in lines:
+        if words[:1] == ["element"] and len(words) == 3:
+            element = words[1]
+            counts[element] = _count(words[2])
+            least += 2 * counts[element] if is_text else 0
+        elif words[:1] == ["property"] and len(words) >= 3 and counts and not is_text:
+            least += counts[element] * PLY_BYTES.get(words[2] if words[1] == "list" else words[1], 1)
+    if not counts.get("vertex") or not counts.get("face"):
+        raise MeshError(
+            f"PLY with {counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces is no surface: export faces too"
+        )
+    promised = " and ".join(f"{count} {element}" for element, count in counts.items())
+    _check_room(promised, least, len(body))
+    rows = len(re.findall(rb"[^\s][^\r\n]*", body))
+    if is_text and rows < sum(counts.values()):
+        raise MeshError(f"PLY promises {promised} elements, {rows} rows follow; {DAMAGED}")
+    return Header(counts["face"])
+
+
+def _check_off(data: bytes) -> Header:
+    rows = [line.split(b"#")[0].split() for line in data.splitlines()]
+    rows = [row for row in rows if row]
+    if not rows or not re.fullmatch(rb"(ST)?C?N?OFF", rows[0][0].upper()):
+        raise MeshError(f"not an OFF: the first word must be OFF; {DAMAGED}")
+    numbers = rows[0][1:] or (rows[1] if len(rows) > 1 else [])
+    if len(numbers) < 2:
+        raise MeshError(f"OFF without the counts of vertices and faces; {DAMAGED}")
+    vertices, faces = _count(numbers[0]), _count(numbers[1])
+    present = len(rows) - (1 if len(rows[0]) > 1 else 2)
+    if present < vertices + faces:
+        raise MeshError(f"OFF promises {vertices} vertices and {faces} faces, {present} rows follow; {DAMAGED}")
+    return Header(faces)
+
+
+def _check_medit(data: bytes) -> Header:
+    sections = re.findall(rb"(?m)^\s*(Vertices|Triangles|Quadrilaterals|Tetrahedra|Hexahedra|Edges)\s+(\d+)", data)
+    if not data.lstrip().startswith(b"MeshVersionFormatted") or not sections:
+        raise MeshError("not a .mesh: expected the text format that starts with MeshVersionFormatted")
+    rows = data.count(b"\n") + 1
+    promised = sum(_count(count) for _, count in sections)
+    if promised > rows:
+        names = " and ".join(f"{count.decode()} {name.decode()}" for name, count in sections)
+        raise MeshError(f".mesh promises {names}, the file has {rows} rows; {DAMAGED}")
+    return Header()
+
+
+def _check_gmsh(data: bytes) -> Header:
+    form = re.search(rb"\$MeshFormat\s+([\d.]+)\s+([01])", data[:512])
+    if not form:
+        raise MeshError("not a .msh: no $MeshFormat; save as Gmsh 4.1")
+    blocks, binary = form.group(1).startswith(b"4"), form.group(2) == b"1"
+    for section in (b"Nodes", b"Elements"):
+        start = re.search(rb"\$" + section + rb"\r?\n", data)
+        if not start or b"$End" + section not in data:
+            raise MeshError(f".msh without the whole section ${section.decode()}; {DAMAGED}")
+        if blocks and binary:
+            (count,) = struct.unpack_from("<8xQ", data.ljust(start.end() + 16, b"\0"), start.end())
+        else:
+            words = data[start.end() : start.end() + 200].splitlines()[0].split()
+            count = _count(words[1] if blocks and len(words) > 1 else words[0] if words else b"")
+        _check_room(f"{count} {section.decode()}", 2 * count, len(data) - start.end())
+    return Header()
+
+
+def _check_vtu(data: bytes) -> Header:
+    if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
+        raise MeshError(f"not a whole .vtu: no <VTKFile> ... </VTKFile>; {DAMAGED}")
+    for name in (b"NumberOfPoints", b"NumberOfCells"):
+        for match in re.findall(name + rb"\s*=\s*[\"'](\d+)[\"']", data):
+            count = _count(match)  # at least a byte each, compressed or not
+            _check_room(f"{name.decode()}={count}", count, len(data))
+    return Header()
+
+
+def _count(word: bytes | str) -> int:
+    text = word.decode("latin-1") if isinstance(word, bytes) else word
+    if not re.fullmatch(r"\d{1,18}", text):
+        raise MeshError(f"the header's count {text[:20]!r} is no number of elements; {DAMAGED}")
+    return int(text)
+
+
+def _check_room(promised: str, needed: int, available: int) -> None:
+    if needed > available:
+        raise MeshError(
+            f"the header promises {promised}, at least {needed} bytes, where {available} follow; {DAMAGED}"
+        )
+
+
+CHECKS: dict[str, Callable[[bytes], Header]] = {
+    ".stl": _check_stl,
+    ".ply": _check_ply,
+    ".off": _check_off,
+    ".mesh": _check_medit,
+    ".msh": _check_gmsh,
+    ".vtu": _check_vtu,
+}

@@ -1,0 +1,162 @@
+"""Reading a surface file: bytes within a limit, header check, the format's parser, triangles."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import tempfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .mesh_error import MeshError
+from .mesh_headers import DAMAGED, check_header
+from .mesh_obj import Array, IntArray, parse_obj, triangulate
+
+TRIMESH_FORMATS = (".stl", ".ply", ".off")
+MESHIO_FORMATS = {".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
+FORMATS = (".obj", *TRIMESH_FORMATS, *MESHIO_FORMATS)
+BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
+BYTES_AT_LEAST = 64 << 20
+OUTWARD_FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # of a tetrahedron of positive volume
+
+
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """Triangles as a file gives them: vertices (n, 3), faces (m, 3), indices in range; sha256 of the file's bytes."""
+
+    vertices: Array
+    faces: IntArray
+    sha256: str
+    notices: tuple[str, ...]
+
+
+def read_mesh(path: Path, max_faces: int) -> RawMesh:
+    """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (tetrahedra: their boundary), each also as .gz.
+
+    Raises MeshError, without the file's name.
+    """
+    suffixes = [suffix.lower() for suffix in path.suffixes]
+    packed = suffixes[-1:] == [".gz"]
+    suffix = (suffixes[:-1] if packed else suffixes)[-1:]
+    if not suffix or suffix[0] not in FORMATS:
+        raise MeshError(f"unknown format: expected a name ending in one of {' '.join(FORMATS)}, or these with .gz")
+    stored = _read_bytes(path, BYTES_AT_LEAST + BYTES_PER_FACE * max_faces)
+    data = _unpack(stored, BYTES_AT_LEAST + BYTES_PER_FACE * max_faces) if packed else stored
+    if not data.strip():
+        raise MeshError("the file is empty: export it again")
+    header = check_header(data, suffix[0], max_faces)
+    notices = [*(["unpacked from .gz"] if packed else []), *header.notices]
+    if suffix[0] == ".obj":
+        vertices, polygons, remarks = parse_obj(data, max_faces)
+        notices += remarks
+        check_indices(vertices, np.array([index for polygon in polygons for index in polygon]))
+        faces, count = triangulate(vertices, polygons), len(polygons)
+    elif suffix[0] in TRIMESH_FORMATS:
+        vertices, faces = _parse_trimesh(data, suffix[0])
+        count = header.polygons or 0
+    else:
+        vertices, faces, count = _parse_meshio(data, suffix[0])
+    if len(faces) < count:
+        raise MeshError(f"{count} faces promised, {len(faces)} read; {DAMAGED}")
+    if len(faces) > count:
+        notices.append(f"{count} polygons cut into {len(faces)} triangles")
+    return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), tuple(notices))
+
+
+def check_indices(vertices: Array, faces: IntArray) -> None:
+    """Raise MeshError where faces name vertices that do not exist."""
+    wrong = np.flatnonzero((faces.ravel() < 0) | (faces.ravel() >= len(vertices)))
+    if len(wrong):
+        raise MeshError(
+            f"{len(wrong)} vertex numbers out of range, the first is {int(faces.ravel()[wrong[0]])} (counted from 0) "
+            f"where there are {len(vertices)} vertices; export the file again"
+        )
+
+
+def _read_bytes(path: Path, limit: int) -> bytes:
+    if path.is_dir():
+        raise MeshError("is a directory: name the surface file in it")
+    try:
+        size = path.stat().st_size
+        if size > limit:
+            raise MeshError(f"{size} bytes, more than the limit of {limit}: decimate the surface or raise --max-faces")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise MeshError("no such file: check the name and the folder") from None
+    except OSError as error:
+        raise MeshError(f"cannot be read ({error.strerror}): check its permissions") from None
+
+
+def _unpack(stored: bytes, limit: int) -> bytes:
+    try:
+        with gzip.open(io.BytesIO(stored)) as stream:
+            data = stream.read(limit + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise MeshError(f"not a whole .gz file ({error}); {DAMAGED}") from None
+    if len(data) > limit:
+        raise MeshError(f"unpacks to more than {limit} bytes: decimate the surface or raise --max-faces")
+    return data
+
+
+def _parse_trimesh(data: bytes, suffix: str) -> tuple[Array, IntArray]:
+    import trimesh
+
+    try:
+        mesh = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
+        vertices = np.array(mesh.vertices, dtype=np.float64)
+        faces = np.array(mesh.faces, dtype=np.int64)
+    except Exception as error:  # a parser may fail on a damaged file in any way
+        raise MeshError(f"not readable as {suffix} ({_first_line(error)}); {DAMAGED}") from None
+    check_indices(vertices, faces)
+    return vertices, faces
+
+
+def _parse_meshio(data: bytes, suffix: str) -> tuple[Array, IntArray, int]:
+    """Vertices, triangles, and the number of polygons they were cut from."""
+    import meshio
+
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder, f"mesh{suffix}")
+        copy.write_bytes(data)
+        try:
+            mesh = meshio.read(copy, file_format=MESHIO_FORMATS[suffix])
+        except (Exception, SystemExit) as error:  # meshio exits the process on some files
+            raise MeshError(f"not readable as {suffix} ({_first_line(error)}); {DAMAGED}") from None
+    cells: dict[str, IntArray] = {}
+    for block in mesh.cells:
+        old = cells.get(block.type)
+        rows = np.asarray(block.data, dtype=np.int64)
+        cells[block.type] = rows if old is None else np.concatenate([old, rows])
+    vertices = np.asarray(mesh.points, dtype=np.float64)
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise MeshError(f"points of shape {vertices.shape} are not in space: export three coordinates each")
+    others = sorted(set(cells) - {"vertex", "line", "triangle", "quad", "tetra"})
+    if others:
+        raise MeshError(f"holds {len(cells[others[0]])} cells of type {others[0]}: save linear tetrahedra or triangles")
+    for rows in cells.values():
+        check_indices(vertices, rows)
+    if "tetra" in cells:
+        faces = tetrahedra_boundary(vertices, cells["tetra"])
+        return vertices, faces, len(faces)
+    polygons = cells.get("triangle", np.empty((0, 3), int)).tolist() + cells.get("quad", np.empty((0, 4), int)).tolist()
+    if not polygons:
+        raise MeshError("no tetrahedra and no triangles in the file: export the volume or its surface")
+    return vertices, triangulate(vertices, polygons), len(polygons)
+
+
+def tetrahedra_boundary(vertices: Array, tetrahedra: IntArray) -> IntArray:
+    """Boundary triangles (m, 3), oriented outward, of tetrahedra (k, 4) in either orientation."""
+    a, b, c, d = (vertices[tetrahedra[:, i]] for i in range(4))
+    inverted = np.sum(np.cross(b - a, c - a) * (d - a), axis=1) < 0
+    corners = np.where(inverted[:, None], tetrahedra[:, [1, 0, 2, 3]], tetrahedra)
+    faces = corners[:, OUTWARD_FACES].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return faces[np.sort(first[count == 1])]
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:120]
