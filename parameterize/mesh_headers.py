@@ -1,4 +1,4 @@
-"""Cheap checks of a surface file before a parser sees it: counts against the file's size, truncation, the format's marks.
+"""Cheap checks of a surface file before a parser sees it: counts against the size, truncation, the format's marks.
 
 Parsers allocate what a header promises and return what they could read; these checks refuse such a file first.
 """
@@ -19,7 +19,7 @@ DAMAGED = "the file is truncated or damaged, export it again"
 
 @dataclass(frozen=True)
 class Header:
-    """What the file promises: its number of polygons (None where the format does not say), and what to tell the user."""
+    """What a file promises: its number of polygons (None where the format does not say), and notices."""
 
     polygons: int | None = None
     notices: tuple[str, ...] = ()
@@ -88,9 +88,8 @@ def _check_ply(data: bytes) -> Header:
         elif words[:1] == ["property"] and len(words) >= 3 and counts and not is_text:
             least += counts[element] * PLY_BYTES.get(words[2] if words[1] == "list" else words[1], 1)
     if not counts.get("vertex") or not counts.get("face"):
-        raise MeshError(
-            f"PLY with {counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces is no surface: export faces too"
-        )
+        found = f"{counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces"
+        raise MeshError(f"PLY with {found} is no surface: export the faces too")
     promised = " and ".join(f"{count} {element}" for element, count in counts.items())
     _check_room(promised, least, len(body))
     rows = len(re.findall(rb"[^\s][^\r\n]*", body))
@@ -163,9 +162,7 @@ def _count(word: bytes | str) -> int:
 
 def _check_room(promised: str, needed: int, available: int) -> None:
     if needed > available:
-        raise MeshError(
-            f"the header promises {promised}, at least {needed} bytes, where {available} follow; {DAMAGED}"
-        )
+        raise MeshError(f"the header promises {promised}, at least {needed} bytes, where {available} follow; {DAMAGED}")
 
 
 CHECKS: dict[str, Callable[[bytes], Header]] = {

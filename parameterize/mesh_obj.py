@@ -40,7 +40,9 @@ def parse_obj(data: bytes, max_faces: int) -> tuple[Array, list[list[int]], list
             relative |= min(polygon) < 0
             polygons.append([index - 1 if index > 0 else index + len(vertices) for index in polygon])
     if not vertices or not polygons:
-        raise MeshError(f"{len(vertices)} vertices and {len(polygons)} faces are no surface: not an OBJ, or an empty one")
+        raise MeshError(
+            f"{len(vertices)} vertices and {len(polygons)} faces are no surface: not an OBJ, or an empty one"
+        )
     check_face_count(len(polygons), max_faces)
     if relative:
         notices.append("negative (relative) vertex numbers resolved")
@@ -60,7 +62,9 @@ def _polygon(words: list[str], number: int) -> list[int]:
     except ValueError:
         raise MeshError(f"line {number}: a face needs vertex numbers, got {' '.join(words[1:5])[:40]!r}") from None
     if not 3 <= len(indices) <= MAX_CORNERS:
-        raise MeshError(f"line {number}: a face has {len(indices)} corners, expected 3 to {MAX_CORNERS}: triangulate it")
+        raise MeshError(
+            f"line {number}: a face has {len(indices)} corners, expected 3 to {MAX_CORNERS}: triangulate it"
+        )
     if 0 in indices:
         raise MeshError(f"line {number}: vertex number 0, OBJ counts from 1; export the file again")
     return indices

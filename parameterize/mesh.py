@@ -1,0 +1,212 @@
+"""The gate: a closed surface as the method needs it, or a MeshError that says why not."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .mesh_check import check_genus, check_manifold, check_volume, choose_component, warnings
+from .mesh_clean import orient, signed_volume, weld_and_drop
+from .mesh_error import MeshError
+from .mesh_headers import check_face_count
+from .mesh_obj import Array, IntArray
+from .mesh_place import deepest_point
+from .mesh_read import check_indices, read_mesh
+
+__all__ = ["MAX_FACES", "MeshError", "Surface", "load_surface", "surface_from_arrays"]
+
+MAX_FACES = 500_000
+USUAL_SIZES = (1e-6, 1e6)
+COMPUTABLE_SIZES = (1e-90, 1e90)  # beyond, volumes leave double precision
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A closed surface of genus 0, one component, wound outward, with its placement in the unit cube's space.
+
+    name: the input's stem. vertices: (n, 3), user's units. faces: (m, 3) vertex numbers. source: path as given, "" for
+    arrays. sha256: of the file's bytes, or of the arrays. notices: what was mended or is doubtful, one line each.
+    scale, center: to_unit(x) = scale * (x - center) + 1/2 gives volume 1 and puts the deepest interior point at
+    (1/2, 1/2, 1/2).
+    """
+
+    name: str
+    vertices: Array
+    faces: IntArray
+    source: str
+    sha256: str
+    notices: tuple[str, ...]
+    scale: float
+    center: Array
+
+    def to_unit(self, points: ArrayLike) -> Array:
+        """Points (..., 3) in the user's units -> placed."""
+        placed: Array = self.scale * (np.asarray(points, dtype=np.float64) - self.center) + 0.5
+        return placed
+
+    def from_unit(self, points: ArrayLike) -> Array:
+        """Placed points (..., 3) -> the user's units."""
+        restored: Array = (np.asarray(points, dtype=np.float64) - 0.5) / self.scale + self.center
+        return restored
+
+    @cached_property
+    def unit_vertices(self) -> Array:
+        """Vertices (n, 3) as placed: the surface encloses volume 1."""
+        return self.to_unit(self.vertices)
+
+    @property
+    def volume(self) -> float:
+        """Enclosed volume, user's units."""
+        return float(self.scale**-3.0)
+
+    @property
+    def bbox(self) -> tuple[Array, Array]:
+        """Lowest and highest corner of the bounding box, (3,) each, user's units."""
+        return self.vertices.min(axis=0), self.vertices.max(axis=0)
+
+    def summary(self) -> dict[str, Any]:
+        """The section `input` of report.json."""
+        return {
+            "file": self.source or self.name,
+            "sha256": self.sha256,
+            "vertices": len(self.vertices),
+            "faces": len(self.faces),
+            "volume": self.volume,
+            "bbox": [corner.tolist() for corner in self.bbox],
+            "notices": list(self.notices),
+        }
+
+
+def load_surface(path: str | Path, *, component: int | None = None, max_faces: int = MAX_FACES) -> Surface:
+    """Read a surface (.obj, .stl, .ply, .off) or the boundary of tetrahedra (.mesh, .msh, .vtu), each also as .gz.
+
+    component: which one to take where the file holds several, 0 the largest. max_faces: refuse more.
+    Raises MeshError (a ValueError) of one line for a file that cannot be read or is no closed surface of genus 0.
+    """
+    source = str(path)
+    try:
+        raw = read_mesh(Path(path), max_faces)
+        name = Path(path).name.split(".")[0] or Path(path).name
+        surface = _gate(raw.vertices, raw.faces, name, source, raw.sha256, raw.notices, component, max_faces)
+    except MeshError as error:
+        raise MeshError(f"{source}: {error}") from None
+    logger.info("%s: %d vertices, %d faces", source, len(surface.vertices), len(surface.faces))
+    return surface
+
+
+def surface_from_arrays(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    name: str = "surface",
+    *,
+    component: int | None = None,
+    max_faces: int = MAX_FACES,
+) -> Surface:
+    """Surface from vertices (n, 3) and triangles (m, 3) of vertex numbers; the same checks as load_surface.
+
+    Raises MeshError (a ValueError) naming what is wrong with the arrays or the surface.
+    """
+    try:
+        points = np.array(vertices, dtype=np.float64)
+        triangles = np.asarray(faces)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise MeshError(f"vertices must have shape (n, 3), got {points.shape}")
+        if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
+            raise MeshError(f"faces must be integers of shape (m, 3), got {triangles.dtype} of shape {triangles.shape}")
+        triangles = triangles.astype(np.int64)
+        digest = hashlib.sha256(points.tobytes() + triangles.tobytes()).hexdigest()
+        return _gate(points, triangles, name, "", digest, (), component, max_faces)
+    except MeshError as error:
+        raise MeshError(f"{name}: {error}") from None
+
+
+def _gate(
+    vertices: Array,
+    faces: IntArray,
+    name: str,
+    source: str,
+    sha256: str,
+    notices: tuple[str, ...],
+    component: int | None,
+    max_faces: int,
+) -> Surface:
+    """Check, normalise, weld, choose the component, check the topology, orient, place."""
+    check_face_count(len(faces), max_faces)
+    if len(faces) < 4:
+        raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
+    _check_finite(vertices)
+    check_indices(vertices, faces)
+    middle, size, remarks = _box(vertices, faces)
+    kept, triangles, mended = weld_and_drop((vertices - middle) / size, faces)
+    if len(triangles) < 4:
+        raise MeshError(f"{len(triangles)} faces that are not degenerate, at least 4 are needed: export it again")
+
+    def where(vertex: int) -> str:
+        return "({:.6g}, {:.6g}, {:.6g})".format(*vertices[kept[vertex]])
+
+    triangles, chosen = choose_component((vertices[kept] - middle) / size, triangles, component)
+    used, compact = np.unique(triangles, return_inverse=True)
+    kept, triangles = kept[used], compact.reshape(-1, 3).astype(np.int64)
+    points = (vertices[kept] - middle) / size
+    check_manifold(triangles, where)
+    triangles, turned = _wind_outward(points, triangles)
+    check_genus(triangles)
+    doubts = warnings(points, triangles, where)
+    deepest, _ = deepest_point(points, triangles)
+    return Surface(
+        name=name,
+        vertices=vertices[kept],
+        faces=triangles,
+        source=source,
+        sha256=sha256,
+        notices=(*notices, *remarks, *mended, *chosen, *turned, *doubts),
+        scale=signed_volume(points, triangles) ** (-1.0 / 3.0) / size,
+        center=deepest * size + middle,
+    )
+
+
+def _check_finite(vertices: Array) -> None:
+    broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(broken):
+        raise MeshError(
+            f"{len(broken)} vertices with NaN or infinite coordinates, the first is vertex {broken[0]} (from 0): "
+            "export the surface again"
+        )
+
+
+def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:
+    """Middle (3,) and longest side of the box of the used vertices, and what to say about it."""
+    used = vertices[np.unique(faces)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    smallest, largest = COMPUTABLE_SIZES
+    if max(abs(low).max(), abs(high).max()) > largest:
+        raise MeshError(f"coordinates beyond {largest:g} cannot be computed with: choose a larger unit of length")
+    size = float((high - low).max())
+    if size < smallest:
+        raise MeshError(f"longest side {size:g}: the surface is a single point or far too small; choose a smaller unit")
+    remarks = []
+    if not USUAL_SIZES[0] < size < USUAL_SIZES[1]:
+        remarks.append(f"unusual size, longest side {size:g}: computed at size 1 and scaled back")
+    middle = (low + high) / 2.0
+    if abs(middle).max() > 1e6 * size:
+        remarks.append(f"far from the origin ({abs(middle).max() / size:.1e} times its size): digits are lost")
+    return middle, size, remarks
+
+
+def _wind_outward(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
+    wound = orient(faces)
+    if wound is None:
+        raise MeshError("one-sided surface (no consistent orientation): it bounds no solid")
+    faces, notices = wound
+    check_volume(vertices, faces)
+    if signed_volume(vertices, faces) < 0:
+        return faces[:, ::-1].copy(), [*notices, "inverted orientation flipped: faces now point outward"]
+    return faces, notices
