@@ -1,0 +1,138 @@
+"""The paper's Table 3, Table 4 and Figure 14 for the models it solves Poisson's equation on, ours beside the paper's.
+
+`python examples/validation.py [--preset paper] [--models DIR] [--out DIR] [--steps-factor F]` runs conch and santa4 and
+writes validation.md with the error figures beside it. The paper's santa4 is not public: its row waits for `santa4.obj` in
+the models' folder (--models, else IGA_NN_DATA, else ../shared/models).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import iga_nn
+from iga_nn.cli import main as iga_nn_main
+from iga_nn.report import read
+
+ABSENT = "model not public"
+
+
+@dataclass(frozen=True)
+class Published:
+    """The paper's row: Table 3 at the scale the model came in, Table 4 in seconds on an RTX 3080 Ti."""
+
+    arap_mean: float
+    arap_max: float
+    boundary: float
+    train: float
+    fit: float
+    total: float
+
+
+PAPER = {
+    "conch": Published(1.468, 50.818, 0.00169, 182.38, 39.02, 221.40),
+    "santa4": Published(3.936, 95.842, 0.00527, 194.23, 38.71, 232.93),
+}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run what is there, write and print the tables; 0 unless a run could not be made."""
+    options = _options(argv)
+    options.out.mkdir(parents=True, exist_ok=True)
+    reports: dict[str, dict[str, Any] | None] = {}
+    failed = False
+    for name in PAPER:
+        model = options.models / f"{name}.obj"
+        reports[name] = _run(model, options) if model.exists() else None
+        failed |= model.exists() and reports[name] is None
+    text = _document(reports, options)
+    (options.out / "validation.md").write_text(text, encoding="utf-8")
+    print(text)
+    return int(failed)
+
+
+def _options(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    fallback = Path(__file__).resolve().parents[2] / "shared" / "models"
+    parser.add_argument("--preset", default="fast", choices=("fast", "paper"))
+    parser.add_argument("--models", type=Path, default=Path(os.environ.get("IGA_NN_DATA", fallback)))
+    parser.add_argument("--out", type=Path, default=Path("out/validation"))
+    parser.add_argument("--steps-factor", type=float, default=1.0, help="shorten every stage, for a quick look")
+    parser.add_argument("--control-points", type=int, default=30)
+    return parser.parse_args(argv)
+
+
+def _run(model: Path, options: argparse.Namespace) -> dict[str, Any] | None:
+    """One model through the command a user types; its report, or None where it did not come to its end."""
+    folder = options.out / model.stem
+    command = ["run", "poisson", str(model), "--out", str(folder), "--force", "--preset", options.preset]
+    command += ["--steps-factor", str(options.steps_factor), "--control-points", str(options.control_points)]
+    code = iga_nn_main(command)
+    return read(folder) if code in (0, 3, 4) else None
+
+
+def _document(reports: dict[str, dict[str, Any] | None], options: argparse.Namespace) -> str:
+    """The tables as Markdown."""
+    short = "" if options.steps_factor == 1.0 else f", every stage shortened by {options.steps_factor}: no measurement"
+    parts = [
+        f"# Validation (iga-nn {iga_nn.__version__}, preset {options.preset}{short})",
+        _table(
+            "Table 3: quality, at the scale the models came in",
+            ("model", "", "ARAP mean", "ARAP max", "boundary rms", "certified"),
+            [row for name, report in reports.items() for row in _quality_rows(name, report)],
+        ),
+        _table(
+            "Table 4: seconds (the paper's on an RTX 3080 Ti)",
+            ("model", "", "train", "fit + optimise", "total"),
+            [row for name, report in reports.items() for row in _time_rows(name, report)],
+        ),
+        _table(
+            "Figure 14: Poisson's equation, u = exp(x+z) sin(y) (the paper's figure gives colours only)",
+            ("model", "refined", "unknowns", "L2 error", "relative", "iterations", "error distribution"),
+            [row for name, report in reports.items() for row in _solve_rows(name, report)],
+        ),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _quality_rows(name: str, report: dict[str, Any] | None) -> list[tuple[str, ...]]:
+    paper = PAPER[name]
+    theirs = (name, "paper", f"{paper.arap_mean:.3f}", f"{paper.arap_max:.3f}", f"{paper.boundary:.5f}", "-")
+    if report is None:
+        return [(name, "ours", ABSENT, "", "", ""), theirs]
+    quality = report["parameterization"]
+    arap, rms = quality["arap"]["as_given"], quality["boundary"]["as_given"]["rms"]
+    return [(name, "ours", f"{arap['mean']:.3f}", f"{arap['max']:.3f}", f"{rms:.5f}", quality["bijective"]), theirs]
+
+
+def _time_rows(name: str, report: dict[str, Any] | None) -> list[tuple[str, ...]]:
+    paper = PAPER[name]
+    theirs = (name, "paper", f"{paper.train:.2f}", f"{paper.fit:.2f}", f"{paper.total:.2f}")
+    if report is None:
+        return [(name, "ours", ABSENT, "", ""), theirs]
+    seconds = report["seconds"]
+    train, fit = seconds["train"], seconds["fit"] + seconds["optimize"]
+    return [(name, "ours", f"{train:.2f}", f"{fit:.2f}", f"{train + fit:.2f}"), theirs]
+
+
+def _solve_rows(name: str, report: dict[str, Any] | None) -> list[tuple[str, ...]]:
+    if report is None:
+        return [(name, "", ABSENT, "", "", "", "")]
+    rows = []
+    for refined, level in enumerate(report["poisson"]["levels"]):
+        figure = f"![error]({name}/error.png)" if refined == len(report["poisson"]["levels"]) - 1 else ""
+        numbers = (f"{level['l2']:.3e}", f"{level['l2_relative']:.3e}", str(level["iterations"]))
+        rows.append((name, str(refined), str(level["dofs"]), *numbers, figure))
+    return rows
+
+
+def _table(title: str, head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = [head, tuple("---" for _ in head), *rows]
+    return f"## {title}\n\n" + "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,94 @@
+"""From a closed surface mesh to a solved PDE on a certified trivariate B-spline.
+
+The public names below are loaded on first use: importing the package brings in neither torch nor VTK.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+
+def _refuse_shadowed(*names: str) -> None:
+    """Raise ImportError where a file of the user's hides one of our packages, whose names are common ones."""
+    for name in names:
+        spec = find_spec(name)
+        found = Path(spec.origin).resolve() if spec and spec.origin else None
+        if found is None or found.parent.parent != Path(__file__).resolve().parent.parent:
+            raise ImportError(
+                f"iga_nn needs its own package '{name}', but '{name}' is {found or 'not installed'}; "
+                f"rename that file, or start Python with 'python -P' so that the script's folder is not searched first"
+            )
+
+
+_refuse_shadowed("parameterize", "solve")
+
+if TYPE_CHECKING:
+    from parameterize.certificate import certify
+    from parameterize.config import preset
+    from parameterize.mesh import MeshError, Surface, load_surface
+    from parameterize.run import Parameterization, parameterize
+    from parameterize.volume import BSplineVolume
+    from solve import Poisson, convergence
+    from solve import solve_poisson as solve
+
+    from .options import InputError, MapOptions, PoissonOptions
+    from .pipeline import run
+    from .samples import sample
+
+_HOME = {
+    "BSplineVolume": "parameterize.volume",
+    "InputError": "iga_nn.options",
+    "MapOptions": "iga_nn.options",
+    "MeshError": "parameterize.mesh",
+    "Parameterization": "parameterize.run",
+    "Poisson": "solve",
+    "PoissonOptions": "iga_nn.options",
+    "Surface": "parameterize.mesh",
+    "certify": "parameterize.certificate",
+    "convergence": "solve",
+    "load_surface": "parameterize.mesh",
+    "parameterize": "parameterize.run",
+    "preset": "parameterize.config",
+    "run": "iga_nn.pipeline",
+    "sample": "iga_nn.samples",
+    "solve": "solve:solve_poisson",
+}
+
+__all__ = [
+    "BSplineVolume",
+    "InputError",
+    "MapOptions",
+    "MeshError",
+    "Parameterization",
+    "Poisson",
+    "PoissonOptions",
+    "Surface",
+    "__version__",
+    "certify",
+    "convergence",
+    "load_surface",
+    "parameterize",
+    "preset",
+    "run",
+    "sample",
+    "solve",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from the module it lives in (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'iga_nn' has no attribute {name!r}")
+    module, _, attribute = _HOME[name].partition(":")
+    value = getattr(import_module(module), attribute or name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})

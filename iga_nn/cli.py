@@ -1,0 +1,201 @@
+"""The command line `iga-nn`: arguments, exit codes, progress; nothing is computed here."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+
+from parameterize.mesh import MAX_FACES, MeshError
+from solve.expressions import ExpressionError
+
+from . import __version__, console, pipeline
+from . import report as reports
+from .options import InputError, MapOptions, PoissonOptions, input_errors
+from .pipeline import Outcome
+
+DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
+
+app = App(
+    name="iga-nn",
+    help="From a closed surface mesh to a solved PDE on a certified trivariate B-spline.",
+    version=f"iga-nn {__version__}",
+    suppress_keyboard_interrupt=False,
+    default_parameter=Parameter(negative=()),
+)
+run_app = App(name="run", help="A surface, all the way to a solved problem.")
+solve_app = App(name="solve", help="A problem on a volume.npz.")
+app.command(run_app)
+app.command(solve_app)
+
+
+Json = Annotated[bool, Parameter(name="--json")]
+
+
+@dataclass(frozen=True)
+class OutputOptions:
+    """Where the results go, and what is said about them.
+
+    Args:
+        out: output folder; the input's stem in the current folder by default.
+        force: replace a finished result in that folder.
+        quiet: no progress.
+        as_json: the verdict as JSON on stdout.
+    """
+
+    out: Path | None = None
+    force: bool = False
+    quiet: bool = False
+    as_json: Json = False
+
+
+Output = Annotated[OutputOptions, Parameter(name="*")]
+Mapping = Annotated[MapOptions, Parameter(name="*")]
+Equation = Annotated[PoissonOptions, Parameter(name="*")]
+
+NO_OUTPUT, NO_MAPPING, NO_POISSON = OutputOptions(), MapOptions(), PoissonOptions()
+
+
+@run_app.command(name="poisson")
+def run_poisson(
+    mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapping = NO_MAPPING, poisson: Equation = NO_POISSON
+) -> int:
+    """Parameterize a surface, certify the spline and solve Poisson's equation on it.
+
+    Args:
+        mesh: path of a closed surface, or the name of a sample or a model.
+    """
+    with console.progress_line(output.quiet) as progress:
+        outcome = pipeline.run(
+            "poisson", mesh, output.out, mapping=mapping, poisson=poisson, force=output.force, progress=progress
+        )
+    return _tell(outcome, output)
+
+
+@app.command(name="parameterize")
+def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapping = NO_MAPPING) -> int:
+    """Turn a surface into a certified trivariate B-spline.
+
+    Args:
+        mesh: path of a closed surface, or the name of a sample or a model.
+    """
+    with console.progress_line(output.quiet) as progress:
+        outcome = pipeline.parameterize_to(mesh, output.out, mapping=mapping, force=output.force, progress=progress)
+    return _tell(outcome, output)
+
+
+@solve_app.command(name="poisson")
+def solve_poisson(volume: Path, /, *, output: Output = NO_OUTPUT, poisson: Equation = NO_POISSON) -> int:
+    """Solve Poisson's equation on a volume.npz.
+
+    Args:
+        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+    """
+    with console.progress_line(output.quiet):
+        outcome = pipeline.solve_to(volume, output.out, poisson=poisson, force=output.force)
+    return _tell(outcome, output)
+
+
+@app.command(name="check")
+def check(path: str, /, *, component: int | None = None, max_faces: int = MAX_FACES, as_json: Json = False) -> int:
+    """Say whether a surface is accepted, or whether a volume.npz is certified; writes nothing.
+
+    Args:
+        path: surface, sample's or model's name, or a volume (.npz).
+        component: which connected piece of the file to take, counted from 0.
+        max_faces: refuse larger surfaces.
+        as_json: the verdict as JSON on stdout.
+    """
+    is_volume = path.endswith(".npz")
+    verdict = pipeline.check_volume(path) if is_volume else pipeline.check_surface(path, component, max_faces)
+    if as_json:
+        print(json.dumps(reports.plain(verdict), indent=2))
+    else:
+        print("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
+    return NOT_CERTIFIED if is_volume and verdict["bijective"] != "certified" else DONE
+
+
+@app.command(name="sample")
+def write_sample(name: str, /, *, out: Path | None = None) -> int:
+    """Write a surface made by formula as an OBJ file.
+
+    Args:
+        name: one of the samples.
+        out: file to write; NAME.obj in the current folder by default.
+    """
+    from .samples import sample, write_obj
+
+    with input_errors():
+        surface = sample(name)
+    target = out or Path(f"{name}.obj")
+    write_obj(surface, target)
+    print(target)
+    return DONE
+
+
+@app.command(name="fetch")
+def fetch_model(name: str, /, *, out: Path | None = None) -> int:
+    """Write one of the published models as an OBJ file, downloading it where it is not at hand.
+
+    Args:
+        name: one of the models.
+        out: file to write; NAME.obj in the current folder by default.
+    """
+    from .data import fetch
+
+    print(fetch(name, out))
+    return DONE
+
+
+def main(argv: list[str]) -> int:
+    """Run one command and return its exit code; everything but a bug of ours ends in one line and a code."""
+    try:
+        code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
+    except KeyboardInterrupt:
+        print("iga-nn: interrupted; the same command with --resume goes on from the checkpoint", file=sys.stderr)
+        return INTERRUPTED
+    except (CycloptsError, InputError, MeshError, ExpressionError, OSError) as error:
+        print(f"iga-nn: {' '.join(str(error).split())}", file=sys.stderr)
+        return BAD_INPUT
+    return code if isinstance(code, int) else DONE  # --help and --version return nothing
+
+
+def run_and_exit() -> None:
+    """Run the console script."""
+    sys.exit(main(sys.argv[1:]))
+
+
+def _tell(outcome: Outcome, output: OutputOptions) -> int:
+    """Say the verdict and return the exit code: 3 wins over 4."""
+    verdict = reports.verdict(outcome.report, outcome.folder)
+    print(json.dumps(reports.plain(verdict), indent=2) if output.as_json else "\n".join(_lines(verdict)))
+    if not reports.is_certified(outcome.report):
+        return NOT_CERTIFIED
+    return DONE if reports.is_converged(outcome.report) else NOT_CONVERGED
+
+
+def _lines(verdict: dict[str, Any]) -> list[str]:
+    """The verdict for a reader, one fact a line."""
+    lines = [f"bijective        {verdict['bijective']}"]
+    for scale, arap in verdict.get("arap", {}).items():
+        rms = verdict["boundary_rms"][scale]
+        lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
+    for level in verdict.get("levels", []):
+        error = f"L2 error {level['l2']:.3e}, " if "l2" in level else ""
+        end = "" if level["converged"] else ", NOT CONVERGED"
+        lines.append(f"{level['dofs']:>8} unknowns {error}{level['iterations']} iterations{end}")
+    lines += [f"warning: {notice}" for notice in verdict.get("notices", [])]
+    lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")
+    return lines
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(item) for item in value) or "none"
+    return str(value)

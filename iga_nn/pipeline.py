@@ -1,0 +1,265 @@
+"""Both rooms in order, and the folder they leave: surface -> volume -> solution -> report and figures.
+
+Every file is written as soon as its content is known, so that a late failure costs nothing that was computed before.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import TYPE_CHECKING, Any, Literal
+
+from parameterize.files import save_arrays
+from parameterize.volume import BSplineVolume
+
+from . import report as reports
+from .options import InputError, MapOptions, PoissonOptions, input_errors, read_corners
+
+if TYPE_CHECKING:
+    from parameterize.mesh import Surface
+    from parameterize.progress import ProgressCallback
+    from parameterize.run import Parameterization
+    from solve import Poisson, Solution
+
+log = logging.getLogger(__name__)
+
+CHECKPOINT = "checkpoint"
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A finished output folder and what its report.json says."""
+
+    folder: Path
+    report: reports.Report
+
+
+@dataclass
+class _Run:
+    """One output folder being filled: its report so far, and the clock."""
+
+    folder: Path
+    report: reports.Report = field(default_factory=lambda: {"schema": reports.SCHEMA})
+    seconds: dict[str, float] = field(default_factory=dict)
+    started: float = field(default_factory=time.perf_counter)
+
+    @contextmanager
+    def timed(self, step: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
+
+    def begin(self) -> None:
+        """The input is good: from here on nothing in the folder counts as finished."""
+        (self.folder / reports.FILE_NAME).unlink(missing_ok=True)
+
+    def write(self, **sections: Any) -> None:
+        self.report.update(sections)
+        reports.write(self.folder, self.report | {"seconds": self.seconds})
+
+    def finish(self) -> Outcome:
+        self.seconds["total"] = time.perf_counter() - self.started
+        self.write(seconds=self.seconds)
+        return Outcome(self.folder, reports.plain(self.report))
+
+
+def run(
+    problem: Literal["poisson"],
+    mesh: str | Path,
+    out: str | Path | None = None,
+    *,
+    mapping: MapOptions | None = None,
+    poisson: PoissonOptions | None = None,
+    force: bool = False,
+    progress: ProgressCallback | None = None,
+) -> Outcome:
+    """From a surface to a solved problem, all files of design in `out` (default: the input's stem).
+
+    mesh: path of a closed surface, or a sample's or model's name.
+    Raises MeshError for a surface that cannot be taken, solve.ExpressionError for a formula, InputError for other
+    options and for an output folder that is finished (unless `force`) or cannot be written.
+    """
+    if problem != "poisson":
+        raise InputError(f"problem {problem!r}: only 'poisson' can be solved")
+    mapping, poisson = mapping or MapOptions(), poisson or PoissonOptions()
+    equation = poisson.problem()
+    state, finished = _open(mesh, out, force, mapping.resume)
+    if finished:
+        return finished
+    result = _parameterize(state, mesh, mapping, progress)
+    _solve(state, result.volume, equation, poisson)
+    return state.finish()
+
+
+def parameterize_to(
+    mesh: str | Path,
+    out: str | Path | None = None,
+    *,
+    mapping: MapOptions | None = None,
+    force: bool = False,
+    progress: ProgressCallback | None = None,
+) -> Outcome:
+    """From a surface to volume.npz, boundary.npz, history.npz, report.json and figures; raises as `run` does."""
+    mapping = mapping or MapOptions()
+    state, finished = _open(mesh, out, force, mapping.resume)
+    if finished:
+        return finished
+    _parameterize(state, mesh, mapping, progress)
+    return state.finish()
+
+
+def solve_to(
+    volume: str | Path, out: str | Path | None = None, *, poisson: PoissonOptions | None = None, force: bool = False
+) -> Outcome:
+    """Solve on a saved volume: solution.npz, report.json, error.png; raises as `run` does. Needs no torch."""
+    poisson = poisson or PoissonOptions()
+    equation = poisson.problem()
+    path = Path(volume)
+    loaded = _load_volume(path)
+    state, _ = _open(path, out, force)
+    state.begin()
+    with state.timed("certify"):
+        certificate = _certify(loaded)
+    log.info("certificate: %s", certificate["bijective"])
+    state.write(
+        input={"file": str(volume), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
+        versions=reports.versions(),
+        parameterization=certificate,
+    )
+    _solve(state, loaded, equation, poisson)
+    return state.finish()
+
+
+def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str, Any]:
+    """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not."""
+    return _load(mesh, component, max_faces).summary()
+
+
+def check_volume(path: str | Path) -> dict[str, Any]:
+    """The certificate of a saved volume. Raises InputError for a file that is none."""
+    return _certify(_load_volume(path))
+
+
+def _open(source: str | Path, out: str | Path | None, force: bool, resume: bool = False) -> tuple[_Run, Outcome | None]:
+    """Make the output folder and try it before anything costly; on --resume a finished one is the answer."""
+    folder = Path(out) if out is not None else Path(Path(source).name.split(".")[0])
+    known = reports.read(folder)
+    if known is not None and reports.is_finished(known) and not force:
+        if resume:
+            return _Run(folder), Outcome(folder, known)
+        raise InputError(f"{folder}: holds a finished result; --force replaces it, --out names another folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); --out names another folder") from None
+    return _Run(folder), None
+
+
+def _parameterize(
+    state: _Run, mesh: str | Path, options: MapOptions, progress: ProgressCallback | None
+) -> Parameterization:
+    config = options.config()
+    with state.timed("load"):
+        surface = _load(mesh, options.component, options.max_faces)
+        corners = read_corners(options.corners, len(surface.vertices)) if options.corners else None
+    log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
+    for notice in surface.notices:
+        log.warning("%s: %s", surface.name, notice)
+    state.begin()
+    from parameterize.run import parameterize
+
+    checkpoint = state.folder / CHECKPOINT
+    result = parameterize(
+        surface,
+        config,
+        seed=options.seed,
+        device=options.device,
+        corners=corners,
+        progress=progress,
+        checkpoint_dir=checkpoint,
+        resume=options.resume,
+    )
+    state.seconds.update(result.seconds)
+    result.volume.save(state.folder / "volume.npz")
+    result.boundary.save(state.folder / "boundary.npz")
+    save_arrays(state.folder / "history.npz", **result.history)
+    state.write(
+        input=surface.summary(),
+        config=asdict(config),
+        seed=options.seed,
+        device=result.device,
+        versions=reports.versions(),
+        parameterization=result.quality.as_dict(),
+    )
+    log.info("certificate: %s", result.certificate.verdict)
+    shutil.rmtree(checkpoint, ignore_errors=True)  # the files above replace it
+    _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history))
+    return result
+
+
+def _solve(state: _Run, volume: BSplineVolume, equation: Poisson, options: PoissonOptions) -> None:
+    from solve import rates, solve_poisson
+
+    verdict = state.report["parameterization"]["bijective"]
+    solutions: list[Solution] = []
+    with state.timed("solve"):
+        for level in sorted(options.refine):
+            with input_errors():
+                solution = solve_poisson(volume, equation, refine=level, degree=options.degree, certified=verdict)
+            solutions.append(solution)
+            log.info("solved, refined %d times: %s", level, solution.report)
+            solution.save(state.folder / "solution.npz")  # the finest so far
+    found = [solution.report for solution in solutions]
+    given = {"exact": equation.exact, "source": equation.source, "boundary": equation.boundary}
+    state.write(
+        poisson={
+            **{name: formula for name, formula in given.items() if formula is not None},
+            "levels": [item.as_dict() for item in found],
+            "rates": rates(found),
+            "notices": list(dict.fromkeys(notice for item in found for notice in item.notices)),  # each once
+        }
+    )
+    if equation.exact is not None:
+        _draw(state, lambda plotting: plotting.draw_solution(state.folder, volume, solutions[-1], equation))
+
+
+def _load(mesh: str | Path, component: int | None, max_faces: int) -> Surface:
+    from .data import resolve
+
+    return resolve(str(mesh), component=component, max_faces=max_faces)
+
+
+def _load_volume(path: str | Path) -> BSplineVolume:
+    with input_errors():
+        return BSplineVolume.load(path)
+
+
+def _certify(volume: BSplineVolume) -> dict[str, Any]:
+    """What the section `parameterization` of report.json says of a volume alone."""
+    from parameterize.certificate import certify
+
+    certificate = certify(volume)
+    return {
+        "control_points": list(volume.shape),
+        "degrees": list(volume.degrees),
+        "bijective": certificate.verdict,
+        "det_lower_bound": certificate.lower_bound,
+        "witness": certificate.witness,
+    }
+
+
+def _draw(state: _Run, draw: Callable[[Any], None]) -> None:
+    """Figures, where this machine can draw; a figure that fails never costs the result."""
+    from . import plotting
+
+    with state.timed("report"):
+        draw(plotting)

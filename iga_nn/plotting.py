@@ -1,0 +1,214 @@
+"""The figures of an output folder. All values are those of the spline itself, sampled here: VTK only draws them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from parameterize.bspline import Array
+from parameterize.quality import arap
+from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
+
+from .rendering import Patch, can_draw, draw, widest_view
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from solve import Poisson, Solution
+
+SAMPLES = 141  # a direction and patch
+PANEL = (900, 700)  # pixels of one view
+FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # distinct for the colour-blind, too
+MAP = "viridis"  # perceptually uniform
+
+
+def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Poisson) -> None:
+    """Write error.png, where VTK can draw."""
+    if can_draw():
+        draw_error(folder / "error.png", volume, solution, problem)
+
+
+def draw_map(folder: Path, volume: BSplineVolume, history: dict[str, NDArray[Any]]) -> None:
+    """Write faces.png, distortion.png (where VTK can draw) and history.png."""
+    draw_history(folder / "history.png", history)
+    if can_draw():
+        draw_faces(folder / "faces.png", volume)
+        draw_distortion(folder / "distortion.png", volume)
+
+
+def draw_faces(path: Path, volume: BSplineVolume) -> None:
+    """The images of the six faces of the cube, each in its colour, from the front and from behind."""
+    from matplotlib.colors import to_rgb
+    from matplotlib.patches import Patch as Swatch
+
+    patches = []
+    for face, color in enumerate(FACE_COLORS):
+        points = volume.grid(*_face_grid(face)).reshape(SAMPLES, SAMPLES, 3)
+        patches.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape)))
+    figure, (panels,) = _panels(1, 2)
+    _show_around(panels, patches)
+    swatches = [
+        Swatch(color=color, label=_face_label(name)) for name, color in zip(FACE_NAMES, FACE_COLORS, strict=True)
+    ]
+    figure.legend(handles=swatches, loc="outside lower center", ncols=6, frameon=False, fontsize=12)
+    figure.suptitle("Images of the six faces of the unit cube", fontsize=14)
+    _save(figure, path)
+
+
+def draw_distortion(path: Path, volume: BSplineVolume) -> None:
+    """tanh(sqrt(ARAP) / 2), as the paper colours it, on the images of u = 1/2, v = 1/2 and w = 1/2; units as given."""
+    from matplotlib.colors import Normalize
+
+    norm = Normalize(0.0, 1.0)
+    figure, (panels,) = _panels(1, 3)
+    for axis, panel in enumerate(panels):
+        grid = _section_grid(axis)
+        points = volume.grid(*grid).reshape(SAMPLES, SAMPLES, 3)
+        energy = arap(volume.grid_jacobian(*grid)).reshape(SAMPLES, SAMPLES)
+        patch = Patch(points, _colors(np.tanh(np.sqrt(energy) / 2.0), norm), lit=False)
+        panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
+        panel.set_title(f"{AXES[axis]} = 1/2", fontsize=13)
+    _color_bar(figure, panels, norm, "tanh(√ARAP / 2), scale as given")
+    figure.suptitle("Distortion on the mid-sections", fontsize=14)
+    _save(figure, path)
+
+
+def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Poisson) -> None:
+    """|u - u_h| on the boundary and on the three mid-sections, logarithmic colours; the error norms beside it."""
+    from matplotlib.colors import LogNorm
+
+    grids = [_face_grid(face) for face in range(6)] + [_section_grid(axis) for axis in range(3)]
+    points = [volume.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
+    errors = [_error(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
+    top = max(float(error.max()) for error in errors) or 1.0
+    norm = LogNorm(1e-4 * top, top, clip=True)
+    figure, rows = _panels(2, 3)
+    boundary = [Patch(p, _colors(e, norm)) for p, e in zip(points[:6], errors[:6], strict=True)]
+    _show_around(rows[0][:2], boundary)
+    _write_numbers(rows[0][2], solution)
+    for axis, panel in enumerate(rows[1]):
+        patch = Patch(points[6 + axis], _colors(errors[6 + axis], norm), lit=False)
+        panel.imshow(draw([patch], widest_view(patch.points.reshape(-1, 3)), PANEL))
+        panel.set_title(f"{AXES[axis]} = 1/2", fontsize=13)
+    _color_bar(figure, rows, norm, r"$|u - u_h|$")
+    figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
+    _save(figure, path)
+
+
+def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
+    """Loss and its unweighted terms over the steps, folded samples below; the stages marked."""
+    terms = [name for name in history if name not in ("stage", "step", "loss", "folded")]
+    steps = np.arange(len(history["loss"]))
+    figure, (upper, lower) = _blank(2, 1, (11, 6), sharex=True, height_ratios=(4, 1))
+    for name in terms:
+        upper.plot(steps, _positive(history[name]), linewidth=0.8, alpha=0.8, label=name)
+    upper.plot(steps, _positive(history["loss"]), color="black", linewidth=1.4, label="loss")
+    upper.set_yscale("log")
+    upper.set_ylabel("loss, and its terms without their weights")
+    upper.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    lower.plot(steps, history["folded"], color="firebrick", linewidth=1.0)
+    lower.set_yscale("symlog", linthresh=1.0)
+    lower.set_ylim(bottom=0.0)
+    lower.set_ylabel("folded")
+    lower.set_xlabel("step")
+    stages = history["stage"]
+    for start in np.flatnonzero(np.r_[True, stages[1:] != stages[:-1]]):
+        for axes in (upper, lower):
+            axes.axvline(start, color="grey", linewidth=0.7, linestyle=":")
+        upper.annotate(
+            str(stages[start]), (start, 1.0), (3, 3), xycoords=upper.get_xaxis_transform(), textcoords="offset points"
+        )
+    _save(figure, path)
+
+
+def _face_grid(face: int) -> tuple[Array, Array, Array]:
+    """Parameters of SAMPLES x SAMPLES points on a face of the cube, in the order of FACE_NAMES."""
+    return _grid(face // 2, float(face % 2))
+
+
+def _section_grid(axis: int) -> tuple[Array, Array, Array]:
+    return _grid(axis, 0.5)
+
+
+def _grid(axis: int, value: float) -> tuple[Array, Array, Array]:
+    u, v, w = (np.array([value]) if a == axis else np.linspace(0.0, 1.0, SAMPLES) for a in range(3))
+    return u, v, w
+
+
+def _error(solution: Solution, problem: Poisson, grid: tuple[Array, Array, Array], points: Array) -> Array:
+    """|u - u_h| at the samples of a grid whose images are `points` (SAMPLES, SAMPLES, 3)."""
+    exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
+    return np.abs(solution.grid(*grid).reshape(SAMPLES, SAMPLES) - exact)
+
+
+def _colors(values: Array, norm: Any) -> Array:
+    """Red, green, blue (m, n, 3) of values (m, n)."""
+    from matplotlib import colormaps
+
+    return np.asarray(colormaps[MAP](norm(values)))[..., :3]
+
+
+def _face_label(name: str) -> str:
+    return f"{name[0]} = {name[1]}"
+
+
+def _positive(values: NDArray[Any]) -> Array:
+    """What a logarithmic axis can show; the rest is left out."""
+    numbers = np.asarray(values, dtype=np.float64)
+    return np.where(numbers > 0.0, numbers, np.nan)
+
+
+def _blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
+    """A figure of its own, outside pyplot: nothing to close, no window system asked."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=inches, dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    height_ratios = grid.pop("height_ratios", None)
+    return figure, figure.subplots(rows, columns, height_ratios=height_ratios, **grid)
+
+
+def _panels(rows: int, columns: int) -> tuple[Figure, Any]:
+    """A figure of empty panels for rendered views, axes (rows, columns)."""
+    figure, axes = _blank(rows, columns, (4.6 * columns, 3.8 * rows + 0.8), squeeze=False)
+    for panel in axes.flat:
+        panel.set_axis_off()
+    return figure, axes
+
+
+def _show_around(panels: Any, patches: list[Patch]) -> None:
+    """The same patches from the front and from behind."""
+    view = widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
+    for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
+        panel.imshow(draw(patches, direction, PANEL))
+        panel.set_title(title, fontsize=13)
+
+
+def _write_numbers(panel: Any, solution: Solution) -> None:
+    report = solution.report
+    norms = [("L2 error", report.l2), ("relative", report.l2_relative), ("H1 seminorm", report.h1_seminorm)]
+    lines = [f"{report.dofs:,} unknowns".replace(",", " ")]
+    lines += [f"{name} {value:.3e}" for name, value in norms if value is not None]
+    panel.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", fontsize=14, linespacing=1.8)
+
+
+def _color_bar(figure: Figure, panels: Any, norm: Any, title: str) -> None:
+    from matplotlib.cm import ScalarMappable
+
+    bar = figure.colorbar(ScalarMappable(norm, MAP), ax=panels, shrink=0.85, aspect=28)
+    bar.set_label(title, fontsize=13)
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """Write the PNG under a temporary name, then rename it."""
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.png")
+    try:
+        figure.savefig(temporary)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

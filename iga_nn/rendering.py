@@ -1,0 +1,138 @@
+"""Pictures of surface patches by VTK, off screen, where this machine can draw at all."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from parameterize.bspline import Array
+
+log = logging.getLogger(__name__)
+
+REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
+PROBE = """
+import pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
+plotter.add_mesh(pyvista.Sphere(), color="red")
+image = plotter.screenshot(return_img=True)
+raise SystemExit(0 if image.std() > 1.0 else 1)
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A surface patch given by samples on a tensor grid.
+
+    points: (m, n, 3). colors: (m, n, 3) red, green, blue in 0..1, shown as they are where `lit` is false.
+    """
+
+    points: Array
+    colors: Array
+    lit: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Orthonormal directions of a camera: what is to the right, what is up, and where the viewer stands."""
+
+    right: Array
+    up: Array
+    towards: Array
+
+    def turned(self) -> View:
+        """The same scene from behind."""
+        return View(-self.right, self.up, -self.towards)
+
+
+@cache
+def can_draw() -> bool:
+    """Whether VTK can draw here. Asked in a child process: without a graphics library it does not fail, it crashes."""
+    _without_display()
+    probe = [sys.executable, "-P", "-c", PROBE]
+    try:
+        done = subprocess.run(probe, capture_output=True, timeout=120, check=False).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        done = False
+    if not done:
+        log.warning("no figures: VTK cannot draw on this machine; remedy: %s", REMEDY)
+    return done
+
+
+def _without_display() -> None:
+    """Where there is no X server, let VTK take EGL at once instead of trying X first and complaining."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+def widest_view(points: Array, tilt: float = 0.0) -> View:
+    """The view that shows most of a point cloud (k, 3): along its thinnest principal axis, the longest one horizontal.
+
+    tilt: radians the viewer is moved up and sideways, so that a solid shows more than one side.
+    """
+    centred = points - points.mean(axis=0)
+    _, _, axes = np.linalg.svd(centred.T @ centred)
+    right, up = axes[0], axes[1]
+    right = right * np.sign(right[np.argmax(np.abs(right))])  # the sign of a principal axis is arbitrary: fix it
+    up = up * np.sign(up[np.argmax(np.abs(up))])
+    towards = np.cross(right, up)
+    towards = np.cos(tilt) * towards + np.sin(tilt) * (0.8 * up + 0.6 * right)
+    right = np.cross(up, towards)
+    right /= np.linalg.norm(right)
+    return View(right, np.cross(towards, right), towards)
+
+
+def draw(patches: Sequence[Patch], view: View, pixels: tuple[int, int]) -> NDArray[np.uint8]:
+    """Picture (height, width, 3) of the patches, parallel projection, framed to fill `pixels` = (width, height)."""
+    import pyvista
+
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=list(pixels), lighting="none")
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    for patch in patches:
+        plotter.add_mesh(
+            _mesh(patch),
+            scalars="rgb",
+            rgb=True,
+            smooth_shading=patch.lit,
+            lighting=patch.lit,
+            ambient=0.5,
+            diffuse=0.55,
+        )
+    _aim(plotter, np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), view, pixels)
+    plotter.add_light(pyvista.Light(light_type="headlight", intensity=0.9))
+    image: NDArray[np.uint8] = plotter.screenshot(return_img=True)
+    plotter.close()
+    return image
+
+
+def _mesh(patch: Patch) -> Any:
+    import pyvista
+
+    x, y, z = np.moveaxis(patch.points[:, :, None, :], -1, 0)  # each (m, n, 1)
+    grid = pyvista.StructuredGrid(x, y, z)
+    flat = patch.colors.transpose(1, 0, 2).reshape(-1, 3)  # VTK counts the first index fastest
+    grid["rgb"] = np.round(255.0 * flat).astype(np.uint8)
+    return grid.extract_surface(algorithm="dataset_surface") if patch.lit else grid
+
+
+def _aim(plotter: Any, points: Array, view: View, pixels: tuple[int, int]) -> None:
+    """Place the camera so that the whole cloud is seen, with a margin of 4 %."""
+    frame = np.stack([view.right, view.up, view.towards], axis=1)  # (3, 3), columns
+    low, high = (points @ frame).min(axis=0), (points @ frame).max(axis=0)
+    width, height, depth = high - low
+    focus = frame @ ((low + high) / 2.0)
+    size = float(np.linalg.norm(high - low))
+    camera = plotter.camera
+    camera.enable_parallel_projection()
+    camera.focal_point, camera.position, camera.up = focus, focus + 2.0 * size * view.towards, view.up
+    camera.parallel_scale = 0.54 * max(height, width * pixels[1] / pixels[0])
+    camera.clipping_range = (2.0 * size - depth, 2.0 * size + depth)

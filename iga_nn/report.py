@@ -1,0 +1,89 @@
+"""report.json: assembled from results, written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from parameterize.files import save_text
+
+from . import __version__
+
+SCHEMA = 1
+FILE_NAME = "report.json"
+
+Report = dict[str, Any]
+
+
+def versions() -> dict[str, str]:
+    """Versions of what decides the numbers."""
+    packages = {name: version(name) for name in ("numpy", "scipy", "torch")}
+    return {"python": platform.python_version(), **packages, "iga-nn": __version__}
+
+
+def plain(value: Any) -> Any:
+    """The same content in JSON's own types: arrays become lists; what is not a finite number becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Path):
+        return str(value)
+    return value
+
+
+def write(folder: Path, report: Mapping[str, Any]) -> None:
+    """Write report.json; atomic."""
+    save_text(folder / FILE_NAME, json.dumps(plain(report), indent=2, allow_nan=False) + "\n")
+
+
+def read(folder: Path) -> Report | None:
+    """The report in a folder, or None where there is none or it is not one of ours."""
+    try:
+        report = json.loads((folder / FILE_NAME).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return report if isinstance(report, dict) and report.get("schema") == SCHEMA else None
+
+
+def is_finished(report: Report | None) -> bool:
+    """Whether the run that wrote this report came to its end."""
+    return report is not None and "total" in report.get("seconds", {})
+
+
+def is_certified(report: Report) -> bool:
+    """Whether the spline's Jacobian determinant was proved positive on the whole cube."""
+    return bool(report["parameterization"]["bijective"] == "certified")
+
+
+def is_converged(report: Report) -> bool:
+    """Whether every solve converged; True where nothing was solved."""
+    return all(level["converged"] for level in report.get("poisson", {}).get("levels", []))
+
+
+def verdict(report: Report, folder: Path) -> Report:
+    """What decides whether a result is used: the `--json` answer of the command line."""
+    quality = report["parameterization"]
+    short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
+    if "arap" in quality:
+        short["arap"] = quality["arap"]
+        short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
+    if "poisson" in report:
+        keys = ("dofs", "l2", "l2_relative", "h1_seminorm", "iterations", "converged")
+        short["levels"] = [{key: level[key] for key in keys if key in level} for level in report["poisson"]["levels"]]
+        short["notices"] = report["poisson"]["notices"]
+    short["seconds"] = report["seconds"]["total"]
+    return short

@@ -1,0 +1,79 @@
+"""What the tests of the front door share: a training that takes no time. Imports wait until they are used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+STAGES = ("S(2)", "S(1)", "cube", "corners", "edges")
+
+
+def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
+    """A result as training leaves it, from the benchmark map; amplitude 0.4 folds it."""
+    from iga_nn.samples import sample
+    from parameterize.boundary import BoundaryMap
+    from parameterize.certificate import certify
+    from parameterize.config import preset
+    from parameterize.quality import measure
+    from parameterize.run import Parameterization
+    from solve.study import benchmark_volume
+
+    cube = sample("cube")
+    volume = benchmark_volume(4, amplitude=amplitude)
+    boundary = BoundaryMap(volume(cube.vertices), cube.vertices, cube.faces)
+    certificate = certify(volume)
+    quality = measure(volume, boundary.vertices, boundary.faces, cube.scale, boundary, certificate)
+    steps = np.arange(50)
+    history = {
+        "stage": np.repeat(STAGES, 10),
+        "step": np.tile(np.arange(10), 5),
+        "loss": np.exp(-0.1 * steps),
+        "folded": np.maximum(0, 20 - steps),
+        "arap": 0.3 * np.exp(-0.05 * steps),
+        "cor": np.where(steps < 30, np.nan, 1e-3),
+    }
+    seconds = {"train": 1.0, "fit": 0.5, "optimize": 0.5, "certify": certificate.seconds}
+    return Parameterization(
+        volume=volume,
+        boundary=boundary,
+        certificate=certificate,
+        quality=quality,
+        history=history,
+        seconds=seconds,
+        device="cpu",
+        seed=given.get("seed", 0),
+        config=given.get("config") or preset("fast"),
+    )
+
+
+@pytest.fixture
+def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Replace the training by the benchmark map: `formula_training()`, or with an amplitude, or an error to raise."""
+
+    def install(amplitude: float = 0.08, error: BaseException | None = None) -> None:
+        from parameterize.progress import Progress
+
+        result = formula_parameterization(amplitude)
+
+        def parameterize(surface: Any, config: Any = None, *, progress: Any = None, **_: Any) -> Any:
+            if error is not None:
+                raise error
+            for step in range(3):
+                if progress is not None:
+                    progress(Progress("S(2)", step, 3, 0.5, 0, 1.0))
+            return result
+
+        monkeypatch.setattr("parameterize.run.parameterize", parameterize)
+
+    return install
+
+
+@pytest.fixture
+def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty current folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import iga_nn
+from iga_nn.cli import main
+
+EXAMPLES = Path(iga_nn.__file__).resolve().parents[1] / "examples"
+
+
+def load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_first_run(capsys):
+    load("first_run").main("ellipsoid", iga_nn.preset("fast").scaled(0.005).with_control_points(8), levels=2)
+    out = capsys.readouterr().out
+    assert "L2 rate" in out and "ARAP" in out
+
+
+def test_convergence_rates():
+    tables = load("convergence").main(degrees=(2, 3), levels=3)
+    for degree, rows in tables.items():
+        assert rows[-1].rate_l2 == pytest.approx(degree + 1, abs=0.25)
+        assert rows[-1].rate_h1 == pytest.approx(degree, abs=0.25)
+
+
+def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(in_folder, capsys):
+    Path("models").mkdir()
+    main(["sample", "ellipsoid", "--out", "models/conch.obj"])
+    short = ["--steps-factor", "0.005", "--control-points", "8"]
+    assert load("validation").main(["--models", "models", "--out", "out", *short]) == 0
+    text = Path("out/validation.md").read_text()
+    assert text.strip() in capsys.readouterr().out
+    assert "| conch | paper | 1.468 | 50.818 | 0.00169 | - |" in text
+    assert "| santa4 | ours | model not public |" in text
+    assert "| santa4 | paper | 194.23 | 38.71 | 232.93 |" in text
+    assert "no measurement" in text
+    assert text.count("| conch | 0 | 512 |") == 1 and "![error](conch/error.png)" in text

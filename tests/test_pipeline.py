@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import iga_nn
+from iga_nn import pipeline
+from iga_nn.options import InputError, MapOptions, PoissonOptions
+from parameterize.volume import BSplineVolume
+
+
+def test_run_returns_what_it_wrote(formula_training, in_folder):
+    formula_training()
+    outcome = iga_nn.run("poisson", "cube", "out", poisson=PoissonOptions(refine=(0,)))
+    assert outcome.report == json.loads((outcome.folder / "report.json").read_text())
+    volume = BSplineVolume.load(outcome.folder / "volume.npz")
+    level = outcome.report["poisson"]["levels"][0]
+    assert level["dofs"] == int(np.prod(volume.shape))
+    assert outcome.report["input"]["file"] == "cube"
+
+
+def test_volume_and_report_outlive_a_failing_solve(formula_training, in_folder, monkeypatch):
+    formula_training()
+    monkeypatch.setattr("solve.solve_poisson", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        iga_nn.run("poisson", "cube", "out")
+    assert (in_folder / "out" / "volume.npz").exists()
+    report = json.loads((in_folder / "out" / "report.json").read_text())
+    assert report["parameterization"]["bijective"] == "certified"
+    assert "total" not in report["seconds"]  # unfinished: the same command may run again
+
+
+def test_broken_input_leaves_an_earlier_result_alone(formula_training, in_folder):
+    formula_training()
+    pipeline.parameterize_to("cube", "out")
+    before = (in_folder / "out" / "report.json").read_bytes()
+    with pytest.raises(iga_nn.MeshError):
+        pipeline.parameterize_to("missing.obj", "out", force=True)
+    assert (in_folder / "out" / "report.json").read_bytes() == before
+
+
+def test_checkpoint_folder_goes_once_the_files_stand(formula_training, in_folder):
+    formula_training()
+    (in_folder / "out" / "checkpoint").mkdir(parents=True)
+    pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True))
+    assert not (in_folder / "out" / "checkpoint").exists()
+
+
+def test_unknown_problem_is_refused():
+    with pytest.raises(InputError, match="heat"):
+        iga_nn.run("heat", "cube")
+
+
+def test_config_follows_the_options():
+    config = MapOptions(preset="paper", steps_factor=0.1, control_points=12).config()
+    assert config.name == "paper" and config.spline.control_points == 12
+    assert config.stages[0].steps == 60
+
+
+def test_default_problem_is_the_papers():
+    assert PoissonOptions().problem().exact == "exp(x+z)*sin(y)"
+    assert PoissonOptions(source="1").problem().exact is None

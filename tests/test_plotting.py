@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import subprocess
+
+import numpy as np
+import pytest
+from conftest import formula_parameterization
+from matplotlib.image import imread
+
+import solve
+from iga_nn import plotting, rendering
+from solve.study import benchmark_volume
+
+
+@pytest.fixture
+def drawing() -> None:
+    if not rendering.can_draw():
+        pytest.skip(f"VTK cannot draw on this machine; remedy: {rendering.REMEDY}")
+
+
+def colored_share(path) -> float:
+    """Share of the pixels that are not grey: what is drawn, without background and lettering."""
+    image = imread(path)[..., :3]
+    return float(np.mean(image.max(axis=-1) - image.min(axis=-1) > 0.1))
+
+
+def test_history_marks_the_stages(tmp_path):
+    plotting.draw_history(tmp_path / "history.png", formula_parameterization().history)
+    assert colored_share(tmp_path / "history.png") > 0.001
+    assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
+
+
+def test_map_figures_show_the_map(tmp_path, drawing):
+    volume = benchmark_volume(4)
+    plotting.draw_faces(tmp_path / "faces.png", volume)
+    plotting.draw_distortion(tmp_path / "distortion.png", volume)
+    assert colored_share(tmp_path / "faces.png") > 0.1
+    assert colored_share(tmp_path / "distortion.png") > 0.1
+
+
+def test_error_figure_also_where_the_error_is_rounding(tmp_path, drawing):
+    volume = benchmark_volume(4)
+    problem = solve.Poisson(exact="x")
+    plotting.draw_error(tmp_path / "error.png", volume, solve.solve_poisson(volume, problem), problem)
+    assert colored_share(tmp_path / "error.png") > 0.05
+
+
+def test_picture_is_framed_whole(drawing):
+    square = np.stack(np.meshgrid([0.0, 2.0], [0.0, 1.0], [0.0], indexing="ij"), axis=-1)[:, :, 0]  # (2, 2, 3)
+    red = np.broadcast_to([1.0, 0.0, 0.0], square.shape)
+    view = rendering.widest_view(square.reshape(-1, 3))
+    image = rendering.draw([rendering.Patch(square, red, lit=False)], view, (400, 400))
+    drawn = np.argwhere(image[..., 1] < 128)
+    height, width = np.ptp(drawn, axis=0) + 1
+    assert abs(width - 400 / 1.08) < 6 and abs(height - 200 / 1.08) < 6  # the longer side fills the frame, 4 % margin
+    assert np.all(image[200, 200] == [255, 0, 0])  # colours as given
+
+
+def test_widest_view_is_a_right_handed_frame_along_the_thin_axis():
+    rng = np.random.default_rng(0)
+    cloud = rng.normal(size=(500, 3)) * [1.0, 0.1, 5.0]
+    view = rendering.widest_view(cloud)
+    frame = np.stack([view.right, view.up, view.towards])
+    assert np.allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(frame) == pytest.approx(1.0)
+    assert abs(view.right[2]) > 0.99 and abs(view.towards[1]) > 0.99
+
+
+def test_without_graphics_library_one_line_names_the_remedy(monkeypatch, caplog, tmp_path):
+    crash = subprocess.CompletedProcess([], returncode=-11)
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: crash)
+    rendering.can_draw.cache_clear()
+    try:
+        result = formula_parameterization()
+        plotting.draw_map(tmp_path, result.volume, result.history)
+    finally:
+        rendering.can_draw.cache_clear()
+    assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
+    assert "libegl1 libgl1-mesa-dri" in caplog.text
