@@ -203,6 +203,6 @@ def evaluate_grid(
 ) -> Array:
     """The same on the tensor grid of three point rows: (len(u), len(v), len(w)) or (len(u), len(v), len(w), c)."""
     field = coefficients
-    for a in range(3):
+    for a in sorted(range(3), key=lambda axis: np.size(points[axis])):  # the shortest row first: least work
         field = apply_along(collocation(knots[a], degrees[a], points[a], derivative[a]), field, a)
     return field

@@ -1,1 +1,23 @@
-"""Isogeometric solver on a B-spline volume."""
+"""Isogeometric solver on a B-spline volume: Poisson's problem, its errors and convergence studies."""
+
+from .expressions import Expression, ExpressionError
+from .field import SplineField
+from .poisson import ConvergenceError, Solution, solve_poisson
+from .problem import Poisson
+from .report import SolveReport
+from .study import ConvergenceRow, benchmark_volume, convergence, rates
+
+__all__ = [
+    "ConvergenceError",
+    "ConvergenceRow",
+    "Expression",
+    "ExpressionError",
+    "Poisson",
+    "Solution",
+    "SolveReport",
+    "SplineField",
+    "benchmark_volume",
+    "convergence",
+    "rates",
+    "solve_poisson",
+]

@@ -1,0 +1,288 @@
+"""Formulas a user types, such as "exp(x+z)*sin(y)": parsed by a whitelist, evaluated on arrays with derivatives.
+
+Nothing is ever passed to eval or exec. Python's own parser makes the tree; every node is then checked against the few
+kinds allowed and translated. Value, gradient and Laplacian follow together by forward automatic differentiation
+(Griewank and Walther, *Evaluating Derivatives*, 2nd ed., chapter 13), so a source -Laplace(u) is exact.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+Number = float | Array  # constants stay NumPy scalars (a kind of float): products with 0.0 and 1.0 are then free
+Gradient = tuple[Number, Number, Number]
+
+MAX_LENGTH = 1000
+MAX_DEPTH = 100
+MAX_EXPONENT = 64
+VARIABLES = ("x", "y", "z")
+CONSTANTS = {"pi": math.pi, "e": math.e}
+OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+
+
+class ExpressionError(ValueError):
+    """A formula that is refused, or data that are not finite somewhere on the domain."""
+
+
+@dataclass(frozen=True, eq=False)
+class Jet:
+    """A function's value, gradient and Laplacian at the points of an array; constants are scalars."""
+
+    value: Number
+    gradient: Gradient = (0.0, 0.0, 0.0)
+    laplacian: Number = 0.0
+
+
+def _plus(a: Number, b: Number) -> Number:
+    if isinstance(a, float) and a == 0.0:
+        return b
+    return a if isinstance(b, float) and b == 0.0 else a + b
+
+
+def _times(a: Number, b: Number) -> Number:
+    for known, other in ((a, b), (b, a)):
+        if isinstance(known, float) and known in (0.0, 1.0):
+            return 0.0 if known == 0.0 else other
+    return a * b
+
+
+def _dot(a: Jet, b: Jet) -> Number:
+    total: Number = 0.0
+    for da, db in zip(a.gradient, b.gradient, strict=True):
+        total = _plus(total, _times(da, db))
+    return total
+
+
+def _combine(operation: Callable[..., Number], *gradients: Gradient) -> Gradient:
+    """Apply an operation component by component."""
+    x, y, z = (operation(*components) for components in zip(*gradients, strict=True))
+    return x, y, z
+
+
+def _add(a: Jet, b: Jet) -> Jet:
+    return Jet(a.value + b.value, _combine(_plus, a.gradient, b.gradient), _plus(a.laplacian, b.laplacian))
+
+
+def _scale(factor: float, a: Jet) -> Jet:
+    gradient = _combine(lambda da: _times(factor, da), a.gradient)
+    return Jet(factor * a.value, gradient, _times(factor, a.laplacian))
+
+
+def _multiply(a: Jet, b: Jet) -> Jet:
+    """Product rule: Laplace(a b) = a Laplace(b) + 2 grad a . grad b + b Laplace(a)."""
+    gradient = _combine(lambda da, db: _plus(_times(a.value, db), _times(b.value, da)), a.gradient, b.gradient)
+    outer = _plus(_times(a.value, b.laplacian), _times(b.value, a.laplacian))
+    return Jet(a.value * b.value, gradient, _plus(outer, _times(2.0, _dot(a, b))))
+
+
+def _chain(a: Jet, value: Number, first: Number, second: Number) -> Jet:
+    """Chain rule for h(a) from h, h' and h'' at a: Laplace(h(a)) = h' Laplace(a) + h'' |grad a|^2."""
+    gradient = _combine(lambda da: _times(first, da), a.gradient)
+    return Jet(value, gradient, _plus(_times(first, a.laplacian), _times(second, _dot(a, a))))
+
+
+def _raise_to(a: Jet, n: float) -> Jet:
+    """Raise a to a constant power; the factors n and n (n - 1) that vanish keep 0 ** negative out."""
+    v = a.value
+    first = n * v ** (n - 1.0) if n != 0.0 else 0.0
+    second = n * (n - 1.0) * v ** (n - 2.0) if n not in (0.0, 1.0) else 0.0
+    return _chain(a, v**n, first, second)
+
+
+def _tanh(a: Jet) -> Jet:
+    t = np.tanh(a.value)
+    slope = 1.0 - t * t
+    return _chain(a, t, slope, -2.0 * t * slope)
+
+
+def _tan(a: Jet) -> Jet:
+    t = np.tan(a.value)
+    slope = 1.0 + t * t
+    return _chain(a, t, slope, 2.0 * t * slope)
+
+
+def _exp(a: Jet) -> Jet:
+    value = np.exp(a.value)
+    return _chain(a, value, value, value)
+
+
+def _sqrt(a: Jet) -> Jet:
+    root = np.sqrt(a.value)
+    return _chain(a, root, 0.5 / root, -0.25 / (root * a.value))
+
+
+def _sin(a: Jet) -> Jet:
+    sine = np.sin(a.value)
+    return _chain(a, sine, np.cos(a.value), -sine)
+
+
+def _cos(a: Jet) -> Jet:
+    cosine = np.cos(a.value)
+    return _chain(a, cosine, -np.sin(a.value), -cosine)
+
+
+def _log(a: Jet) -> Jet:
+    return _chain(a, np.log(a.value), 1.0 / a.value, -1.0 / (a.value * a.value))
+
+
+def _abs(a: Jet) -> Jet:
+    """Derivatives hold away from the zeros of the argument; the source of a kink is not a function."""
+    return _chain(a, np.abs(a.value), np.sign(a.value), 0.0)
+
+
+FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
+    "sin": _sin,
+    "cos": _cos,
+    "tan": _tan,
+    "exp": _exp,
+    "log": _log,
+    "sqrt": _sqrt,
+    "tanh": _tanh,
+    "abs": _abs,
+}
+
+Evaluator = Callable[[tuple[Jet, Jet, Jet]], Jet]
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A formula in x, y, z. Raises ExpressionError, naming the place, for anything outside the whitelist."""
+
+    text: str
+    _evaluate: Evaluator = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_evaluate", _Translator(self.text).result)
+
+    def __call__(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
+        """Values at points given by arrays of equal shape."""
+        points = _coordinates(x, y, z)
+        with np.errstate(all="ignore"):
+            jet = self._evaluate((Jet(points[0]), Jet(points[1]), Jet(points[2])))
+        return np.broadcast_to(np.asarray(jet.value), points[0].shape)
+
+    def jet(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array, Array]:
+        """Value (...), gradient (3, ...) and Laplacian (...) at points given by arrays of equal shape."""
+        points = _coordinates(x, y, z)
+        seeds = (Jet(points[0], (1.0, 0.0, 0.0)), Jet(points[1], (0.0, 1.0, 0.0)), Jet(points[2], (0.0, 0.0, 1.0)))
+        with np.errstate(all="ignore"):
+            jet = self._evaluate(seeds)
+        rows = [np.broadcast_to(np.asarray(row), points[0].shape) for row in (jet.value, *jet.gradient, jet.laplacian)]
+        return rows[0], np.stack(rows[1:4]), rows[4]
+
+
+def _coordinates(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> list[Array]:
+    return list(np.broadcast_arrays(*(np.asarray(c, dtype=np.float64) for c in (x, y, z))))
+
+
+def _shorten(text: str, length: int = 40) -> str:
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
+class _Translator:
+    """Turns a text into nested closures over jets, refusing what is not on the list."""
+
+    def __init__(self, text: str) -> None:
+        if not isinstance(text, str):
+            raise ExpressionError(f"an expression must be text, got {type(text).__name__}")
+        self.text = text.strip()
+        if not self.text:
+            raise ExpressionError("the expression is empty; write a formula such as exp(x+z)*sin(y)")
+        if len(self.text) > MAX_LENGTH:
+            raise ExpressionError(f"the expression has {len(self.text)} characters; at most {MAX_LENGTH} are allowed")
+        self._check_brackets()
+        try:
+            tree = ast.parse(self.text, mode="eval")
+        except SyntaxError as error:
+            column = f", column {error.offset}" if error.offset else ""
+            raise ExpressionError(f"expression{column}, {_shorten(self.text)!r}: {error.msg}") from None
+        except (ValueError, MemoryError, RecursionError) as error:
+            raise ExpressionError(f"expression, {_shorten(self.text)!r}: cannot be parsed ({error})") from None
+        self.result = self._node(tree.body, 1)
+
+    def _check_brackets(self) -> None:
+        """Bound the nesting before Python's parser sees the text."""
+        depth = 0
+        for column, character in enumerate(self.text, 1):
+            depth += (character == "(") - (character == ")")
+            if depth > MAX_DEPTH:
+                raise ExpressionError(f"expression, column {column}: more than {MAX_DEPTH} nested parentheses")
+
+    def _refuse(self, node: ast.expr, why: str) -> ExpressionError:
+        place = _shorten(ast.get_source_segment(self.text, node) or "")
+        return ExpressionError(f"expression, column {node.col_offset + 1}, {place!r}: {why}")
+
+    def _node(self, node: ast.expr, depth: int) -> Evaluator:
+        if depth > MAX_DEPTH:
+            raise self._refuse(node, f"nested more than {MAX_DEPTH} deep")
+        if isinstance(node, ast.Constant):
+            return self._number(node)
+        if isinstance(node, ast.Name):
+            return self._name(node)
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            inner = self._node(node.operand, depth + 1)
+            return lambda p: _scale(-1.0, inner(p))
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+            return self._binary(node, depth)
+        if isinstance(node, ast.Call):
+            return self._call(node, depth)
+        raise self._refuse(node, f"not allowed; use numbers, x y z pi e, + - * / ** and {' '.join(FUNCTIONS)}")
+
+    def _number(self, node: ast.Constant) -> Evaluator:
+        if type(node.value) not in (int, float):
+            raise self._refuse(node, "only real numbers are allowed")
+        try:
+            number = float(node.value)  # type: ignore[arg-type]
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise self._refuse(node, "the number is too large")
+        constant = Jet(np.float64(number))  # unlike a Python float it overflows to inf and never turns complex
+        return lambda p: constant
+
+    def _name(self, node: ast.Name) -> Evaluator:
+        if node.id in VARIABLES:
+            index = VARIABLES.index(node.id)
+            return lambda p: p[index]
+        if node.id in CONSTANTS:
+            constant = Jet(np.float64(CONSTANTS[node.id]))
+            return lambda p: constant
+        raise self._refuse(node, f"unknown name; the names are {', '.join((*VARIABLES, *CONSTANTS, *FUNCTIONS))}")
+
+    def _call(self, node: ast.Call, depth: int) -> Evaluator:
+        if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
+            raise self._refuse(node.func, f"not a known function; the functions are {', '.join(FUNCTIONS)}")
+        if len(node.args) != 1 or node.keywords:
+            raise self._refuse(node, f"{node.func.id} takes exactly one argument")
+        function, inner = FUNCTIONS[node.func.id], self._node(node.args[0], depth + 1)
+        return lambda p: function(inner(p))
+
+    def _binary(self, node: ast.BinOp, depth: int) -> Evaluator:
+        left, right = self._node(node.left, depth + 1), self._node(node.right, depth + 1)
+        match OPERATORS[type(node.op)]:
+            case "+":
+                return lambda p: _add(left(p), right(p))
+            case "-":
+                return lambda p: _add(left(p), _scale(-1.0, right(p)))
+            case "*":
+                return lambda p: _multiply(left(p), right(p))
+            case "/":
+                return lambda p: _multiply(left(p), _raise_to(right(p), -1.0))
+            case _:
+                return self._power(node, left, right)
+
+    def _power(self, node: ast.BinOp, left: Evaluator, right: Evaluator) -> Evaluator:
+        if any(isinstance(part, ast.Name) and part.id in VARIABLES for part in ast.walk(node.right)):
+            return lambda p: _exp(_multiply(right(p), _log(left(p))))  # valid for a positive base
+        with np.errstate(all="ignore"):
+            exponent = float(right((Jet(0.0), Jet(0.0), Jet(0.0))).value)  # no variable in it: any point will do
+        if not abs(exponent) <= MAX_EXPONENT:
+            raise self._refuse(node.right, f"the exponent must lie between -{MAX_EXPONENT} and {MAX_EXPONENT}")
+        return lambda p: _raise_to(left(p), exponent)

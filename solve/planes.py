@@ -1,0 +1,44 @@
+"""Splines on planes of quadrature points: the slab by slab evaluation under assembly and error norms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from parameterize.bspline import Array
+from parameterize.volume import BSplineVolume
+
+from . import kernels
+from .quadrature import GaussRule, Table
+
+
+class PlaneField:
+    """A scalar spline with its basis tabulated at a Gauss rule.
+
+    coefficients: (n_u, n_v, n_w); tables: as `GaussRule.tabulate` returns them.
+    """
+
+    def __init__(self, coefficients: Array, tables: tuple[Table, Table, Table]) -> None:
+        self._coefficients = np.ascontiguousarray(coefficients)
+        self._tables = tables
+
+    def evaluate(self, q: int, out: Array) -> None:
+        """Write value and parametric gradient on the plane through point `q` of direction u: out (4, q_w, q_v)."""
+        u, v, w = self._tables
+        weights = np.ascontiguousarray(u.values[:, q])
+        kernels.evaluate_plane(self._coefficients, u.first[q], weights, *v, *w, out)
+
+
+def map_planes(volume: BSplineVolume, rule: GaussRule) -> Iterator[tuple[int, Array]]:
+    """For every point q of direction u: q and the map on its plane, (3, 4, q_w, q_v): components x value and gradient.
+
+    The array is reused from one step to the next.
+    """
+    tables = rule.tabulate(volume.degrees, volume.knots)
+    components = [PlaneField(volume.control_points[..., c], tables) for c in range(3)]
+    fields = np.empty((3, 4, *rule.plane_shape))
+    for q in range(rule.shape[0]):
+        for component, out in zip(components, fields, strict=True):
+            component.evaluate(q, out)
+        yield q, fields

@@ -1,0 +1,61 @@
+"""SolveReport: the numbers of one solve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from .norms import Errors
+
+
+@dataclass(frozen=True)
+class SolveReport:
+    """One entry of `poisson.levels` in report.json.
+
+    elements, dofs: totals; the unknowns fixed by boundary data count as dofs.
+    h: longest straight edge of a mapped element, in the volume's units.
+    errors: the norms, None without an exact solution; `l2`, `l2_relative` and `h1_seminorm` read from it.
+    residual: |r| / |b| at the end; residuals: the same before the first and after every iteration.
+    seconds: process CPU seconds of setup, solve and errors.
+    notices: what the reader of these numbers must know, one line each.
+    """
+
+    elements: int
+    dofs: int
+    h: float
+    iterations: int
+    converged: bool
+    residual: float
+    seconds: dict[str, float]
+    errors: Errors | None = None
+    notices: tuple[str, ...] = ()
+    residuals: tuple[float, ...] = field(default=(), repr=False)
+
+    @property
+    def l2(self) -> float | None:
+        """L2 norm of the error."""
+        return self.errors.l2 if self.errors else None
+
+    @property
+    def l2_relative(self) -> float | None:
+        """L2 norm of the error over that of the exact solution."""
+        return self.errors.l2_relative if self.errors else None
+
+    @property
+    def h1_seminorm(self) -> float | None:
+        """L2 norm of the error's gradient; None where the exact gradient is unknown."""
+        return self.errors.h1_seminorm if self.errors else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The entry as report.json holds it; errors that are not known are absent."""
+        names = ("elements", "dofs", "h", "l2", "l2_relative", "h1_seminorm", "iterations", "converged", "residual")
+        entry = {name: getattr(self, name) for name in (*names, "seconds")}
+        return {name: value for name, value in entry.items() if value is not None}
+
+    def __str__(self) -> str:
+        errors = [("L2", self.l2), ("relative L2", self.l2_relative), ("H1", self.h1_seminorm)]
+        parts = [f"{self.elements} elements", f"{self.dofs} dofs", f"h {self.h:.4g}"]
+        parts += [f"{name} {value:.4e}" for name, value in errors if value is not None]
+        state = "" if self.converged else f", NOT CONVERGED (residual {self.residual:.1e})"
+        parts.append(f"{self.iterations} iterations{state}")
+        return "\n".join([", ".join(parts), *self.notices])

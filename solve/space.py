@@ -1,0 +1,91 @@
+"""The trial space: tensor-product splines on a volume's own knots, refined and raised in degree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from parameterize.bspline import Array, breakpoints, insert_knots, midpoints
+from parameterize.volume import BSplineVolume
+
+
+@dataclass(frozen=True, eq=False)
+class TrialSpace:
+    """Scalar trivariate splines on the unit cube.
+
+    degrees: one per parametric direction.
+    knots: three open knot vectors on [0, 1].
+    """
+
+    degrees: tuple[int, int, int]
+    knots: tuple[Array, Array, Array]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of basis functions per direction."""
+        n_u, n_v, n_w = (len(k) - p - 1 for k, p in zip(self.knots, self.degrees, strict=True))
+        return n_u, n_v, n_w
+
+    @property
+    def dofs(self) -> int:
+        """Number of basis functions, those fixed by the boundary data included."""
+        return int(np.prod(self.shape))
+
+    @property
+    def elements(self) -> int:
+        """Number of non-empty knot spans."""
+        return int(np.prod([len(breakpoints(k)) - 1 for k in self.knots]))
+
+    @property
+    def gauss_points(self) -> tuple[int, int, int]:
+        """Gauss points per span and direction that the operator needs.
+
+        `degree` points keep the full order of convergence (they are exact for degree 2 p - 1) and cost 2.2 times less
+        than degree + 1 in three dimensions. Where the space is only continuous somewhere, as for degree 1, they
+        would let hourglass modes through: one point more.
+        """
+        counts = []
+        for degree, knots in zip(self.degrees, self.knots, strict=True):
+            inner = np.unique(knots, return_counts=True)[1][1:-1]
+            only_continuous = degree == 1 or bool(np.any(inner == degree))
+            counts.append(degree + 1 if only_continuous else degree)
+        g_u, g_v, g_w = counts
+        return g_u, g_v, g_w
+
+
+def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = None) -> TrialSpace:
+    """The trial space of a volume: every span halved `refine` times, in the given degree (default: the map's own).
+
+    At the map's own knots the space is as smooth as the map (smoother would spoil the order of convergence) and never
+    smoother than degree - 1; at the knots that halving adds it is as smooth as its degree allows.
+    Raises ValueError for a negative `refine` or a degree below 1.
+    """
+    if refine < 0:
+        raise ValueError(f"refine must be 0 or more (each level halves every span), got {refine}")
+    if degree is not None and degree < 1:
+        raise ValueError(f"degree must be at least 1, got {degree}; leave it out for the map's own degree")
+    degrees, rows = [], []
+    for own, knots in zip(volume.degrees, volume.knots, strict=True):
+        new_degree = own if degree is None else degree
+        row = _same_smoothness(knots, own, new_degree)
+        for _ in range(refine):
+            row, _ = insert_knots(row, new_degree, midpoints(row))
+        degrees.append(new_degree)
+        rows.append(row)
+    return TrialSpace((degrees[0], degrees[1], degrees[2]), (rows[0], rows[1], rows[2]))
+
+
+def _same_smoothness(knots: Array, old: int, new: int) -> Array:
+    """Knot vector of degree `new` on the same breakpoints, as smooth at each inner one as degree `old` was."""
+    values, repeats = np.unique(knots, return_counts=True)
+    repeats = np.maximum(1, repeats + new - old)  # smoothness = degree - multiplicity
+    repeats[[0, -1]] = new + 1
+    return np.repeat(values, repeats)
+
+
+def longest_edge(volume: BSplineVolume, space: TrialSpace) -> float:
+    """h: the longest straight distance between neighbouring corners of the mapped elements, in the volume's units."""
+    u, v, w = (breakpoints(k) for k in space.knots)
+    corners = volume.grid(u, v, w)  # (e_u + 1, e_v + 1, e_w + 1, 3)
+    return max(float(np.linalg.norm(np.diff(corners, axis=a), axis=-1).max()) for a in range(3))

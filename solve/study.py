@@ -1,0 +1,73 @@
+"""Convergence studies: one fixed map, refined exactly, and the rates that follow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from parameterize.bspline import greville, open_uniform_knots
+from parameterize.volume import BSplineVolume
+
+from .poisson import solve_poisson
+from .problem import Poisson
+from .report import SolveReport
+
+
+@dataclass(frozen=True)
+class ConvergenceRow:
+    """One level of a study; the rates compare it with the level before (None for the first, or without errors)."""
+
+    report: SolveReport
+    rate_l2: float | None
+    rate_h1: float | None
+
+    def __str__(self) -> str:
+        rates = [f"{name} rate {r:.2f}" for name, r in (("L2", self.rate_l2), ("H1", self.rate_h1)) if r is not None]
+        return ", ".join([str(self.report), *rates])
+
+
+def convergence(
+    volume: BSplineVolume,
+    problem: Poisson,
+    refine: Iterable[int] = range(3),
+    degree: int | None = None,
+    *,
+    certified: str | None = None,
+) -> list[ConvergenceRow]:
+    """Solve on each refinement level of one map; for smooth solutions the L2 rate tends to degree + 1."""
+    reports = [solve_poisson(volume, problem, refine=k, degree=degree, certified=certified).report for k in refine]
+    found = rates(reports)
+    l2, h1 = ([None, *found.get(name, [None] * len(reports))] for name in ("l2", "h1"))
+    return [ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports)]
+
+
+def rates(reports: Sequence[SolveReport]) -> dict[str, list[float]]:
+    """Observed orders between neighbouring levels: {"l2": [...], "h1": [...]}, a key absent without its error.
+
+    The mesh size is that of the parametric mesh (elements^(-1/3)), so halving spans counts as exactly one half.
+    """
+    found: dict[str, list[float]] = {}
+    for key, name in (("l2", "l2"), ("h1", "h1_seminorm")):
+        errors = [getattr(report, name) for report in reports]
+        if None in errors:
+            continue
+        found[key] = [
+            3.0 * math.log(errors[i] / errors[i + 1]) / math.log(reports[i + 1].elements / reports[i].elements)
+            for i in range(len(reports) - 1)
+        ]
+    return found
+
+
+def benchmark_volume(n: int, degree: int = 3, amplitude: float = 0.08) -> BSplineVolume:
+    """The map on which solvers are compared: a twisted unit cube with n elements a direction, for tests and benchmarks.
+
+    Control points P = g + amplitude (sin pi(g_y + g_z), sin pi(g_x + g_z), sin pi(g_x + g_y)) at the Greville points g.
+    Different n are different maps: for rates refine one of them. It folds at amplitude 0.20.
+    """
+    points = greville(open_uniform_knots(n + degree, degree), degree)
+    g = np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1)  # (n + degree, ..., 3)
+    twist = np.sin(np.pi * (g.sum(axis=-1, keepdims=True) - g))
+    return BSplineVolume.uniform(g + amplitude * twist, degree)

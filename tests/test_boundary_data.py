@@ -1,0 +1,45 @@
+import numpy as np
+import pytest
+
+from parameterize.bspline import collocation, gauss_points
+from solve.boundary import boundary_coefficients
+from solve.space import trial_space
+from solve.study import benchmark_volume
+
+
+@pytest.fixture(scope="module")
+def volume():
+    return benchmark_volume(5)
+
+
+def smooth(x, y, z):
+    return np.exp(x + z) * np.sin(y)
+
+
+@pytest.mark.parametrize("component", [0, 1, 2])
+def test_data_in_the_space_are_reproduced(volume, component):
+    """x, y and z are splines on the map: their coefficients are its control points."""
+    found = boundary_coefficients(volume, trial_space(volume), lambda *where: where[component])
+    expected = volume.control_points[..., component].copy()
+    expected[1:-1, 1:-1, 1:-1] = 0.0
+    assert np.allclose(found, expected, atol=1e-12)
+
+
+def test_corners_are_interpolated_and_the_inside_is_zero(volume):
+    found = boundary_coefficients(volume, trial_space(volume), smooth)
+    corners = np.ix_((0, -1), (0, -1), (0, -1))
+    assert np.allclose(found[corners], smooth(*np.moveaxis(volume.control_points[corners], -1, 0)), atol=1e-14)
+    assert np.all(found[1:-1, 1:-1, 1:-1] == 0.0)
+
+
+def test_errors_are_orthogonal_to_the_functions_inside_an_edge_and_a_face(volume):
+    space = trial_space(volume)
+    found = boundary_coefficients(volume, space, smooth)
+    points, weights = (part.ravel() for part in gauss_points(space.knots[0], 5))
+    basis = collocation(space.knots[0], 3, points).toarray()  # the same in the three directions
+    inner = weights[:, None] * basis[:, 1:-1]
+    edge = smooth(*np.moveaxis(volume.grid(points, [1.0], [0.0])[:, 0, 0], -1, 0)) - basis @ found[:, -1, 0]
+    assert np.abs(edge).max() > 1e-6  # not interpolated everywhere, so the next line says something
+    assert np.abs(inner.T @ edge).max() < 1e-15
+    face = smooth(*np.moveaxis(volume.grid(points, points, [1.0])[:, :, 0], -1, 0)) - basis @ found[:, :, -1] @ basis.T
+    assert np.abs(inner.T @ face @ inner).max() < 1e-15

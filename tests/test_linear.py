@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from solve.linear import conjugate_gradients
+
+
+def identity(r):
+    return r
+
+
+def test_diagonal_with_three_eigenvalues_takes_three_iterations():
+    d = np.repeat([1.0, 2.0, 5.0], 10)
+    b = np.linspace(1.0, 2.0, 30)
+    result = conjugate_gradients(lambda p: d * p, b, identity, 1e-12)
+    assert result.converged
+    assert result.iterations == 3
+    assert np.allclose(result.x, b / d, atol=1e-12)
+
+
+def test_exact_preconditioner_takes_one_iteration():
+    d = np.linspace(1.0, 100.0, 50)
+    result = conjugate_gradients(lambda p: d * p, np.ones(50), lambda r: r / d, 1e-12)
+    assert result.iterations == 1
+
+
+def test_history_holds_the_true_residuals():
+    rng = np.random.default_rng(0)
+    q = np.linalg.qr(rng.standard_normal((20, 20)))[0]
+    matrix = q @ np.diag(np.geomspace(1.0, 1e3, 20)) @ q.T
+    b = rng.standard_normal(20)
+    result = conjugate_gradients(lambda p: matrix @ p, b, identity, 1e-10, 7)
+    assert len(result.residuals) == 8
+    assert result.residuals[0] == 1.0
+    true = np.linalg.norm(b - matrix @ result.x) / np.linalg.norm(b)
+    assert result.residuals[-1] == pytest.approx(true, rel=1e-8)
+
+
+def test_iteration_limit_is_reported():
+    d = np.geomspace(1.0, 1e6, 100)
+    result = conjugate_gradients(lambda p: d * p, np.ones(100), identity, 1e-10, 5)
+    assert not result.converged
+    assert result.iterations == 5
+
+
+def test_zero_right_hand_side_needs_no_iteration():
+    result = conjugate_gradients(identity, np.zeros(4), identity)
+    assert result.converged
+    assert result.iterations == 0
+
+
+@pytest.mark.parametrize("value", [-1.0, 0.0, np.nan])
+def test_stops_where_the_matrix_is_not_positive(value):
+    result = conjugate_gradients(lambda p: value * p, np.ones(4), identity)
+    assert not result.converged
+    assert result.iterations == 0
+    assert np.all(result.x == 0.0)

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+
+from parameterize.bspline import greville, open_uniform_knots
+from parameterize.volume import BSplineVolume
+from solve.norms import error_norms
+from solve.space import trial_space
+from solve.study import benchmark_volume
+
+
+def cube(size, n=3, degree=2):
+    points = size * greville(open_uniform_knots(n + degree, degree), degree)
+    return BSplineVolume.uniform(np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1), degree)
+
+
+def test_norms_of_a_linear_function_against_zero_by_hand():
+    """On [0, 2]^3 the square of 3 x integrates to 9 * 8/3 * 4 = 96, and that of its gradient to 9 * 8 = 72."""
+    volume = cube(2.0)
+    space = trial_space(volume)
+
+    def exact(x, y, z):
+        return 3.0 * x, np.stack([3.0 + 0 * x, 0 * x, 0 * x])
+
+    errors = error_norms(volume, space, np.zeros(space.shape), exact)
+    assert errors.l2 == pytest.approx(np.sqrt(96.0))
+    assert errors.l2_relative == pytest.approx(1.0)
+    assert errors.h1_seminorm == pytest.approx(np.sqrt(72.0))
+
+
+def test_a_spline_has_no_distance_from_itself():
+    """y is a spline on the curved map, with gradient (0, 1, 0): pulls the physical gradient back through J."""
+    volume = benchmark_volume(4)
+    errors = error_norms(
+        volume,
+        trial_space(volume),
+        volume.control_points[..., 1],
+        lambda x, y, z: (y, np.stack([0 * x, 1 + 0 * x, 0 * x])),
+    )
+    assert errors.l2 < 1e-14
+    assert errors.h1_seminorm < 1e-12
+
+
+def test_without_gradient_the_seminorm_is_unknown():
+    volume = cube(1.0)
+    space = trial_space(volume)
+    errors = error_norms(volume, space, np.zeros(space.shape), lambda x, y, z: (x, None))
+    assert errors.h1_seminorm is None
+    assert errors.l2 == pytest.approx(np.sqrt(1.0 / 3.0))
+
+
+def test_degree_plus_two_points_integrate_the_square_of_one_degree_more_exactly():
+    volume = cube(1.0)
+    space = trial_space(volume)
+    errors = error_norms(volume, space, np.zeros(space.shape), lambda x, y, z: (x**3, None))
+    assert errors.l2 == pytest.approx(np.sqrt(1.0 / 7.0), rel=1e-14)

@@ -1,0 +1,101 @@
+import numpy as np
+import pytest
+
+from parameterize.bspline import collocation
+from parameterize.volume import BSplineVolume
+from solve.operators import assemble
+from solve.quadrature import gauss_rule
+from solve.space import trial_space
+from solve.study import benchmark_volume
+
+
+def assemble_dense(volume, space, rule, source):
+    """Stiffness matrix and load vector from dense tables of every basis function at every point."""
+    points = np.stack(np.meshgrid(*rule.points, indexing="ij"), axis=-1).reshape(-1, 3)
+    weights = np.einsum("i,j,k->ijk", *rule.weights).ravel()
+    tables = [
+        [collocation(space.knots[a], space.degrees[a], rule.points[a], d).toarray() for d in (0, 1)] for a in range(3)
+    ]
+
+    def basis(*derivative):
+        return np.kron(np.kron(tables[0][derivative[0]], tables[1][derivative[1]]), tables[2][derivative[2]])
+
+    jacobian = volume.jacobian(points)
+    measure = weights * np.linalg.det(jacobian)
+    parametric = np.stack([basis(1, 0, 0), basis(0, 1, 0), basis(0, 0, 1)], axis=-1)  # (q, n, 3)
+    gradient = np.einsum("qni,qij->qnj", parametric, np.linalg.inv(jacobian))
+    matrix = np.einsum("q,qni,qmi->nm", measure, gradient, gradient, optimize=True)
+    return matrix, basis(0, 0, 0).T @ (measure * source(*volume(points).T))
+
+
+@pytest.fixture(
+    scope="module", params=[(1, None), (2, None), (3, None), (2, 3), (3, 1)], ids=lambda p: f"map{p[0]}-degree{p[1]}"
+)
+def case(request):
+    own, degree = request.param
+    rng = np.random.default_rng(0)
+    smooth = benchmark_volume(2, own)
+    stretched = smooth.control_points * [1.0, 2.0, 0.5] + 0.02 * rng.standard_normal(smooth.control_points.shape)
+    volume = BSplineVolume.uniform(stretched[:, : own + 1], own) if own == 3 else BSplineVolume.uniform(stretched, own)
+    space = trial_space(volume, degree=degree)
+    rule = gauss_rule(space)
+
+    def source(x, y, z):
+        return x * y + np.sin(z)
+
+    return assemble(volume, space, source), *assemble_dense(volume, space, rule, source)
+
+
+def test_operator_equals_the_assembled_matrix(case):
+    system, matrix, _ = case
+    x = np.random.default_rng(1).standard_normal(system.stiffness.space.shape)
+    expected = (matrix @ x.ravel()).reshape(x.shape)
+    assert np.allclose(system.stiffness.apply(x), expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_diagonal_equals_that_of_the_assembled_matrix(case):
+    system, matrix, _ = case
+    assert np.allclose(system.stiffness.diagonal().ravel(), np.diag(matrix), rtol=1e-12)
+
+
+def test_load_equals_the_assembled_vector(case):
+    system, _, load = case
+    assert np.allclose(system.load.ravel(), load, atol=1e-13 * np.abs(load).max())
+
+
+def test_interior_product_is_the_full_one_with_zero_boundary():
+    stiffness = assemble(benchmark_volume(3), trial_space(benchmark_volume(3)), lambda x, y, z: 0.0 * x).stiffness
+    x = np.zeros(stiffness.space.shape)
+    x[1:-1, 1:-1, 1:-1] = np.random.default_rng(2).standard_normal((4, 4, 4))
+    assert np.array_equal(stiffness.apply_inside(x[1:-1, 1:-1, 1:-1]), stiffness.apply(x)[1:-1, 1:-1, 1:-1])
+
+
+def test_symmetric_positive_and_constants_in_the_kernel():
+    volume = benchmark_volume(4)
+    stiffness = assemble(volume, trial_space(volume), lambda x, y, z: 0.0 * x).stiffness
+    rng = np.random.default_rng(3)
+    a, b = rng.standard_normal((2, *stiffness.space.shape))
+    assert np.vdot(a, stiffness.apply(b)) == pytest.approx(np.vdot(b, stiffness.apply(a)), rel=1e-12)
+    assert np.vdot(a, stiffness.apply(a)) > 0.0
+    assert np.abs(stiffness.apply(np.ones_like(a))).max() < 1e-12
+
+
+def test_linear_functions_are_in_balance_inside_a_curved_map_once_the_rule_is_exact():
+    """The integrand has degree 3 p - 1 per direction: 5 Gauss points for p = 3."""
+    volume = benchmark_volume(4)
+    space = trial_space(volume)
+    stiffness = assemble(volume, space, lambda x, y, z: 0.0 * x, gauss_rule(space, (5, 5, 5))).stiffness
+    for component in range(3):
+        inside = stiffness.apply(volume.control_points[..., component])[1:-1, 1:-1, 1:-1]
+        assert np.abs(inside).max() < 1e-13
+
+
+def test_folded_points_are_counted_and_a_flat_map_is_refused():
+    smooth = benchmark_volume(4)
+    mirrored = BSplineVolume(smooth.degrees, smooth.knots, smooth.control_points * [1.0, 1.0, -1.0])
+    system = assemble(mirrored, trial_space(mirrored), lambda x, y, z: 0.0 * x)
+    assert system.folded == system.points == 12**3
+    assert assemble(smooth, trial_space(smooth), lambda x, y, z: 0.0 * x).folded == 0
+    flat = BSplineVolume(smooth.degrees, smooth.knots, 0.0 * smooth.control_points)
+    with pytest.raises(ValueError, match="det J is zero"):
+        assemble(flat, trial_space(flat), lambda x, y, z: 0.0 * x)

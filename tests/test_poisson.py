@@ -1,0 +1,189 @@
+import logging
+
+import numpy as np
+import pytest
+
+from parameterize.bspline import greville, open_uniform_knots
+from parameterize.volume import BSplineVolume
+from solve import ConvergenceError, ExpressionError, Poisson, SplineField, benchmark_volume, solve_poisson
+
+WAVE = Poisson(exact="exp(x+z)*sin(y)")
+
+
+def affine(degree, n=3):
+    """A sheared, stretched and shifted box."""
+    points = greville(open_uniform_knots(n + degree, degree), degree)
+    grid = np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1)
+    matrix = np.array([[2.0, 0.3, 0.0], [0.1, 1.0, 0.2], [0.0, -0.2, 0.7]])
+    return BSplineVolume.uniform(grid @ matrix.T + [1.0, -2.0, 0.5], degree)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5])
+def test_patch_linear(degree):
+    solution = solve_poisson(affine(degree), Poisson(exact="1+2*x-3*y+z"), tolerance=1e-13)
+    assert solution.report.l2_relative < 1e-11
+    assert solution.report.h1_seminorm < 1e-11
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4])
+def test_patch_quadratic(degree):
+    report = solve_poisson(affine(degree), Poisson(exact="x**2-2*y**2+x*z+y"), tolerance=1e-13).report
+    assert report.l2_relative < 1e-11
+
+
+def test_linear_solution_on_a_curved_map_is_limited_by_the_quadrature_only():
+    """p Gauss points are not exact there: the error is far below that of the approximation, and vanishes fast."""
+    errors = [
+        solve_poisson(benchmark_volume(4), Poisson(exact="x+y+z"), refine=k, tolerance=1e-13).report.l2
+        for k in range(2)
+    ]
+    assert errors[0] < 2e-5
+    assert errors[1] < errors[0] / 16
+
+
+@pytest.mark.parametrize(("n", "l2"), [(8, 1.434e-5), (27, 1.97e-7)])
+def test_reference_errors_of_the_benchmark_map(n, l2):
+    report = solve_poisson(benchmark_volume(n), WAVE).report
+    assert report.l2 == pytest.approx(l2, rel=0.05)
+    assert report.dofs == (n + 3) ** 3
+    assert report.iterations <= 23
+    assert report.converged
+
+
+def test_solution_evaluates_to_the_exact_one():
+    solution = solve_poisson(benchmark_volume(6), WAVE, refine=1)
+    parameters = np.random.default_rng(0).random((50, 3))
+    x, y, z = solution.geometry(parameters).T
+    exact = np.exp(x + z) * np.sin(y)
+    assert np.abs(solution(parameters) - exact).max() < 1e-4
+    u = np.linspace(0.0, 1.0, 4)
+    assert np.allclose(solution.grid(u, u[:2], u[:3])[1, 1, 2], solution([[u[1], u[1], u[2]]])[0])
+
+
+def test_source_alone_means_zero_on_the_boundary():
+    """-Laplace u = 3 pi^2 s with s = sin sin sin on the unit cube has the solution s."""
+    points = greville(open_uniform_knots(9, 3), 3)
+    cube = BSplineVolume.uniform(np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1), 3)
+    solution = solve_poisson(cube, Poisson(source="3*pi**2*sin(pi*x)*sin(pi*y)*sin(pi*z)"))
+    assert solution([[0.5, 0.5, 0.5]])[0] == pytest.approx(1.0, abs=1e-3)
+    assert np.all(solution.coefficients[0] == 0.0)
+    assert "l2" not in solution.report.as_dict()
+
+
+def test_functions_as_data_agree_with_formulas():
+    formula = solve_poisson(benchmark_volume(4), WAVE)
+    function = solve_poisson(
+        benchmark_volume(4),
+        Poisson(exact=lambda x, y, z: np.exp(x + z) * np.sin(y), source=lambda x, y, z: -np.exp(x + z) * np.sin(y)),
+    )
+    assert np.allclose(function.coefficients, formula.coefficients, atol=1e-12)
+    assert function.report.l2 == pytest.approx(formula.report.l2, rel=1e-10)
+    assert function.report.h1_seminorm is None
+    assert "h1_seminorm" not in function.report.as_dict()
+
+
+def test_units_scale_the_errors():
+    """On a map in millimetres h grows by 1000 and the L2 norm by 1000^(3/2); the relative error stays."""
+    small = solve_poisson(benchmark_volume(4), WAVE).report
+    large = solve_poisson(
+        benchmark_volume(4).transformed(1000.0, [0, 0, 0]), Poisson(exact="exp((x+z)/1000)*sin(y/1000)")
+    ).report
+    assert large.h == pytest.approx(1000.0 * small.h)
+    assert large.l2 == pytest.approx(1000.0**1.5 * small.l2, rel=1e-4)
+    assert large.l2_relative == pytest.approx(small.l2_relative, rel=1e-4)
+
+
+def test_report_entry_has_the_keys_of_report_json():
+    report = solve_poisson(benchmark_volume(3), WAVE).report
+    entry = report.as_dict()
+    errors = {"l2", "l2_relative", "h1_seminorm"}
+    assert set(entry) == errors | {"elements", "dofs", "h", "iterations", "converged", "residual", "seconds"}
+    assert set(entry["seconds"]) == {"setup", "solve", "errors"}
+    assert entry["elements"] == 27
+    assert entry["residual"] <= 1e-10
+    assert len(report.residuals) == report.iterations + 1
+    assert "27 elements, 216 dofs" in str(report)
+
+
+def test_round_trip_of_the_solution_file(tmp_path):
+    solution = solve_poisson(benchmark_volume(3), WAVE, degree=2)
+    solution.save(tmp_path / "solution.npz")
+    field = SplineField.load(tmp_path / "solution.npz")
+    assert field.degrees == solution.degrees == (2, 2, 2)
+    assert np.array_equal(field.coefficients, solution.coefficients)
+    assert all(np.array_equal(a, b) for a, b in zip(field.knots, solution.knots, strict=True))
+    assert np.array_equal(field([[0.2, 0.5, 0.9]]), solution([[0.2, 0.5, 0.9]]))
+
+
+def test_a_file_that_does_not_fit_together_is_refused(tmp_path):
+    solution = solve_poisson(benchmark_volume(3), WAVE)
+    knots = {f"knots_{a}": k for a, k in zip("uvw", solution.knots, strict=True)}
+    np.savez(tmp_path / "a.npz", degrees=np.array([3, 3, 3]), **knots, coefficients=np.zeros((6, 6, 5)))
+    with pytest.raises(ValueError, match="direction w: 5 coefficients"):
+        SplineField.load(tmp_path / "a.npz")
+    np.savez(tmp_path / "b.npz", degrees=np.array([3, 3, 3]), **knots, coefficients=np.full((6, 6, 6), np.nan))
+    with pytest.raises(ValueError, match="finite"):
+        SplineField.load(tmp_path / "b.npz")
+
+
+def test_no_convergence_is_reported_and_raised_on_request():
+    solution = solve_poisson(benchmark_volume(4), WAVE, max_iterations=3)
+    assert not solution.report.converged
+    assert solution.report.iterations == 3
+    assert "NOT CONVERGED" in str(solution.report)
+    with pytest.raises(ConvergenceError, match="after 3 iterations") as caught:
+        solve_poisson(benchmark_volume(4), WAVE, max_iterations=3, strict=True)
+    assert np.array_equal(caught.value.solution.coefficients, solution.coefficients)
+
+
+def test_a_map_that_is_not_certified_is_said_loudly(caplog):
+    with caplog.at_level(logging.WARNING, logger="solve"):
+        report = solve_poisson(benchmark_volume(3), WAVE, certified="undecided").report
+    assert "undecided" in report.notices[0]
+    assert "undecided" in caplog.text
+    assert solve_poisson(benchmark_volume(3), WAVE, certified="certified").report.notices == ()
+
+
+def test_a_fold_seen_at_the_gauss_points_is_said():
+    report = solve_poisson(benchmark_volume(8, amplitude=0.3), WAVE, max_iterations=20).report
+    assert any("folded" in notice for notice in report.notices)
+
+
+@pytest.mark.parametrize(
+    ("problem", "name"),
+    [
+        (Poisson(exact="log(x)"), "exact"),
+        (Poisson(source="1/(x-x)"), "source"),
+        (Poisson(source="0", boundary="sqrt(0-1-x)"), "boundary"),
+        (Poisson(source=lambda x, y, z: np.full(x.shape, np.nan)), "source"),
+    ],
+)
+def test_data_that_are_not_finite_name_the_point(problem, name):
+    """The benchmark map reaches x < 0."""
+    with pytest.raises(ExpressionError, match=rf"{name}.* not finite at x=-?\d.*, y=.*, z="):
+        solve_poisson(benchmark_volume(3), problem)
+
+
+def test_problems_without_a_source_are_refused_with_the_remedy():
+    with pytest.raises(ValueError, match='source="0"'):
+        Poisson(boundary="x")
+    with pytest.raises(ValueError, match="source"):
+        Poisson(exact=lambda x, y, z: x)
+    with pytest.raises(ValueError, match="source must be a formula"):
+        Poisson(source=1.0)
+    with pytest.raises(ExpressionError, match="boundary: expression, column 1"):
+        Poisson(source="0", boundary="q")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [({"tolerance": 0.0}, "tolerance"), ({"max_iterations": 0}, "max_iterations"), ({"refine": -1}, "refine")],
+)
+def test_arguments_out_of_range_are_named(arguments, name):
+    with pytest.raises(ValueError, match=name):
+        solve_poisson(benchmark_volume(3), WAVE, **arguments)
+
+
+def test_a_space_without_interior_functions_is_refused():
+    with pytest.raises(ValueError, match="raise refine or degree"):
+        solve_poisson(benchmark_volume(1), WAVE, degree=1)
