@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -19,10 +18,10 @@ from .space import TrialSpace
 
 @dataclass(frozen=True)
 class Errors:
-    """L2 norm of u - u_h, the same over the L2 norm of u, and the H1 seminorm (None where grad u is unknown)."""
+    """L2 norm of u - u_h, the same over that of u (None where it is zero), and H1 seminorm (None without grad u)."""
 
     l2: float
-    l2_relative: float
+    l2_relative: float | None
     h1_seminorm: float | None
 
 
@@ -49,5 +48,5 @@ def error_norms(
             wanted[1:] = gradient
         sums += kernels.plane_errors(fields, rule.plane_weights(q), approximate, wanted)
     l2, norm, seminorm = np.sqrt(sums).tolist()
-    relative = l2 / norm if norm > 0.0 else math.inf
+    relative = l2 / norm if norm > 0.0 else None
     return Errors(l2, relative, seminorm if has_gradient else None)

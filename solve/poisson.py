@@ -81,6 +81,7 @@ def solve_poisson(
 @functools.cache
 def _warm_up() -> None:
     """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
+    log.info("preparing the compiled kernels: some seconds on the first use, then they are cached")
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
     _solve(cube, Poisson(exact="x*x"), trial_space(cube, 1), 1e-10, 10, None)

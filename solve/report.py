@@ -38,7 +38,7 @@ class SolveReport:
 
     @property
     def l2_relative(self) -> float | None:
-        """L2 norm of the error over that of the exact solution."""
+        """L2 norm of the error over that of the exact solution; None where the latter is zero."""
         return self.errors.l2_relative if self.errors else None
 
     @property

@@ -44,21 +44,25 @@ def convergence(
     return [ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports)]
 
 
-def rates(reports: Sequence[SolveReport]) -> dict[str, list[float]]:
+def rates(reports: Sequence[SolveReport]) -> dict[str, list[float | None]]:
     """Observed orders between neighbouring levels: {"l2": [...], "h1": [...]}, a key absent without its error.
 
     The mesh size is that of the parametric mesh (elements^(-1/3)), so halving spans counts as exactly one half.
+    None stands where there is no order: between equal meshes, or next to an error of zero.
     """
-    found: dict[str, list[float]] = {}
+    found: dict[str, list[float | None]] = {}
     for key, name in (("l2", "l2"), ("h1", "h1_seminorm")):
         errors = [getattr(report, name) for report in reports]
-        if None in errors:
-            continue
-        found[key] = [
-            3.0 * math.log(errors[i] / errors[i + 1]) / math.log(reports[i + 1].elements / reports[i].elements)
-            for i in range(len(reports) - 1)
-        ]
+        if None not in errors:
+            sizes = [report.elements ** (1.0 / 3.0) for report in reports]
+            found[key] = [_rate(errors[i : i + 2], sizes[i : i + 2]) for i in range(len(reports) - 1)]
     return found
+
+
+def _rate(errors: list[float], sizes: list[float]) -> float | None:
+    if min(errors) == 0.0 or sizes[0] == sizes[1]:
+        return None
+    return math.log(errors[0] / errors[1]) / math.log(sizes[1] / sizes[0])
 
 
 def benchmark_volume(n: int, degree: int = 3, amplitude: float = 0.08) -> BSplineVolume:

@@ -70,6 +70,13 @@ def test_source_alone_means_zero_on_the_boundary():
     assert "l2" not in solution.report.as_dict()
 
 
+def test_zero_as_exact_solution_has_no_relative_error():
+    report = solve_poisson(benchmark_volume(3), Poisson(exact="0")).report
+    assert report.l2 == 0.0
+    assert report.iterations == 0
+    assert "l2_relative" not in report.as_dict()
+
+
 def test_functions_as_data_agree_with_formulas():
     formula = solve_poisson(benchmark_volume(4), WAVE)
     function = solve_poisson(

@@ -20,6 +20,13 @@ def test_rates_by_hand():
     assert rates([report(8, 1.0, 4.0), report(64, 0.25, 2.0)])["h1"] == pytest.approx([1.0])
 
 
+def test_no_rate_between_equal_meshes_or_next_to_a_zero_error():
+    assert rates([report(8, 1.0, 0.0), report(8, 0.5, 1.0), report(64, 0.0, 0.5)]) == {
+        "l2": [None, None],
+        "h1": [None, pytest.approx(1.0)],
+    }
+
+
 def test_rates_without_exact_solution_are_absent():
     assert rates([SolveReport(8, 0, 0.0, 0, True, 0.0, {})] * 2) == {}
 
