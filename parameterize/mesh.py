@@ -18,13 +18,12 @@ from .mesh_error import MeshError
 from .mesh_headers import check_face_count
 from .mesh_obj import Array, IntArray
 from .mesh_place import deepest_point
-from .mesh_read import check_indices, read_mesh
+from .mesh_read import LARGEST, check_finite, check_indices, read_mesh
 
 __all__ = ["MAX_FACES", "MeshError", "Surface", "load_surface", "surface_from_arrays"]
 
 MAX_FACES = 500_000
 USUAL_SIZES = (1e-6, 1e6)
-COMPUTABLE_SIZES = (1e-90, 1e90)  # beyond, volumes leave double precision
 logger = logging.getLogger(__name__)
 
 
@@ -142,7 +141,7 @@ def _gate(
     check_face_count(len(faces), max_faces)
     if len(faces) < 4:
         raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
-    _check_finite(vertices)
+    check_finite(vertices)
     check_indices(vertices, faces)
     middle, size, remarks = _box(vertices, faces)
     kept, triangles, mended = weld_and_drop((vertices - middle) / size, faces)
@@ -173,24 +172,12 @@ def _gate(
     )
 
 
-def _check_finite(vertices: Array) -> None:
-    broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
-    if len(broken):
-        raise MeshError(
-            f"{len(broken)} vertices with NaN or infinite coordinates, the first is vertex {broken[0]} (from 0): "
-            "export the surface again"
-        )
-
-
 def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:
     """Middle (3,) and longest side of the box of the used vertices, and what to say about it."""
     used = vertices[np.unique(faces)]
     low, high = used.min(axis=0), used.max(axis=0)
-    smallest, largest = COMPUTABLE_SIZES
-    if max(abs(low).max(), abs(high).max()) > largest:
-        raise MeshError(f"coordinates beyond {largest:g} cannot be computed with: choose a larger unit of length")
     size = float((high - low).max())
-    if size < smallest:
+    if size < 1.0 / LARGEST:
         raise MeshError(f"longest side {size:g}: the surface is a single point or far too small; choose a smaller unit")
     remarks = []
     if not USUAL_SIZES[0] < size < USUAL_SIZES[1]:

@@ -6,7 +6,6 @@ Parsers allocate what a header promises and return what they could read; these c
 from __future__ import annotations
 
 import re
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -26,7 +25,7 @@ class Header:
 
 
 def check_header(data: bytes, suffix: str, max_faces: int) -> Header:
-    """Check the bytes of a file by its format (".stl", ".ply", ".off", ".mesh", ".msh", ".vtu").
+    """Check the bytes of a file by its format (".stl", ".ply", ".off", ".mesh", ".vtu").
 
     Raises MeshError, without the file's name, for a file that is no such format, promises more than it holds, or has
     more than max_faces faces.
@@ -125,24 +124,6 @@ def _check_medit(data: bytes) -> Header:
     return Header()
 
 
-def _check_gmsh(data: bytes) -> Header:
-    form = re.search(rb"\$MeshFormat\s+([\d.]+)\s+([01])", data[:512])
-    if not form:
-        raise MeshError("not a .msh: no $MeshFormat; save as Gmsh 4.1")
-    blocks, binary = form.group(1).startswith(b"4"), form.group(2) == b"1"
-    for section in (b"Nodes", b"Elements"):
-        start = re.search(rb"\$" + section + rb"\r?\n", data)
-        if not start or b"$End" + section not in data:
-            raise MeshError(f".msh without the whole section ${section.decode()}; {DAMAGED}")
-        if blocks and binary:
-            (count,) = struct.unpack_from("<8xQ", data.ljust(start.end() + 16, b"\0"), start.end())
-        else:
-            words = data[start.end() : start.end() + 200].splitlines()[0].split()
-            count = _count(words[1] if blocks and len(words) > 1 else words[0] if words else b"")
-        _check_room(f"{count} {section.decode()}", 2 * count, len(data) - start.end())
-    return Header()
-
-
 def _check_vtu(data: bytes) -> Header:
     if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
         raise MeshError(f"not a whole .vtu: no <VTKFile> ... </VTKFile>; {DAMAGED}")
@@ -170,6 +151,5 @@ CHECKS: dict[str, Callable[[bytes], Header]] = {
     ".ply": _check_ply,
     ".off": _check_off,
     ".mesh": _check_medit,
-    ".msh": _check_gmsh,
     ".vtu": _check_vtu,
 }

@@ -5,14 +5,18 @@ from __future__ import annotations
 import gzip
 import hashlib
 import io
+import logging
 import tempfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from .mesh_error import MeshError
+from .mesh_gmsh import trim_gmsh
 from .mesh_headers import DAMAGED, check_header
 from .mesh_obj import Array, IntArray, parse_obj, triangulate
 
@@ -21,6 +25,7 @@ MESHIO_FORMATS = {".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
 FORMATS = (".obj", *TRIMESH_FORMATS, *MESHIO_FORMATS)
 BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
 BYTES_AT_LEAST = 64 << 20
+LARGEST = 1e90  # coordinate: volumes beyond its cube leave double precision
 OUTWARD_FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # of a tetrahedron of positive volume
 
 
@@ -53,6 +58,7 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     if suffix[0] == ".obj":
         vertices, polygons, remarks = parse_obj(data, max_faces)
         notices += remarks
+        check_finite(vertices)
         check_indices(vertices, np.array([index for polygon in polygons for index in polygon]))
         faces, count = triangulate(vertices, polygons), len(polygons)
     elif suffix[0] in TRIMESH_FORMATS:
@@ -65,6 +71,18 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     if len(faces) > count:
         notices.append(f"{count} polygons cut into {len(faces)} triangles")
     return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), tuple(notices))
+
+
+def check_finite(vertices: Array) -> None:
+    """Raise MeshError for coordinates that are NaN, infinite or too large to compute volumes with."""
+    broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(broken):
+        raise MeshError(
+            f"{len(broken)} vertices with NaN or infinite coordinates, the first is vertex {broken[0]} (from 0): "
+            "export the surface again"
+        )
+    if abs(vertices).max(initial=0.0) > LARGEST:
+        raise MeshError(f"coordinates beyond {LARGEST:g} cannot be computed with: choose a larger unit of length")
 
 
 def check_indices(vertices: Array, faces: IntArray) -> None:
@@ -106,7 +124,8 @@ def _parse_trimesh(data: bytes, suffix: str) -> tuple[Array, IntArray]:
     import trimesh
 
     try:
-        mesh = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
+        with _quiet():
+            mesh = trimesh.load_mesh(io.BytesIO(data), file_type=suffix[1:], process=False)
         vertices = np.array(mesh.vertices, dtype=np.float64)
         faces = np.array(mesh.faces, dtype=np.int64)
     except Exception as error:  # a parser may fail on a damaged file in any way
@@ -121,9 +140,10 @@ def _parse_meshio(data: bytes, suffix: str) -> tuple[Array, IntArray, int]:
 
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder, f"mesh{suffix}")
-        copy.write_bytes(data)
+        copy.write_bytes(trim_gmsh(data) if suffix == ".msh" else data)
         try:
-            mesh = meshio.read(copy, file_format=MESHIO_FORMATS[suffix])
+            with _quiet():
+                mesh = meshio.read(copy, file_format=MESHIO_FORMATS[suffix])
         except (Exception, SystemExit) as error:  # meshio exits the process on some files
             raise MeshError(f"not readable as {suffix} ({_first_line(error)}); {DAMAGED}") from None
     cells: dict[str, IntArray] = {}
@@ -134,6 +154,7 @@ def _parse_meshio(data: bytes, suffix: str) -> tuple[Array, IntArray, int]:
     vertices = np.asarray(mesh.points, dtype=np.float64)
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise MeshError(f"points of shape {vertices.shape} are not in space: export three coordinates each")
+    check_finite(vertices)
     others = sorted(set(cells) - {"vertex", "line", "triangle", "quad", "tetra"})
     if others:
         raise MeshError(f"holds {len(cells[others[0]])} cells of type {others[0]}: save linear tetrahedra or triangles")
@@ -157,6 +178,18 @@ def tetrahedra_boundary(vertices: Array, tetrahedra: IntArray) -> IntArray:
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     boundary: IntArray = faces[np.sort(first[count == 1])]
     return boundary
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the parsers from printing and logging what they raise."""
+    logger = logging.getLogger("trimesh")
+    before, logger.disabled = logger.disabled, True
+    try:
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            yield
+    finally:
+        logger.disabled = before
 
 
 def _first_line(error: BaseException) -> str:

@@ -1,0 +1,462 @@
+import gzip
+import os
+import struct
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import trimesh
+
+from parameterize.mesh import MeshError, load_surface, surface_from_arrays
+from parameterize.mesh_clean import signed_volume
+from parameterize.mesh_obj import triangulate
+from parameterize.mesh_place import deepest_point
+from parameterize.mesh_read import BYTES_AT_LEAST
+
+MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).parents[2] / "shared" / "models"))
+CUBE = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
+QUADS = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]  # outward
+TRIANGLES = np.array([[q[0], q[i], q[i + 1]] for q in QUADS for i in (1, 2)])
+TETRAHEDRON = (np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+
+
+def ball(radius=1.0, center=(0.0, 0.0, 0.0), subdivisions=2):
+    mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+    return np.asarray(mesh.vertices) + center, np.asarray(mesh.faces)
+
+
+def joined(*parts):
+    offsets = np.cumsum([0] + [len(v) for v, _ in parts])
+    faces = [f + offset for (_, f), offset in zip(parts, offsets, strict=False)]
+    return np.concatenate([v for v, _ in parts]), np.concatenate(faces)
+
+
+def obj(vertices=CUBE, faces=QUADS):
+    rows = ["v {!r} {!r} {!r}".format(*v) for v in np.asarray(vertices).tolist()]
+    return "\n".join(rows + ["f " + " ".join(str(i + 1) for i in face) for face in faces]) + "\n"
+
+
+def binary_stl(vertices=CUBE, faces=TRIANGLES, header=b"made by code"):
+    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *vertices[face].ravel(), 0) for face in faces)
+    return header.ljust(80, b"\0") + struct.pack("<I", len(faces)) + rows
+
+
+def text_stl(vertices=CUBE, faces=TRIANGLES):
+    rows = ["solid cube"]
+    for face in faces:
+        corners = ["vertex {} {} {}".format(*vertices[i]) for i in face]
+        rows += ["facet normal 0 0 0", "outer loop", *corners, "endloop", "endfacet"]
+    return "\n".join([*rows, "endsolid cube", ""])
+
+
+def off(vertices=CUBE, faces=QUADS, counts=None):
+    n, m = counts or (len(vertices), len(faces))
+    rows = ["OFF", f"{n} {m} 0", *("{} {} {}".format(*v) for v in vertices)]
+    return "\n".join(rows + [" ".join(map(str, [len(f), *f])) for f in faces]) + "\n"
+
+
+def ply(vertices=CUBE, faces=TRIANGLES, counts=None, binary=False):
+    n, m = counts or (len(vertices), len(faces))
+    head = f"ply\nformat {'binary_little_endian' if binary else 'ascii'} 1.0\nelement vertex {n}\n"
+    head += "".join(f"property float {a}\n" for a in "xyz")
+    head += f"element face {m}\nproperty list uchar int vertex_indices\nend_header\n"
+    if binary:
+        body = b"".join(struct.pack("<3f", *v) for v in vertices)
+        return head.encode() + body + b"".join(struct.pack(f"<B{len(f)}i", len(f), *f) for f in faces)
+    rows = ["{} {} {}".format(*v) for v in vertices] + [" ".join(map(str, [len(f), *f])) for f in faces]
+    return (head + "\n".join(rows) + "\n").encode()
+
+
+def write(folder, name, content):
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def is_unit_cube(surface):
+    assert surface.vertices.shape == (8, 3)
+    assert surface.faces.shape == (12, 3)
+    assert signed_volume(surface.vertices, surface.faces) == pytest.approx(1.0)
+    assert surface.volume == pytest.approx(1.0)
+    return True
+
+
+ACCEPTED = {
+    "quads.obj": (obj(), "6 polygons cut into 12 triangles"),
+    "triangles.obj": (obj(faces=TRIANGLES), None),
+    "bom.obj": (b"\xef\xbb\xbf" + obj().encode(), "byte order mark"),
+    "crlf.obj": (obj().replace("\n", "\r\n"), "6 polygons"),
+    "cr.obj": (obj().replace("\n", "\r"), "6 polygons"),
+    "continued.obj": (obj().replace("f 1 3", "f 1 \\\n3"), "6 polygons"),
+    "negative.obj": (obj(faces=[[i - 9 for i in quad] for quad in QUADS]), "negative (relative) vertex numbers"),
+    "seams.obj": (obj(CUBE[np.ravel(QUADS)], np.arange(24).reshape(6, 4)), "welded 16 duplicate vertices"),
+    "texture.obj": (obj().replace("f 1 3", "vt 0 0\nvn 0 0 1\nf 1/1/1 3//1"), "6 polygons"),
+    "unused.obj": ("v 5 5 5\n" + obj(faces=np.array(QUADS) + 1), "dropped 1 vertices that no face uses"),
+    "degenerate.obj": (obj() + "f 1 1 2\n", "dropped 1 degenerate faces"),
+    "inverted.obj": (obj(faces=[q[::-1] for q in QUADS]), "inverted orientation flipped"),
+    "winding.obj": (obj(faces=[QUADS[0][::-1], *QUADS[1:]]), "inconsistent winding: 2 faces flipped"),
+    "packed.obj.gz": (gzip.compress(obj().encode()), "unpacked from .gz"),
+    "binary.stl": (binary_stl(), "welded 28 duplicate vertices"),
+    "solid.stl": (binary_stl(header=b"solid but binary"), "although it starts with 'solid'"),
+    "text.stl": (text_stl(), "welded 28"),
+    "UPPER.STL": (text_stl().upper(), "welded 28"),
+    "packed.stl.gz": (gzip.compress(binary_stl()), "unpacked from .gz"),
+    "text.ply": (ply(), None),
+    "crlf.ply": (ply().replace(b"\n", b"\r\n"), None),
+    "binary.ply": (ply(binary=True), None),
+    "quads.ply": (ply(faces=QUADS), "6 polygons cut"),
+    "quads.off": (off(), "6 polygons cut"),
+    "comments.off": (off().replace("OFF\n", "OFF\n# a cube\n\n").replace("\n", "\r\n"), "6 polygons cut"),
+}
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+def test_accepts_and_says_so(name, tmp_path):
+    content, notice = ACCEPTED[name]
+    surface = load_surface(write(tmp_path, name, content))
+    assert is_unit_cube(surface)
+    assert surface.name == name.split(".")[0]
+    if notice is None:
+        assert surface.notices == ()
+    else:
+        assert any(notice in line for line in surface.notices), surface.notices
+
+
+HOLE = obj(faces=QUADS[1:])
+NOT_A_NUMBER = CUBE.copy()
+NOT_A_NUMBER[3, 1] = np.nan
+REFUSED = {
+    "empty.obj": ("", "the file is empty"),
+    "blank.stl": (" \n\n", "the file is empty"),
+    "garbage.obj": ("hello world\nthis is text\n", "0 vertices and 0 faces"),
+    "binary.obj": (b"\x00\x01\x02" * 100, "binary data"),
+    "garbage.stl": (bytes(range(256)), "must have"),
+    "short.stl": (b"abc", "3 bytes, the header alone takes 84"),
+    "garbage.ply": ("hello\n", "no header"),
+    "garbage.off": ("hello\n", "first word must be OFF"),
+    "garbage.mesh": ("hello\n", "MeshVersionFormatted"),
+    "garbage.msh": ("hello\n", "$MeshFormat"),
+    "garbage.vtu": ("hello\n", "VTKFile"),
+    "unknown.step": ("ISO-10303-21;", "unknown format"),
+    "bare": ("x", "unknown format"),
+    "word.obj": (obj().replace("v 0.0 0.0 0.0", "v 0.0 zero 0.0"), "line 1: a vertex needs three numbers"),
+    "decimal_comma.obj": (obj().replace("v 0.0 0.0 0.0", "v 0,0 0,0 0,0"), "line 1: a vertex"),
+    "face_word.obj": (obj() + "f 1 two 3\n", "line 15: a face needs vertex numbers"),
+    "two_corners.obj": (obj() + "f 1 2\n", "line 15: a face has 2 corners"),
+    "zero.obj": (obj() + "f 0 1 2\n", "vertex number 0"),
+    "nan.obj": (obj(NOT_A_NUMBER), "1 vertices with NaN or infinite coordinates, the first is vertex 3"),
+    "infinite.obj": (obj().replace("v 0.0 0.0 0.0", "v 1e999 0 0"), "1 vertices with NaN or infinite"),
+    "nan.stl": (binary_stl(NOT_A_NUMBER), "with NaN or infinite"),
+    "nan.ply": (ply(NOT_A_NUMBER, binary=True), "with NaN or infinite"),
+    "range.obj": (obj() + "f 1 2 99\n", "1 vertex numbers out of range, the first is 98"),
+    "below.obj": (obj() + "f 1 2 -20\n", "1 vertex numbers out of range, the first is -12"),
+    "range.off": (off(faces=[*QUADS, [0, 1, 77]]), "not readable as .off"),
+    "range.ply": (ply(faces=[*TRIANGLES, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
+    "few.obj": (obj(faces=QUADS[:1]), "2 faces, a closed surface needs at least 4"),
+    "cut.stl": (binary_stl()[:-20], "must have 684 bytes, this one has 664"),
+    "long.stl": (binary_stl() + b"abc", "must have 684 bytes, this one has 687"),
+    "cut_text.stl": (text_stl()[:-100], "truncated or damaged"),
+    "cut.ply": (ply()[:-40], "rows follow"),
+    "cut_binary.ply": (ply(binary=True)[:-30], "truncated or damaged"),
+    "cut.off": (off()[:-30], "rows follow"),
+    "points.ply": (ply(faces=np.empty((0, 3), int)), "8 vertices and 0 faces is no surface"),
+    "billion.ply": (ply(counts=(10**9, 12)), "at least 2000000024 bytes"),
+    "billion_binary.ply": (ply(counts=(8, 500_000), binary=True), "at least 500096 bytes"),
+    "billion.off": (off(counts=(10**9, 6)), "promises 1000000000 vertices"),
+    "billion.stl": (binary_stl()[:80] + struct.pack("<I", 10**9), "must have 50000000084 bytes"),
+    "word_count.off": (off().replace("8 6 0", "8 many 0"), "count 'many'"),
+    "many.mesh": ("MeshVersionFormatted 2\nDimension 3\nVertices\n1000000000\n0 0 0 0\nEnd\n", "promises 1000000000"),
+    "many.msh": (
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1000000000\n$EndNodes\n$Elements\n0\n$EndElements\n",
+        "damaged node rows",
+    ),
+    "high.msh": (
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1 1 1\n3 1 0 1\n9999999999\n0 0 0\n$EndNodes\n",
+        "node numbers of the .msh must be 1 to 10000000",
+    ),
+    "old.msh": ("$MeshFormat\n4 0 8\n$EndMeshFormat\n", "Gmsh format '4' is not read"),
+    "cut.msh": ("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 8 1 8\n", "without the whole section $Nodes"),
+    "many.vtu": (
+        '<VTKFile type="UnstructuredGrid"><Piece NumberOfPoints="1000000000" NumberOfCells="1"></Piece></VTKFile>',
+        "NumberOfPoints=1000000000",
+    ),
+    "open.obj": (HOLE, "open surface: 1 boundary loop (4 edges)"),
+    "two_holes.obj": (obj(faces=QUADS[2:]), "open surface: 2 boundary loops (8 edges)"),
+    "fin.obj": (obj() + "v 2 2 2\nf 1 2 9\n", "1 non-manifold edges"),
+    "not_gz.obj.gz": (b"plain text", "not a whole .gz"),
+    "cut.obj.gz": (gzip.compress(obj().encode())[:-10], "not a whole .gz"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refuses_in_one_line(name, tmp_path):
+    content, defect = REFUSED[name]
+    path = write(tmp_path, name, content)
+    with pytest.raises(MeshError) as caught:
+        load_surface(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert defect in message
+    assert "\n" not in message
+
+
+def test_refuses_missing_files_and_directories(tmp_path):
+    with pytest.raises(MeshError, match="no such file"):
+        load_surface(tmp_path / "absent.obj")
+    folder = tmp_path / "folder.obj"
+    folder.mkdir()
+    with pytest.raises(MeshError, match="is a directory"):
+        load_surface(folder)
+
+
+def test_a_gzip_bomb_stops_at_the_limit(tmp_path):
+    zeros = gzip.compress(b"v 0 0 0\n" * (BYTES_AT_LEAST // 8 + 1000), compresslevel=1)
+    with pytest.raises(MeshError, match="unpacks to more than"):
+        load_surface(write(tmp_path, "bomb.obj.gz", zeros), max_faces=4)
+
+
+def test_max_faces_is_checked_before_and_after_parsing(tmp_path):
+    for name, content in (("a.obj", obj(faces=TRIANGLES)), ("a.stl", binary_stl()), ("a.off", off(faces=TRIANGLES))):
+        with pytest.raises(MeshError, match="12 faces, more than max_faces=11"):
+            load_surface(write(tmp_path, name, content), max_faces=11)
+    path = write(tmp_path, "quads.obj", obj())
+    with pytest.raises(MeshError, match="12 faces, more than max_faces=8"):
+        load_surface(path, max_faces=8)
+    assert is_unit_cube(load_surface(path, max_faces=12))
+
+
+def test_the_first_defect_is_named_by_its_place():
+    vertices, faces = ball()
+    corner = faces[7]
+    with pytest.raises(MeshError) as caught:
+        surface_from_arrays(10.0 * vertices, np.delete(faces, 7, axis=0), "pierced")
+    place = str(caught.value).split("at (")[1].split(")")[0]
+    found = np.array([float(x) for x in place.split(",")])
+    assert np.linalg.norm(10.0 * vertices[corner] - found, axis=1).min() < 1e-4
+    assert str(caught.value).startswith("pierced: open surface: 1 boundary loop (3 edges)")
+
+
+def test_refuses_genus_one():
+    torus = trimesh.creation.torus(1.0, 0.3, major_sections=24, minor_sections=12)
+    with pytest.raises(MeshError, match=r"genus 1 \(1 handle\), expected 0: a cube has no handle"):
+        surface_from_arrays(torus.vertices, torus.faces)
+
+
+def test_lists_components_and_takes_the_one_asked_for():
+    pair = joined(ball(subdivisions=1), ball(2.0, (5, 0, 0)))
+    with pytest.raises(MeshError, match=r"2 components \(0: 320 faces, 1: 80 faces\): choose one with --component N"):
+        surface_from_arrays(*pair)
+    small = surface_from_arrays(*pair, component=1)
+    assert len(small.faces) == 80
+    assert any("component 1 taken of 2" in line for line in small.notices)
+    assert surface_from_arrays(*pair, component=0).center == pytest.approx([5, 0, 0], abs=0.05)
+    with pytest.raises(MeshError, match="no component 2: choose one of 2"):
+        surface_from_arrays(*pair, component=2)
+
+
+def test_refuses_nested_shells():
+    outer, (vertices, faces) = ball(2.0), ball(subdivisions=1)
+    with pytest.raises(MeshError, match="2 nested shells .* component 1 lies inside component 0"):
+        surface_from_arrays(*joined(outer, (vertices, faces[:, ::-1])))
+
+
+def test_refuses_a_pinched_vertex():
+    vertices, faces = TETRAHEDRON
+    pinched = np.concatenate([faces, np.where(faces == 0, 0, faces + 3)])
+    with pytest.raises(MeshError, match=r"1 non-manifold vertices .* the first at \(0, 0, 0\)"):
+        surface_from_arrays(np.vstack([vertices, -vertices[1:]]), pinched)
+
+
+def test_touching_sheets_of_a_closed_mesh_are_not_welded():
+    """Two vertices in one place are no defect where the numbering keeps the sheets apart."""
+    vertices, faces = ball(subdivisions=3)
+    north, south = np.argmax(vertices[:, 2]), np.argmin(vertices[:, 2])
+    vertices[north] = vertices[south] = 0.0  # two dents that meet in the centre
+    with pytest.raises(MeshError, match="non-manifold"):
+        surface_from_arrays(vertices, np.where(faces == south, north, faces))
+    assert len(surface_from_arrays(vertices, faces).vertices) == len(vertices)
+
+
+def test_collapses_edges_without_length():
+    vertices, faces = ball()
+    a, b = faces[0, :2]
+    vertices[b] = vertices[a]
+    surface = surface_from_arrays(vertices, faces)
+    assert (len(surface.vertices), len(surface.faces)) == (len(vertices) - 1, len(faces) - 2)
+    assert "dropped 2 degenerate faces" in surface.notices
+
+
+def test_refuses_a_flat_sheet_and_a_single_point():
+    square = CUBE * [1, 1, 0]
+    with pytest.raises(MeshError, match="encloses no volume"):
+        surface_from_arrays(np.vstack([CUBE[:4], [[0.5, 0.5, 0]]]) * [1, 1, 0], pyramid())
+    with pytest.raises(MeshError):
+        surface_from_arrays(square, TRIANGLES)
+    with pytest.raises(MeshError, match="single point or far too small"):
+        surface_from_arrays(np.zeros((8, 3)), TRIANGLES)
+
+
+def pyramid():
+    return [[0, 2, 3], [0, 3, 1], [0, 1, 4], [1, 3, 4], [3, 2, 4], [2, 0, 4]]
+
+
+@pytest.mark.parametrize("size", [1e12, 1e-9, 1e40, 1e-40])
+def test_accepts_any_size_and_scales_back(size, tmp_path):
+    vertices, faces = ball()
+    surface = load_surface(write(tmp_path, "ball.obj", obj(vertices * size, faces)))
+    assert surface.vertices.shape == vertices.shape
+    assert surface.volume / size**3 == pytest.approx(signed_volume(vertices, faces))
+    assert any("unusual size" in line for line in surface.notices)
+    assert signed_volume(surface.unit_vertices, surface.faces) == pytest.approx(1.0)
+
+
+def test_refuses_sizes_beyond_double_precision():
+    with pytest.raises(MeshError, match="choose a larger unit"):
+        surface_from_arrays(CUBE * 1e200, TRIANGLES)
+
+
+def test_says_when_the_surface_is_far_from_the_origin():
+    surface = surface_from_arrays(CUBE + 1e7, TRIANGLES)
+    assert any("far from the origin" in line for line in surface.notices)
+
+
+def test_warns_of_slivers_and_names_the_first():
+    vertices, faces = CUBE.copy(), TRIANGLES.tolist()
+    face = faces.pop(0)  # an extra vertex all but on one of its edges
+    vertices = np.vstack([vertices, (vertices[face[0]] + vertices[face[1]]) / 2 + [1e-4, 0, 0]])
+    faces += [[8, face[1], face[2]], [8, face[2], face[0]], [face[0], face[1], 8]]
+    surface = surface_from_arrays(vertices, faces)
+    assert any(line.startswith("1 slivers (an angle below 0.5 degrees)") for line in surface.notices)
+
+
+def test_refuses_a_one_sided_surface():
+    """The real projective plane with six vertices: closed, every edge between two faces, no orientation."""
+    faces = [
+        [0, 1, 2],
+        [0, 2, 3],
+        [0, 3, 4],
+        [0, 4, 5],
+        [0, 5, 1],
+        [1, 2, 4],
+        [2, 3, 5],
+        [3, 4, 1],
+        [4, 5, 2],
+        [5, 1, 3],
+    ]
+    points = np.random.default_rng(0).normal(size=(6, 3))
+    with pytest.raises(MeshError, match="one-sided"):
+        surface_from_arrays(points, faces)
+
+
+def test_arrays_of_the_wrong_kind_are_named():
+    with pytest.raises(MeshError, match=r"vertices must have shape \(n, 3\), got \(8, 2\)"):
+        surface_from_arrays(CUBE[:, :2], TRIANGLES)
+    with pytest.raises(MeshError, match="faces must be integers"):
+        surface_from_arrays(CUBE, TRIANGLES.astype(float))
+    with pytest.raises(MeshError, match="out of range, the first is -1"):
+        surface_from_arrays(CUBE, np.where(TRIANGLES == 7, -1, TRIANGLES))
+
+
+def test_equal_input_gives_equal_surfaces_and_other_input_other_hashes():
+    first, second = surface_from_arrays(CUBE, TRIANGLES), surface_from_arrays(CUBE, TRIANGLES)
+    assert first.sha256 == second.sha256
+    assert np.array_equal(first.center, second.center)
+    assert surface_from_arrays(CUBE * 2, TRIANGLES).sha256 != first.sha256
+
+
+def test_the_summary_is_the_input_section_of_the_report(tmp_path):
+    path = write(tmp_path, "cube.obj", obj(2.0 * CUBE))
+    summary = load_surface(path).summary()
+    assert (summary["file"], summary["vertices"], summary["faces"]) == (str(path), 8, 12)
+    assert summary["volume"] == pytest.approx(8.0)
+    assert summary["bbox"] == [[0, 0, 0], [2, 2, 2]]
+    assert summary["notices"] == ["6 polygons cut into 12 triangles"]
+    assert len(summary["sha256"]) == 64
+
+
+def test_placement_puts_the_deepest_point_in_the_middle_and_volume_to_one():
+    box = surface_from_arrays(CUBE * [2.0, 4.0, 3.0] + [10.0, 0.0, 0.0], TRIANGLES)
+    assert box.center[0] == pytest.approx(11.0, abs=2e-3)
+    assert box.to_unit(box.center) == pytest.approx([0.5, 0.5, 0.5])
+    assert box.scale == pytest.approx(24 ** (-1 / 3))
+    assert box.from_unit(box.unit_vertices) == pytest.approx(box.vertices)
+
+
+def test_the_deepest_point_of_a_tetrahedron_is_its_incenter():
+    """Corner tetrahedron: r = 3 V / A = (1/2) / (3/2 + sqrt(3)/2), incentre (r, r, r)."""
+    radius = 1.0 / (3.0 + np.sqrt(3.0))
+    point, depth = deepest_point(*TETRAHEDRON)
+    assert depth == pytest.approx(radius, rel=1e-3)
+    assert depth <= radius
+    assert point == pytest.approx([radius] * 3, rel=0.02)
+
+
+def test_the_deepest_point_of_an_angle_is_in_its_elbow():
+    """Two arms of width 1: (t, t) in the elbow is t from both walls and (1 - t) sqrt 2 from the inner corner."""
+    outline = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], dtype=float)
+    vertices = np.vstack([np.c_[outline, np.full(6, z)] for z in (0.0, 4.0)])
+    sides = [[i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6] for i in range(6)]
+    faces = triangulate(vertices, [[5, 4, 3, 2, 1, 0], [6, 7, 8, 9, 10, 11], *sides])
+    surface = surface_from_arrays(vertices, faces)
+    assert (surface.volume, surface.notices) == (pytest.approx(12.0), ())
+    assert surface.center[:2] == pytest.approx([2 - np.sqrt(2)] * 2, abs=0.02)
+
+
+def test_concave_quadrilaterals_are_cut_along_the_inner_diagonal():
+    dart = np.array([[0, 0, 0], [2, 1, 0], [0, 0.5, 0], [-2, 1, 0]], dtype=float)  # reflex at vertex 2
+    triangles = triangulate(dart, [[0, 1, 2, 3]])
+    areas = np.cross(dart[triangles[:, 1]] - dart[triangles[:, 0]], dart[triangles[:, 2]] - dart[triangles[:, 0]])[:, 2]
+    assert areas / 2 == pytest.approx([0.5, 0.5])
+
+
+def test_polygons_keep_their_order():
+    triangles = triangulate(CUBE, [QUADS[0], TRIANGLES[2].tolist(), QUADS[1]])
+    assert [set(t) <= set(QUADS[0]) for t in triangles.tolist()] == [True, True, False, False, False]
+    assert triangles[2].tolist() == TRIANGLES[2].tolist()
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("cube.mesh", {}),
+        ("cube.msh", {"file_format": "gmsh", "binary": True}),
+        ("cube.msh", {"file_format": "gmsh", "binary": False}),
+        ("cube.msh", {"file_format": "gmsh22", "binary": True}),
+        ("cube.msh", {"file_format": "gmsh22", "binary": False}),
+        ("cube.vtu", {}),
+        ("cube.vtu.gz", {"binary": False}),
+    ],
+)
+def test_tetrahedra_give_their_boundary(name, options, tmp_path):
+    """A cube of five tetrahedra, two of them inside out."""
+    tetrahedra = np.array([[0, 1, 2, 4], [1, 3, 2, 7], [1, 4, 7, 5], [2, 7, 4, 6], [1, 2, 7, 4]])
+    path = tmp_path / name.removesuffix(".gz")
+    meshio.write(path, meshio.Mesh(CUBE, [("tetra", tetrahedra)]), **options)
+    if name.endswith(".gz"):
+        path = write(tmp_path, name, gzip.compress(path.read_bytes()))
+    assert is_unit_cube(load_surface(path))
+
+
+def test_surfaces_in_volume_formats_and_other_cells(tmp_path):
+    path = tmp_path / "surface.vtu"
+    meshio.write(path, meshio.Mesh(CUBE, [("quad", np.array(QUADS))]))
+    assert is_unit_cube(load_surface(path))
+    meshio.write(path, meshio.Mesh(CUBE, [("hexahedron", np.array([[0, 1, 3, 2, 4, 5, 7, 6]]))]))
+    with pytest.raises(MeshError, match="1 cells of type hexahedron: save linear tetrahedra or triangles"):
+        load_surface(path)
+    meshio.write(path, meshio.Mesh(CUBE, [("tetra", np.array([[0, 1, 2, 40]]))]))
+    with pytest.raises(MeshError, match="out of range, the first is 40"):
+        load_surface(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(MODELS.glob("*.obj")), ids=lambda path: path.stem)
+def test_real_models_are_accepted_unchanged(path):
+    surface = load_surface(path)
+    rows = [line.split() for line in path.read_text().splitlines()]
+    given = np.array([[float(x) for x in row[1:4]] for row in rows if row[:1] == ["v"]])
+    assert np.array_equal(surface.vertices, given)
+    assert len(surface.faces) == sum(row[:1] == ["f"] for row in rows)
+    _, depth = deepest_point(surface.unit_vertices, surface.faces)
+    assert 0.2 < depth < 0.62035  # the ball of volume 1 has radius 0.62035
