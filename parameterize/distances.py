@@ -81,7 +81,7 @@ def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary)
     where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
     axis = 3 * triangle // len(boundary.triangles)  # the direction that is constant on the face
     where[np.arange(len(where)), axis] = boundary.parameters[corners[:, 0]][np.arange(len(where)), axis]
-    best = np.linalg.norm(volume(where) - points, axis=1)
+    best: Array = np.linalg.norm(volume(where) - points, axis=1)
     active = np.arange(len(points))
     for _ in range(_NEWTON_STEPS):
         step = _foot_step(volume, where[active], points[active], axis[active])

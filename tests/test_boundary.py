@@ -1,0 +1,105 @@
+"""The boundary map: faces of the cube, orientation seen from its centre, the file."""
+
+import numpy as np
+import pytest
+
+from parameterize.boundary import BoundaryMap
+from parameterize.volume import FACE_NAMES
+
+CORNERS = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
+
+
+def cube_map():
+    """The cube itself: two triangles a face, outward, in the order u0, u1, v0, v1, w0, w1."""
+    faces = [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5],
+        [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
+        [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]  # fmt: skip
+    return BoundaryMap(10.0 * CORNERS - 3.0, CORNERS, np.array(faces))
+
+
+def test_cube_faces_and_orientation_of_the_cube():
+    mapping = cube_map()
+    assert mapping.cube_faces.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+    assert mapping.flipped().size == 0
+    for k, name in enumerate(FACE_NAMES):
+        places = mapping.parameters[mapping.faces[mapping.cube_faces == k]]
+        assert np.all(places[..., "uvw".index(name[0])] == float(name[1]))
+
+
+def test_turned_triangles_are_flipped():
+    mapping = cube_map()
+    faces = mapping.faces.copy()
+    faces[[3, 8]] = faces[[3, 8], ::-1]
+    assert BoundaryMap(mapping.vertices, CORNERS, faces).flipped().tolist() == [3, 8]
+    assert len(BoundaryMap(mapping.vertices, CORNERS, mapping.faces[:, ::-1]).flipped()) == 12
+
+
+@pytest.mark.parametrize(
+    "triangle",
+    [
+        [[0, 0, 0], [0, 0, 1], [0, 0, 1]],  # two corners coincide
+        [[0, 0, 0], [0, 0, 0.3], [0, 0, 1]],  # on an edge of the cube
+        [[1, 0.1, 0.1], [1, 0.2, 0.2], [1, 0.7, 0.7]],  # on a line inside a face
+        [[1, 0.1, 0.3], [1, 0.2, 0.6], [1, 0.3, 0.9]],  # the same, but for rounding
+    ],
+)
+def test_triangles_without_area_are_flipped(triangle):
+    for order in ([0, 1, 2], [2, 1, 0]):
+        assert BoundaryMap(np.zeros((3, 3)), np.array(triangle, dtype=float), np.array([order])).flipped().tolist() == [
+            0
+        ]
+
+
+def test_thin_triangle_keeps_its_sign():
+    places = np.array([[1.0, 0.0, 0.5], [1.0, 1.0, 0.5], [1.0, 0.5, 0.5 + 1e-12]])
+    assert BoundaryMap(places, places, np.array([[0, 1, 2]])).flipped().size == 0
+    assert BoundaryMap(places, places, np.array([[1, 0, 2]])).flipped().tolist() == [0]
+
+
+def test_triangle_across_an_edge_has_no_face():
+    places = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.0, 0.0, 0.6]])
+    with pytest.raises(ValueError, match="do not lie on one face of the cube, the first is 0"):
+        _ = BoundaryMap(places, places, np.array([[0, 1, 2]])).cube_faces
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"parameters": CORNERS[:7]}, "one row for each of the 8 vertices"),
+        ({"parameters": 0.5 * CORNERS + 0.25}, "8 do not, the first is vertex 0"),
+        ({"parameters": 1.5 * CORNERS}, "first is vertex 1"),
+        ({"parameters": CORNERS[:, :2]}, "parameters must have shape"),
+        ({"vertices": np.full((8, 3), np.nan)}, "vertices must be finite"),
+        ({"faces": np.array([[0, 1, 8]])}, "0 to 7, got 0 to 8"),
+        ({"faces": np.array([[0, -1, 2]])}, "0 to 7, got -1 to 2"),
+        ({"faces": np.array([[0.0, 1.0, 2.0]])}, "whole numbers"),
+    ],
+)
+def test_parts_that_do_not_fit(change, message):
+    mapping = cube_map()
+    parts = {"vertices": mapping.vertices, "parameters": mapping.parameters, "faces": mapping.faces} | change
+    with pytest.raises(ValueError, match=message):
+        BoundaryMap(**parts)
+
+
+def test_save_and_load(tmp_path):
+    mapping = cube_map()
+    mapping.save(tmp_path / "boundary.npz")
+    loaded = BoundaryMap.load(tmp_path / "boundary.npz")
+    for name in ("vertices", "parameters", "faces"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(mapping, name))
+    assert loaded.faces.dtype == np.int64
+
+
+def test_load_names_the_file_and_the_fault(tmp_path):
+    path = tmp_path / "boundary.npz"
+    with pytest.raises(FileNotFoundError, match=r"boundary\.npz"):
+        BoundaryMap.load(path)
+    np.savez(path, vertices=CORNERS, parameters=0.5 + 0.0 * CORNERS, faces=np.array([[0, 1, 2]]))
+    with pytest.raises(ValueError, match=r"boundary\.npz: parameters must lie on the faces"):
+        BoundaryMap.load(path)
+    np.savez(path, vertices=CORNERS, parameters=np.array(["a"] * 8), faces=np.array([[0, 1, 2]]))
+    with pytest.raises(ValueError, match=r"boundary\.npz"):
+        BoundaryMap.load(path)

@@ -1,0 +1,119 @@
+"""Array files: atomic, without pickles, and refused with a reason."""
+
+import hashlib
+import zipfile
+
+import numpy as np
+import pytest
+
+from parameterize import files
+from parameterize.files import load_arrays, save_arrays, save_text
+
+
+def test_round_trip_is_exact(tmp_path):
+    path = tmp_path / "a.npz"
+    values = np.array([0.1, np.nextafter(1.0, 2.0), 1e-308])
+    save_arrays(path, values=values, numbers=np.arange(3))
+    data = load_arrays(path, ("values", "numbers"))
+    np.testing.assert_array_equal(data["values"], values)
+    assert data["numbers"].dtype == np.arange(3).dtype
+
+
+def test_only_the_named_arrays_are_read(tmp_path):
+    save_arrays(tmp_path / "a.npz", wanted=np.ones(2), other=np.zeros(2))
+    assert list(load_arrays(tmp_path / "a.npz", ("wanted",))) == ["wanted"]
+
+
+def test_equal_arrays_give_equal_files(tmp_path):
+    for name in ("a.npz", "b.npz"):
+        save_arrays(tmp_path / name, values=np.arange(5.0))
+    digests = {hashlib.sha256((tmp_path / name).read_bytes()).hexdigest() for name in ("a.npz", "b.npz")}
+    assert len(digests) == 1
+
+
+def test_failed_write_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch):
+    path = tmp_path / "a.npz"
+    save_arrays(path, values=np.ones(3))
+
+    def fail(stream, **arrays):
+        stream.write(b"half a file")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(files.np, "savez_compressed", fail)
+    with pytest.raises(OSError, match="disk full"):
+        save_arrays(path, values=np.zeros(3))
+    monkeypatch.undo()
+    assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
+    np.testing.assert_array_equal(load_arrays(path, ("values",))["values"], np.ones(3))
+
+
+def test_text_replaces_what_was_there(tmp_path):
+    path = tmp_path / "report.json"
+    save_text(path, "{}")
+    save_text(path, "conch \N{LATIN SMALL LETTER SHARP S}")
+    assert path.read_text(encoding="utf-8") == "conch ß"
+    assert [p.name for p in tmp_path.iterdir()] == ["report.json"]
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"none\.npz: no such file"):
+        load_arrays(tmp_path / "none.npz", ())
+
+
+def test_missing_array_is_named(tmp_path):
+    save_arrays(tmp_path / "a.npz", one=np.ones(1))
+    with pytest.raises(ValueError, match=r"a\.npz: has no array named two, three"):
+        load_arrays(tmp_path / "a.npz", ("one", "two", "three"))
+
+
+class Bomb:
+    """Unpickling this would be noticed."""
+
+    def __reduce__(self):
+        return (pytest.fail, ("a pickle was run",))
+
+
+def test_pickled_content_is_refused_unread(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, values=np.array([Bomb()], dtype=object))
+    with pytest.raises(ValueError, match=r"a\.npz: .*allow_pickle"):
+        load_arrays(path, ("values",))
+
+
+def test_truncated_archive_is_refused(tmp_path):
+    path = tmp_path / "a.npz"
+    save_arrays(path, values=np.random.default_rng(0).random(1000))
+    whole = path.read_bytes()
+    for size in (0, 10, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:size])
+        with pytest.raises(ValueError, match=r"a\.npz: not a readable \.npz archive"):
+            load_arrays(path, ("values",))
+
+
+def test_damaged_array_is_refused(tmp_path):
+    path = tmp_path / "a.npz"
+    save_arrays(path, values=np.random.default_rng(0).random(1000))
+    content = bytearray(path.read_bytes())
+    middle = len(content) // 2
+    content[middle : middle + 50] = bytes(50)
+    path.write_bytes(bytes(content))
+    with pytest.raises(ValueError, match=r"a\.npz"):
+        load_arrays(path, ("values",))
+
+
+def test_other_files_are_refused(tmp_path):
+    path = tmp_path / "a.npz"
+    path.write_text("v 0 0 0\n")
+    with pytest.raises(ValueError, match="not a readable"):
+        load_arrays(path, ())
+    with pytest.raises(ValueError, match="not a readable"):
+        load_arrays(tmp_path, ())
+
+
+def test_archive_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "a.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("values.npy", bytes(10_000))
+    monkeypatch.setattr(files, "MAX_UNPACKED_BYTES", 9_999)
+    with pytest.raises(ValueError, match=r"a\.npz: unpacks to 10000 bytes"):
+        load_arrays(path, ("values",))
