@@ -1,7 +1,7 @@
 """The paper's Table 3, Table 4 and Figure 14 for the models it solves Poisson's equation on, ours beside the paper's.
 
 `python examples/validation.py [--preset paper] [--models DIR] [--out DIR] [--steps-factor F]` runs conch and santa4 and
-writes validation.md with the error figures beside it. The paper's santa4 is not public: its row waits for `santa4.obj` in
+writes validation.md with the error figures beside it. The paper's santa4 is not public: its row waits for santa4.obj in
 the models' folder (--models, else IGA_NN_DATA, else ../shared/models).
 """
 

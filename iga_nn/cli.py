@@ -25,7 +25,7 @@ app = App(
     help="From a closed surface mesh to a solved PDE on a certified trivariate B-spline.",
     version=f"iga-nn {__version__}",
     suppress_keyboard_interrupt=False,
-    default_parameter=Parameter(negative=()),
+    default_parameter=Parameter(negative=(), consume_multiple=True),
 )
 run_app = App(name="run", help="A surface, all the way to a solved problem.")
 solve_app = App(name="solve", help="A problem on a volume.npz.")

@@ -128,11 +128,11 @@ def _aim(plotter: Any, points: Array, view: View, pixels: tuple[int, int]) -> No
     """Place the camera so that the whole cloud is seen, with a margin of 4 %."""
     frame = np.stack([view.right, view.up, view.towards], axis=1)  # (3, 3), columns
     low, high = (points @ frame).min(axis=0), (points @ frame).max(axis=0)
-    width, height, depth = high - low
+    width, height, _ = high - low
     focus = frame @ ((low + high) / 2.0)
     size = float(np.linalg.norm(high - low))
     camera = plotter.camera
     camera.enable_parallel_projection()
     camera.focal_point, camera.position, camera.up = focus, focus + 2.0 * size * view.towards, view.up
     camera.parallel_scale = 0.54 * max(height, width * pixels[1] / pixels[0])
-    camera.clipping_range = (2.0 * size - depth, 2.0 * size + depth)
+    camera.clipping_range = (size, 3.0 * size)
