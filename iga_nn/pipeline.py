@@ -92,7 +92,10 @@ def run(
     equation = poisson.problem()
     state, finished = _open(mesh, out, force, mapping.resume)
     if finished:
-        return finished
+        if "poisson" in finished.report:
+            return finished
+        volume = finished.folder / "volume.npz"
+        raise InputError(f"{finished.folder}: holds a finished volume; `iga-nn solve poisson {volume}` solves on it")
     result = _parameterize(state, mesh, mapping, progress)
     _solve(state, result.volume, equation, poisson)
     return state.finish()
@@ -258,7 +261,7 @@ def _certify(volume: BSplineVolume) -> dict[str, Any]:
 
 
 def _draw(state: _Run, draw: Callable[[Any], None]) -> None:
-    """Figures, where this machine can draw; a figure that fails never costs the result."""
+    """Figures, timed; importing matplotlib and VTK takes part of it."""
     from . import plotting
 
     with state.timed("report"):

@@ -27,8 +27,8 @@ MAP = "viridis"  # perceptually uniform
 
 
 def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Poisson) -> None:
-    """Write error.png, where VTK can draw."""
-    if can_draw():
+    """Write error.png, where VTK can draw and the solver did not break down."""
+    if can_draw() and np.all(np.isfinite(solution.coefficients)):
         draw_error(folder / "error.png", volume, solution, problem)
 
 

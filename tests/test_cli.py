@@ -62,6 +62,8 @@ def test_finished_output_is_left_alone_unless_forced(formula_training, in_folder
     assert "--force" in one_line(capsys.readouterr().err)
     assert main(["parameterize", "cube", "--resume"]) == 0  # the answer is there already
     assert Path("cube/volume.npz").stat().st_mtime_ns == before
+    assert main(["run", "poisson", "cube", "--resume"]) == 2  # a volume, but no solution
+    assert "iga-nn solve poisson cube/volume.npz" in one_line(capsys.readouterr().err)
     assert main(["parameterize", "cube", "--force"]) == 0
     assert Path("cube/volume.npz").stat().st_mtime_ns > before
 
