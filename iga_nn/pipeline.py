@@ -219,7 +219,7 @@ def _solve(state: _Run, volume: BSplineVolume, equation: Poisson, options: Poiss
             with input_errors():
                 solution = solve_poisson(volume, equation, refine=level, degree=options.degree, certified=verdict)
             solutions.append(solution)
-            log.info("solved, refined %d times: %s", level, solution.report)
+            log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
             solution.save(state.folder / "solution.npz")  # the finest so far
     found = [solution.report for solution in solutions]
     given = {"exact": equation.exact, "source": equation.source, "boundary": equation.boundary}

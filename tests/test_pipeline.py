@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ import iga_nn
 from iga_nn import pipeline
 from iga_nn.options import InputError, MapOptions, PoissonOptions
 from parameterize.volume import BSplineVolume
+
+MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).resolve().parents[2] / "shared" / "models"))
 
 
 def test_run_returns_what_it_wrote(formula_training, in_folder):
@@ -62,3 +66,24 @@ def test_config_follows_the_options():
 def test_default_problem_is_the_papers():
     assert PoissonOptions().problem().exact == "exp(x+z)*sin(y)"
     assert PoissonOptions(source="1").problem().exact is None
+
+
+def test_same_seed_gives_the_same_volume_bit_for_bit(in_folder):
+    short = MapOptions(steps_factor=0.005, control_points=8)
+    for out in ("first", "second"):
+        pipeline.parameterize_to("ellipsoid", out, mapping=short)
+    assert (in_folder / "first" / "volume.npz").read_bytes() == (in_folder / "second" / "volume.npz").read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["conch", "bunny", "duck"])
+def test_published_models_end_to_end(name, in_folder):
+    model = MODELS / f"{name}.obj"
+    if not model.exists():
+        pytest.skip(f"{model}: not there; set IGA_NN_DATA to the folder of the models")
+    report = iga_nn.run("poisson", model, "out").report
+    assert report["seconds"]["total"] < 600.0
+    assert all(level["converged"] for level in report["poisson"]["levels"])
+    assert report["poisson"]["levels"][1]["l2"] < report["poisson"]["levels"][0]["l2"]
+    files = {file.name for file in (in_folder / "out").iterdir()}
+    assert files >= {"volume.npz", "boundary.npz", "solution.npz", "history.npz", "report.json", "history.png"}
