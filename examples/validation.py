@@ -17,7 +17,8 @@ import iga_nn
 from iga_nn.cli import main as iga_nn_main
 from iga_nn.report import read
 
-ABSENT = "model not public"
+ABSENT, FAILED = "model not public", "run failed"
+Result = dict[str, Any] | str  # a report, or why there is none
 
 
 @dataclass(frozen=True)
@@ -39,19 +40,15 @@ PAPER = {
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run what is there, write and print the tables; 0 unless a run could not be made."""
+    """Run what is there, write and print the tables; 0 unless a model that is there could not be run."""
     options = _options(argv)
     options.out.mkdir(parents=True, exist_ok=True)
-    reports: dict[str, dict[str, Any] | None] = {}
-    failed = False
-    for name in PAPER:
-        model = options.models / f"{name}.obj"
-        reports[name] = _run(model, options) if model.exists() else None
-        failed |= model.exists() and reports[name] is None
-    text = _document(reports, options)
+    models = {name: options.models / f"{name}.obj" for name in PAPER}
+    results = {name: _run(model, options) if model.exists() else ABSENT for name, model in models.items()}
+    text = _document(results, options)
     (options.out / "validation.md").write_text(text, encoding="utf-8")
     print(text)
-    return int(failed)
+    return int(FAILED in results.values())
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:
@@ -65,16 +62,16 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def _run(model: Path, options: argparse.Namespace) -> dict[str, Any] | None:
-    """One model through the command a user types; its report, or None where it did not come to its end."""
+def _run(model: Path, options: argparse.Namespace) -> Result:
+    """One model through the command a user types."""
     folder = options.out / model.stem
     command = ["run", "poisson", str(model), "--out", str(folder), "--force", "--preset", options.preset]
     command += ["--steps-factor", str(options.steps_factor), "--control-points", str(options.control_points)]
     code = iga_nn_main(command)
-    return read(folder) if code in (0, 3, 4) else None
+    return (read(folder) if code in (0, 3, 4) else None) or FAILED
 
 
-def _document(reports: dict[str, dict[str, Any] | None], options: argparse.Namespace) -> str:
+def _document(results: dict[str, Result], options: argparse.Namespace) -> str:
     """The tables as Markdown."""
     short = "" if options.steps_factor == 1.0 else f", every stage shortened by {options.steps_factor}: no measurement"
     parts = [
@@ -82,48 +79,48 @@ def _document(reports: dict[str, dict[str, Any] | None], options: argparse.Names
         _table(
             "Table 3: quality, at the scale the models came in",
             ("model", "", "ARAP mean", "ARAP max", "boundary rms", "certified"),
-            [row for name, report in reports.items() for row in _quality_rows(name, report)],
+            [row for name, result in results.items() for row in _quality_rows(name, result)],
         ),
         _table(
             "Table 4: seconds (the paper's on an RTX 3080 Ti)",
             ("model", "", "train", "fit + optimise", "total"),
-            [row for name, report in reports.items() for row in _time_rows(name, report)],
+            [row for name, result in results.items() for row in _time_rows(name, result)],
         ),
         _table(
-            "Figure 14: Poisson's equation, u = exp(x+z) sin(y) (the paper's figure gives colours only)",
+            "Figure 14: Poisson's equation, u = exp(x+z) sin(y) (the paper's numbers stand in its figure only)",
             ("model", "refined", "unknowns", "L2 error", "relative", "iterations", "error distribution"),
-            [row for name, report in reports.items() for row in _solve_rows(name, report)],
+            [row for name, result in results.items() for row in _solve_rows(name, result)],
         ),
     ]
     return "\n\n".join(parts) + "\n"
 
 
-def _quality_rows(name: str, report: dict[str, Any] | None) -> list[tuple[str, ...]]:
+def _quality_rows(name: str, result: Result) -> list[tuple[str, ...]]:
     paper = PAPER[name]
     theirs = (name, "paper", f"{paper.arap_mean:.3f}", f"{paper.arap_max:.3f}", f"{paper.boundary:.5f}", "-")
-    if report is None:
-        return [(name, "ours", ABSENT, "", "", ""), theirs]
-    quality = report["parameterization"]
+    if isinstance(result, str):
+        return [(name, "ours", result, "", "", ""), theirs]
+    quality = result["parameterization"]
     arap, rms = quality["arap"]["as_given"], quality["boundary"]["as_given"]["rms"]
     return [(name, "ours", f"{arap['mean']:.3f}", f"{arap['max']:.3f}", f"{rms:.5f}", quality["bijective"]), theirs]
 
 
-def _time_rows(name: str, report: dict[str, Any] | None) -> list[tuple[str, ...]]:
+def _time_rows(name: str, result: Result) -> list[tuple[str, ...]]:
     paper = PAPER[name]
     theirs = (name, "paper", f"{paper.train:.2f}", f"{paper.fit:.2f}", f"{paper.total:.2f}")
-    if report is None:
-        return [(name, "ours", ABSENT, "", ""), theirs]
-    seconds = report["seconds"]
+    if isinstance(result, str):
+        return [(name, "ours", result, "", ""), theirs]
+    seconds = result["seconds"]
     train, fit = seconds["train"], seconds["fit"] + seconds["optimize"]
     return [(name, "ours", f"{train:.2f}", f"{fit:.2f}", f"{train + fit:.2f}"), theirs]
 
 
-def _solve_rows(name: str, report: dict[str, Any] | None) -> list[tuple[str, ...]]:
-    if report is None:
-        return [(name, "", ABSENT, "", "", "", "")]
+def _solve_rows(name: str, result: Result) -> list[tuple[str, ...]]:
+    if isinstance(result, str):
+        return [(name, "", result, "", "", "", "")]
     rows = []
-    for refined, level in enumerate(report["poisson"]["levels"]):
-        figure = f"![error]({name}/error.png)" if refined == len(report["poisson"]["levels"]) - 1 else ""
+    for refined, level in enumerate(result["poisson"]["levels"]):
+        figure = f"![error]({name}/error.png)" if refined == len(result["poisson"]["levels"]) - 1 else ""
         numbers = (f"{level['l2']:.3e}", f"{level['l2_relative']:.3e}", str(level["iterations"]))
         rows.append((name, str(refined), str(level["dofs"]), *numbers, figure))
     return rows

@@ -97,7 +97,7 @@ def load_surface(path: str | Path, *, component: int | None = None, max_faces: i
         surface = _gate(raw.vertices, raw.faces, name, source, raw.sha256, raw.notices, component, max_faces)
     except MeshError as error:
         raise MeshError(f"{source}: {error}") from None
-    logger.info("%s: %d vertices, %d faces", source, len(surface.vertices), len(surface.faces))
+    logger.debug("%s: %d vertices, %d faces", source, len(surface.vertices), len(surface.faces))
     return surface
 
 
