@@ -118,7 +118,7 @@ def _time_rows(name: str, result: Result) -> list[tuple[str, ...]]:
 def _solve_rows(name: str, result: Result) -> list[tuple[str, ...]]:
     if isinstance(result, str):
         return [(name, "", result, "", "", "", "")]
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for refined, level in enumerate(result["poisson"]["levels"]):
         figure = f"![error]({name}/error.png)" if refined == len(result["poisson"]["levels"]) - 1 else ""
         numbers = (f"{level['l2']:.3e}", f"{level['l2_relative']:.3e}", str(level["iterations"]))
