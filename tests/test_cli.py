@@ -1,6 +1,10 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -216,3 +220,17 @@ def test_real_training_in_short(in_folder, capsys):
     assert report["parameterization"]["control_points"] == [8, 8, 8]
     assert set(np.load("bean/history.npz")["stage"]) >= {"S(2)", "S(1)", "cube", "corners", "edges"}
     assert not Path("bean/checkpoint").exists()
+
+
+def test_ctrl_c_in_the_middle_of_a_training_leaves_a_checkpoint(in_folder):
+    command = [sys.executable, "-m", "iga_nn", "parameterize", "bean"]
+    environment = os.environ | {"PYTHONPATH": str(Path(iga_nn.__file__).resolve().parents[1])}
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as running:
+        for line in running.stderr:
+            if "step" in line:
+                break
+        running.send_signal(signal.SIGINT)
+        rest = running.stderr.read()
+    assert running.returncode == 130
+    assert "--resume" in one_line(rest)
+    assert any(Path("bean/checkpoint").iterdir())
