@@ -23,7 +23,8 @@ Indices = NDArray[np.int64]
 
 _UNIT_ROUNDOFF = 2.0**-53
 _UNDERFLOW = 1e-280  # what sums of products of numbers below 1 can lose to underflow, with room
-_CHUNK = 256  # spans or pieces at a time: a few MB, near the cache
+_CHUNK = 256  # spans at a time: a few MB, near the cache
+_PIECES = 64  # pieces at a time
 _TIGHT = 0.5  # a proved bound below this share of the least known value of det J is refined
 
 
@@ -56,17 +57,16 @@ def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
     start = time.perf_counter()
     form = _DeterminantForm(volume)
     bounds, corners, means = form.survey()
-    target = max(0.0, _TIGHT * float(corners.min()))
-    doubtful = np.flatnonzero(~(bounds > target))  # span numbers, flat
-    search = _Search(form, max_depth, target)
+    search = _Search(form, max_depth, float(corners.min()))
+    doubtful = np.flatnonzero(~(bounds > search.target))  # span numbers, flat
     for begin in range(0, len(doubtful), _CHUNK):
         search.examine(doubtful[begin : begin + _CHUNK])
     bounds[doubtful] = np.inf
     lowest = min(float(bounds.min()), search.lowest)
     mean = float(np.sum(means * form.span_sizes()))
-    failed = np.array(sorted(search.unproved), dtype=np.int64)
+    failed = np.flatnonzero(search.unproved)
     verdict: Literal["certified", "folded", "undecided"] = "undecided" if failed.size else "certified"
-    if search.folded:
+    if search.worst_piece is not None:
         verdict = "folded"
     return Certificate(
         verdict=verdict,
@@ -129,6 +129,7 @@ class _DeterminantForm:
         self.degrees = volume.degrees
         self.breaks = [breakpoints(k) for k in volume.knots]
         self.n_spans: tuple[int, ...] = tuple(len(b) - 1 for b in self.breaks)
+        self.span_count = int(np.prod(self.n_spans))
         self.roundings = _roundings(volume.degrees)
         points, self.exponent = _to_unit_magnitude(np.moveaxis(volume.control_points, -1, 0))
         self.exponent *= 3
@@ -154,7 +155,7 @@ class _DeterminantForm:
 
     def survey(self) -> tuple[Array, Array, Array]:
         """For all spans: lower bound of det J, least value at the 8 corners, mean; (n_spans in all,) each."""
-        total = int(np.prod(self.n_spans))
+        total = self.span_count
         bounds, corners, means = np.empty(total), np.empty(total), np.empty(total)
         for start in range(0, total, _CHUNK):
             chunk = np.arange(start, min(start + _CHUNK, total))
@@ -271,15 +272,18 @@ class _Pieces:
 
 
 class _Search:
-    """Depth-first subdivision of doubtful spans. Memory: at most 9 * _CHUNK pieces a level."""
+    """Depth-first subdivision of doubtful spans, each until it is proved, or folded, or a part of it is given up.
 
-    def __init__(self, form: _DeterminantForm, max_depth: int, target: float) -> None:
+    Depth-first bounds the memory, at most 9 * _PIECES pieces a level, and the time that a hopeless span takes.
+    """
+
+    def __init__(self, form: _DeterminantForm, max_depth: int, known: float) -> None:
         self.form = form
         self.max_depth = max_depth
-        self.target = target
+        self.known = known  # least value of det J seen
         self.lowest = np.inf  # least bound of det J over the pieces done with
-        self.unproved: set[int] = set()
-        self.folded: set[int] = set()
+        self.unproved = np.zeros(form.span_count, dtype=bool)
+        self.closed = np.zeros(form.span_count, dtype=bool)  # folded or given up: not to be looked at further
         self.deepest = 0.0  # det J at the worst fold
         self.worst_piece: tuple[int, int, Indices, Indices] | None = None  # depth, span, origin (3,), corner (3,)
 
@@ -290,31 +294,37 @@ class _Search:
         stack = [_Pieces(0, spans, np.zeros((len(spans), 3), dtype=np.int64), whole, permanents)]
         while stack:
             top = stack.pop()
-            if len(top.spans) > _CHUNK:
-                stack.append(top.subset(slice(_CHUNK, None)))
-                top = top.subset(slice(_CHUNK))
+            if len(top.spans) > _PIECES:
+                stack.append(top.subset(slice(_PIECES, None)))
+                top = top.subset(slice(_PIECES))
             doubtful = self._settle(top)
             if len(doubtful.spans):
                 stack.append(doubtful.halved())
+
+    @property
+    def target(self) -> float:
+        """A bound of det J above this is good enough."""
+        return max(0.0, _TIGHT * self.known)
 
     def _settle(self, pieces: _Pieces) -> _Pieces:
         """Draw the conclusions that can be drawn; return the pieces to be cut."""
         errors = self.form.errors(pieces.permanents, pieces.depth)
         least = pieces.values.min(axis=(1, 2, 3))
+        bounds = least - errors
         corners = _corners(pieces.values, first=1).reshape(-1, 8)
         lowest_corner = corners.min(axis=1)
+        self.known = min(self.known, float(lowest_corner.min()))
         self._record_folds(pieces, corners, lowest_corner < -errors)
-        bounds = least - errors
-        hopeless = (lowest_corner <= errors) & (least >= -errors)  # det J is 0 at a corner, and no fold can show
-        done = (bounds > self.target) | hopeless | np.isin(pieces.spans, list(self.folded))
         if pieces.depth == self.max_depth:
-            done[:] = True
-        self.unproved.update(pieces.spans[done & ~(bounds > 0.0)].tolist())
+            self.closed[pieces.spans[~(bounds > 0.0)]] = True
+        hopeless = (lowest_corner <= errors) & (least >= -errors)  # det J is 0 at a corner, and no fold can show
+        done = (bounds > self.target) | hopeless | self.closed[pieces.spans] | (pieces.depth == self.max_depth)
+        self.unproved[pieces.spans[done & ~(bounds > 0.0)]] = True
         self.lowest = min(self.lowest, float(bounds[done].min(initial=np.inf)))
         return pieces.subset(~done)
 
     def _record_folds(self, pieces: _Pieces, corners: Array, folded: NDArray[np.bool_]) -> None:
-        self.folded.update(pieces.spans[folded].tolist())
+        self.closed[pieces.spans[folded]] = True
         row, corner = np.unravel_index(int(corners.argmin()), corners.shape)
         if folded[row] and corners[row, corner] < self.deepest:
             self.deepest = float(corners[row, corner])

@@ -1,0 +1,238 @@
+"""Distortion and distances, on maps whose values can be worked out by hand."""
+
+import json
+
+import igl
+import numpy as np
+import pytest
+
+from parameterize.boundary import BoundaryMap
+from parameterize.bspline import collocation, greville, open_uniform_knots
+from parameterize.certificate import certify
+from parameterize.distances import Distances, SampledBoundary, to_boundary, to_mesh
+from parameterize.quality import arap, arap_grid, measure, scaled_jacobian, signed_singular_values
+from parameterize.volume import BSplineVolume
+
+CORNERS = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
+CUBE_FACES = np.array(
+    [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5],
+        [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
+        [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]
+)  # fmt: skip
+
+
+def greville_grid(n, degree=3):
+    row = greville(open_uniform_knots(n, degree), degree)
+    return np.stack(np.meshgrid(row, row, row, indexing="ij"), axis=-1)
+
+
+def affine(matrix, n=5):
+    return BSplineVolume.uniform(greville_grid(n) @ np.asarray(matrix, dtype=float).T)
+
+
+def ball(n=14):
+    """Interpolates the map from the cube onto the unit ball that scales x by sqrt(1 - y^2/2 - z^2/2 + y^2 z^2/3)."""
+    s = 2.0 * greville_grid(n) - 1.0
+    x2, y2, z2 = np.moveaxis(s**2, -1, 0)
+    factors = [1 - y2 / 2 - z2 / 2 + y2 * z2 / 3, 1 - x2 / 2 - z2 / 2 + x2 * z2 / 3, 1 - x2 / 2 - y2 / 2 + x2 * y2 / 3]
+    knots = open_uniform_knots(n, 3)
+    inverse = np.linalg.inv(collocation(knots, 3, greville(knots, 3)).toarray())
+    values = s * np.sqrt(np.stack(factors, axis=-1))
+    return BSplineVolume.uniform(np.einsum("ai,bj,ck,ijkx->abcx", inverse, inverse, inverse, values))
+
+
+def rotations(n, seed=0):
+    q, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((n, 3, 3)))
+    return q * np.sign(np.linalg.det(q))[:, None, None]
+
+
+def test_singular_values_agree_with_lapack():
+    matrices = np.random.default_rng(0).standard_normal((4, 500, 3, 3))
+    values = signed_singular_values(matrices)
+    np.testing.assert_allclose(np.abs(values), np.linalg.svd(matrices, compute_uv=False), rtol=1e-9, atol=1e-14)
+    np.testing.assert_array_equal(np.sign(values[..., 2]), np.sign(np.linalg.det(matrices)))
+    assert np.all(values[..., 0] >= values[..., 1]) and np.all(values[..., 1] >= np.abs(values[..., 2]))
+
+
+def test_small_singular_values_are_not_lost():
+    graded = rotations(100) * np.array([1.0, 1e-7, 1e-14])  # columns: the eigenvalues of J^T J would lose the last two
+    values = signed_singular_values(graded)
+    np.testing.assert_allclose(values, np.broadcast_to([1.0, 1e-7, 1e-14], (100, 3)), rtol=1e-12)
+    both = rotations(100, 1) @ np.diag([1.0, 1e-3, 1e-10]) @ rotations(100, 2)
+    np.testing.assert_allclose(signed_singular_values(both)[:, 2], 1e-10, atol=1e-15)
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e200])
+def test_singular_values_do_not_depend_on_units(size):
+    matrix = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 1.0], [3.0, 0.0, 1.0]])
+    np.testing.assert_allclose(signed_singular_values(size * matrix), size * signed_singular_values(matrix), rtol=1e-14)
+    assert signed_singular_values(np.zeros((3, 3))).tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"), [(np.zeros((3, 2)), r"shape \(..., 3, 3\)"), (np.full((3, 3), np.nan), "finite")]
+)
+def test_bad_jacobians_are_refused(bad, message):
+    with pytest.raises(ValueError, match=message):
+        arap(bad)
+
+
+def test_arap_by_hand():
+    assert arap(np.diag([2.0, 1.0, 0.5])) == pytest.approx(1.25)  # 1 + 0 + 1/4
+    assert arap(np.diag([0.5, 3.0, -1.0])) == pytest.approx(0.0 + 4.0 + 2.25)  # the smallest, 0.5, takes the sign
+    np.testing.assert_allclose(arap(rotations(20)), 0.0, atol=1e-28)
+    np.testing.assert_allclose(arap(-rotations(20)), 4.0, rtol=1e-14)  # mirrored: (-1 - 1)^2
+
+
+def test_arap_agrees_with_the_polar_rotation():
+    rng = np.random.default_rng(3)
+    matrices = rng.standard_normal((200, 3, 3))
+    u, _, vt = np.linalg.svd(matrices)
+    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
+    closest = u @ vt  # rotation closest to J: ARAP is the squared distance to it
+    np.testing.assert_allclose(arap(matrices), np.sum((matrices - closest) ** 2, axis=(1, 2)), rtol=1e-9)
+
+
+def test_scaled_jacobian():
+    assert scaled_jacobian(np.diag([2.0, 5.0, 0.1])) == pytest.approx(1.0)
+    assert scaled_jacobian(np.diag([2.0, 5.0, -0.1])) == pytest.approx(-1.0)
+    assert scaled_jacobian(np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])) == pytest.approx(0.5**0.5)
+    assert scaled_jacobian(np.diag([1.0, 1.0, 0.0])) == 0.0
+
+
+def test_arap_grid_integrates_over_the_cube():
+    points = greville_grid(5)
+    points[..., 0] += 0.5 * np.linspace(0.0, 1.0, 5)[:, None, None] ** 2  # x = x(u): ARAP is (x' - 1)^2
+    (u, v, w), values, weights = arap_grid(BSplineVolume.uniform(points), n_gauss=4)
+    assert values.shape == weights.shape == (8, 8, 8) == (len(u), len(v), len(w))
+    assert weights.sum() == pytest.approx(1.0, rel=1e-14)
+    rate = BSplineVolume.uniform(points).grid_jacobian(u, [0.5], [0.5])[:, 0, 0, 0, 0]
+    np.testing.assert_allclose(values, np.broadcast_to((rate[:, None, None] - 1.0) ** 2, values.shape), atol=1e-13)
+    scaled = arap_grid(BSplineVolume.uniform(points), n_gauss=1, scale=3.0)[1]
+    direct = arap_grid(BSplineVolume.uniform(3.0 * points), n_gauss=1)[1]
+    np.testing.assert_allclose(scaled, direct, rtol=1e-12)
+
+
+def test_slabs_do_not_show(monkeypatch):
+    volume = ball(8)
+    whole = arap_grid(volume)[1]
+    monkeypatch.setattr("parameterize.quality._SLAB_POINTS", 500)
+    np.testing.assert_allclose(arap_grid(volume)[1], whole, rtol=1e-13)
+
+
+def test_distances_by_hand():
+    distances = Distances.of(np.array([3.0, 4.0, 0.0, 0.0]))
+    assert (distances.rms, distances.mean, distances.max) == (2.5, 1.75, 4.0)
+    assert distances.scaled(2.0) == Distances(5.0, 3.5, 8.0)
+    with pytest.raises(ValueError, match="empty"):
+        Distances.of(np.zeros(0))
+
+
+def test_sampled_boundary_is_the_cube():
+    sampled = SampledBoundary.of(affine(np.eye(3)), samples=4)
+    np.testing.assert_allclose(sampled.points, sampled.parameters, atol=1e-14)
+    assert len(sampled.points) == 96 and len(sampled.triangles) == 108
+    corners = sampled.points[sampled.triangles]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2.0
+    assert areas.sum() == pytest.approx(6.0)
+    with pytest.raises(ValueError, match="at least 2"):
+        SampledBoundary.of(affine(np.eye(3)), samples=1)
+
+
+def test_cube_inside_a_larger_cube():
+    gap = 0.125
+    larger = (1.0 + 2.0 * gap) * CORNERS - gap
+    volume = affine(np.eye(3))
+    sampled = SampledBoundary.of(volume, samples=5)
+    np.testing.assert_allclose(to_mesh(sampled.points, larger, CUBE_FACES), gap, rtol=1e-12)
+    np.testing.assert_allclose(to_boundary(larger, volume, sampled), gap * 3.0**0.5, rtol=1e-12)
+
+
+def test_inner_points_see_the_nearest_face():
+    points = np.random.default_rng(4).uniform(0.05, 0.95, (200, 3))
+    volume = affine(np.eye(3))
+    expected = np.minimum(points, 1.0 - points).min(axis=1)
+    np.testing.assert_allclose(to_boundary(points, volume, SampledBoundary.of(volume, 3)), expected, rtol=1e-10)
+
+
+def test_foot_points_are_on_the_spline_not_on_its_triangles():
+    volume = ball()
+    on_it = SampledBoundary.of(volume, 23).points
+    coarse = SampledBoundary.of(volume, 12)
+    assert to_mesh(on_it, coarse.points, coarse.triangles).max() > 1e-3
+    assert to_boundary(on_it, volume, coarse).max() < 1e-9
+    outside = 1.1 * on_it / np.linalg.norm(on_it, axis=1, keepdims=True)
+    np.testing.assert_allclose(to_boundary(outside, volume, coarse), 0.1, atol=2e-4)
+
+
+def icosphere(levels):
+    """A subdivided octahedron with its vertices on the unit sphere."""
+    vertices = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+    vertices, faces = igl.upsample(vertices, faces.astype(np.int64), levels)
+    return vertices / np.linalg.norm(vertices, axis=1, keepdims=True), faces
+
+
+def test_report_on_a_ball():
+    volume = ball()
+    vertices, faces = icosphere(4)
+    parameters = SampledBoundary.of(volume, 6).parameters
+    boundary = BoundaryMap(1.25 * volume(parameters), parameters, np.zeros((0, 3), dtype=int))
+    scale = (4.0 * np.pi / 3.0) ** (-1.0 / 3.0)
+    certificate = certify(volume)
+    report = measure(volume, vertices, faces, scale, boundary, certificate).as_dict()
+    assert json.loads(json.dumps(report)) == report
+    assert report["control_points"] == [14, 14, 14] and report["degrees"] == [3, 3, 3]
+    assert report["bijective"] == certificate.verdict and report["det_lower_bound"] == certificate.lower_bound
+    assert report["boundary_injective"] is None
+    assert report["points"]["arap"] == 33**3 and report["points"]["spline_to_mesh"] == 153_600
+    assert report["points"]["mesh_to_spline"] == len(vertices) and report["points"]["boundary"] == len(parameters)
+    assert report["boundary"]["as_given"]["max"] == pytest.approx(0.25, abs=1e-4)  # 0.25 |F|, |F| = 1
+    (_, values, weights), given = arap_grid(volume), report["arap"]["as_given"]
+    assert given == {"mean": pytest.approx(np.sum(weights * values)), "max": pytest.approx(values.max())}
+    assert report["arap"]["unit_volume"]["mean"] == pytest.approx(np.sum(arap_grid(volume, scale=scale)[1] * weights))
+    assert report["arap"]["unit_volume"]["mean"] < 0.4 < given["mean"]
+    for pair in (report["boundary"], *report["surface_distance"].values()):
+        for name in ("rms", "mean", "max"):
+            assert pair["unit_volume"][name] == pytest.approx(scale * pair["as_given"][name], rel=1e-12)
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    sagitta = 1.0 - np.sum(normals * corners[:, 0], axis=1)  # how deep the flat triangles lie below the sphere
+    assert report["surface_distance"]["spline_to_mesh"]["as_given"]["max"] == pytest.approx(sagitta.max(), rel=0.1)
+    assert report["surface_distance"]["mesh_to_spline"]["as_given"]["max"] < 2e-4
+
+
+def test_affine_report_by_hand():
+    volume = affine(np.diag([2.0, 1.0, 0.5]))
+    boundary = BoundaryMap(CORNERS * [2.0, 1.0, 0.5] + [0.0, 0.0, 0.25], CORNERS, CUBE_FACES)
+    report = measure(volume, CORNERS * [2.0, 1.0, 0.5], CUBE_FACES, 2.0, boundary, certify(volume))
+    section = report.as_dict()
+    assert section["bijective"] == "certified" and section["witness"] is None
+    assert section["arap"]["as_given"] == {"mean": pytest.approx(1.25), "max": pytest.approx(1.25)}
+    assert section["arap"]["unit_volume"]["mean"] == pytest.approx(9.0 + 1.0 + 0.0)  # sigma = 4, 2, 1
+    for scale, size in (("as_given", 0.25), ("unit_volume", 0.5)):
+        assert section["boundary"][scale] == {name: pytest.approx(size) for name in ("rms", "mean", "max")}
+    for pair in section["surface_distance"].values():
+        assert pair["as_given"]["max"] < 1e-12
+    text = str(report)
+    assert "certified" in text and "1.25, 1.25" in text and "10, 10" in text
+
+
+def test_folded_report_names_the_witness():
+    volume = affine(np.diag([-1.0, 1.0, 1.0]))
+    mirrored = CORNERS * [-1.0, 1.0, 1.0]
+    report = measure(volume, mirrored, CUBE_FACES, 1.0, BoundaryMap(mirrored, CORNERS, CUBE_FACES), certify(volume))
+    assert report.as_dict()["arap"]["as_given"]["mean"] == pytest.approx(4.0)
+    assert report.as_dict()["witness"] == list(report.certificate.witness)
+    assert "folded at (" in str(report)
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan")])
+def test_scale_must_be_positive(scale):
+    volume = affine(np.eye(3))
+    boundary = BoundaryMap(CORNERS, CORNERS, CUBE_FACES)
+    with pytest.raises(ValueError, match="scale must be positive"):
+        measure(volume, CORNERS, CUBE_FACES, scale, boundary, certify(volume))
