@@ -3,7 +3,7 @@
 On every span det J is a polynomial of degree 3 p - 1 a direction, and its Bernstein coefficients bound it. All of them
 positive: proved. A corner coefficient is a value of det J: negative there, folded. Else the span is cut into eight and
 looked at again. (Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys.
-233, 2013, section 3.) "Positive" and "negative" mean by more than a bound of all rounding errors, derived in determinant.py.
+233, 2013, section 3.) "Positive" and "negative" mean by more than a bound of all rounding errors (determinant.py).
 """
 
 from __future__ import annotations
