@@ -64,17 +64,16 @@ class SplineConfig:
     control_points: int = 30
     degree: int = 3
     fit_cell: float = 0.035  # lattice of inverse samples
-    fit_fairness: float = 1e-5
+    fit_fairness: float = 1e-7
     gauss: int = 2  # Gauss points a span and direction in the distortion term
     fairness: float = 1e-3
     vertex: float = 5e4  # squared distance along the surface normal
     tangential: float = 0.02  # share of `vertex` for the distance within the tangent plane
-    barrier: float = 30.0  # squared shortfall of the Bernstein coefficients of det J
-    barrier_floor: float = 0.045  # coefficients below this are penalised; mean det J is 1
-    steps: int = 100
-    slide_every: int = 4
+    min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
+    min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
+    penalties: tuple[float, ...] = (20.0, 20.0, 100.0, 500.0, 2500.0, 2500.0, 2500.0, 2500.0)  # one a round
+    steps: int = 25  # a round
     history: int = 12  # L-BFGS pairs
-    rounds: int = 4  # certificate, then optimisation again with the spans it could not prove
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,23 @@
-"""Corners of the cube on the surface, the 12 edge paths between them, and the six patches they bound (section 4.4.1)."""
+"""Corners of the cube on the surface, 12 edge paths between them, six patches bounded by these (section 4.4.1)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from .bspline import Array
-from .cutting import CutMesh, IntArray, cut_along_rays
+from .cutting import CutMesh, IntArray, cut_along_rays, mesh_edges
 
 CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)  # (8, 3), (0,0,0) ... (1,1,1)
 EDGES = [(i, j) for i in range(8) for j in range(i + 1, 8) if np.abs(CORNERS[i] - CORNERS[j]).sum() == 1.0]
 _SNAP = 0.1  # crossings nearer than this share of a mesh edge to a vertex use the vertex: no slivers along the paths
 _STRAY = 20.0  # how much dearer a path gets at one cell's distance from its cube edge
 _CELL = 0.05
+_TRIES = 24
 
 
 class PathError(RuntimeError):
@@ -66,14 +66,30 @@ def cut_surface(mapped: Array, faces: IntArray, corners: IntArray) -> CubeSurfac
 
 
 def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
-    """Disjoint shortest paths along mesh edges, made dear away from the cube edge they stand for."""
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    """Disjoint paths along mesh edges, one a cube edge; where one finds no way, it is traced first in the next try."""
+    order = list(range(len(EDGES)))
+    for _ in range(_TRIES):
+        paths, blocked = _trace_in_order(position, faces, corners, order)
+        if blocked is None:
+            return [paths[k] for k in range(len(EDGES))]
+        order.remove(blocked)
+        order.insert(0, blocked)
+    i, j = EDGES[order[0]]
+    raise PathError(f"no path left on the surface between cube corners {CORNERS[i]} and {CORNERS[j]}")
+
+
+def _trace_in_order(
+    position: Array, faces: IntArray, corners: IntArray, order: list[int]
+) -> tuple[dict[int, IntArray], int | None]:
+    """Shortest paths, made dear away from the cube edge they stand for; and the first edge that found no way."""
+    edges = mesh_edges(faces)
     length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
     radial = 0.5 + (position - 0.5) / (2.0 * np.abs(position - 0.5).max(axis=1, keepdims=True))
     free = np.ones(len(position), dtype=bool)
     free[corners] = False
-    paths = []
-    for i, j in EDGES:
+    paths: dict[int, IntArray] = {}
+    for number in order:
+        i, j = EDGES[number]
         usable = free.copy()
         usable[corners[[i, j]]] = True
         keep = usable[edges].all(axis=1)
@@ -85,11 +101,11 @@ def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[In
         path = [int(corners[j])]
         while path[-1] != corners[i]:
             if previous[path[-1]] < 0:
-                raise PathError(f"no path left on the surface between cube corners {CORNERS[i]} and {CORNERS[j]}")
+                return paths, number
             path.append(int(previous[path[-1]]))
         free[path] = False
-        paths.append(np.array(path[::-1]))
-    return paths
+        paths[number] = np.array(path[::-1])
+    return paths, None
 
 
 def _distance_to_segment(points: Array, start: Array, end: Array) -> Array:
@@ -99,7 +115,9 @@ def _distance_to_segment(points: Array, start: Array, end: Array) -> Array:
 
 def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntArray:
     """Flood-fill the triangles between the paths; label each of the six patches by its four corners."""
-    on_path = {tuple(sorted(pair)) for path in paths for pair in zip(path[:-1].tolist(), path[1:].tolist(), strict=True)}
+    on_path = {
+        tuple(sorted(pair)) for path in paths for pair in zip(path[:-1].tolist(), path[1:].tolist(), strict=True)
+    }
     sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     order = np.lexsort(sides.T)
     pairs, owners = sides[order][::2], order.reshape(-1, 2) // 3  # closed mesh: every edge has two triangles
@@ -123,12 +141,14 @@ def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntAr
 
 
 def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array, IntArray]:
-    """Path vertices (k,), their targets on the cube's edges by mapped arc length (k, 3), and pairs (s, 2) of neighbours."""
-    vertices, targets, following = [], [], []
+    """Path vertices (k,), targets on the cube's edges by mapped arc length (k, 3), pairs of neighbours (s, 2)."""
+    vertices: list[IntArray] = []
+    targets: list[Array] = []
+    following: list[IntArray] = []
     for (i, j), path in zip(EDGES, paths, strict=True):
         steps = np.linalg.norm(np.diff(mapped[path], axis=0), axis=1)
         share = np.concatenate([[0.0], np.cumsum(steps)]) / max(steps.sum(), 1e-12)
-        start = sum(map(len, vertices))
+        start = sum(len(path) for path in vertices)
         vertices.append(path)
         targets.append((1.0 - share)[:, None] * CORNERS[i] + share[:, None] * CORNERS[j])
         following.append(start + np.stack([np.arange(len(path) - 1), np.arange(1, len(path))], axis=1))

@@ -62,13 +62,31 @@ def cut_along_rays(mapped: Array, faces: IntArray, snap: float) -> CutMesh:
     return CutMesh(faces, parents, share)
 
 
+def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tuple[Array, IntArray]:
+    """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface the same."""
+    while True:
+        edges = mesh_edges(faces)
+        ends = vertices[edges]
+        long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > longest
+        if not long.any():
+            return vertices, faces
+        faces = split_edges(faces, edges[long], len(vertices))
+        vertices = np.concatenate([vertices, ends[long].mean(axis=1)])
+
+
+def mesh_edges(faces: IntArray) -> IntArray:
+    """Every edge of the triangles once, smaller vertex first: (k, 2)."""
+    return np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+
+
 def _crossings(
     height: Array, position: Array, faces: IntArray, axes: tuple[int, int, int], snap: float
 ) -> tuple[IntArray, Array]:
     """Mesh edges (k, 2) that cross the plane within the half planes of cube edges, and where (k,)."""
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges = mesh_edges(faces)
     start, end = height[edges[:, 0]], height[edges[:, 1]]
-    edges, start, end = (part[start * end < 0.0] for part in (edges, start, end))
+    crossing = start * end < 0.0
+    edges, start, end = edges[crossing], start[crossing], end[crossing]
     where = start / (start - end)
     point = (1.0 - where)[:, None] * position[edges[:, 0]] + where[:, None] * position[edges[:, 1]]
     a, _, c = axes
@@ -79,7 +97,7 @@ def _crossings(
 def split_edges(faces: IntArray, edges: IntArray, first_new: int) -> IntArray:
     """Faces after putting vertex `first_new + i` on edge i (given once, smaller index first); (m, 3) -> (m', 3).
 
-    At most two edges of a triangle are split: one gives two triangles, two give three.
+    One split edge of a triangle gives two triangles, two give three, three give four.
     """
     lookup = {(int(i), int(j)): first_new + k for k, (i, j) in enumerate(edges)}
     touched = np.zeros(int(faces.max()) + 1, dtype=bool)
@@ -98,6 +116,10 @@ def _split_triangle(face: list[int], lookup: dict[tuple[int, int], int]) -> list
     count = sum(m is not None for m in middle)
     if count == 0:
         return [(face[0], face[1], face[2])]
+    if count == 3:
+        (a, b, c), (ab, bc, ca) = face, middle
+        assert ab is not None and bc is not None and ca is not None
+        return [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     turn = next(k for k in range(3) if middle[k] is not None and (count == 1 or middle[k - 1] is not None))
     a, b, c = face[turn], face[turn - 2], face[turn - 1]
     first, last = middle[turn], middle[turn - 1]  # on a-b and, for two cuts, on c-a

@@ -70,16 +70,24 @@ def to_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
 
 
 def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> Array:
-    """Distance of each point (m, 3) to the boundary of the spline: (m,).
+    """Distance of each point (m, 3) to the boundary of the spline: (m,)."""
+    return foot_points(points, volume, boundary)[2]
+
+
+def foot_points(
+    points: Array, volume: BSplineVolume, boundary: SampledBoundary
+) -> tuple[Array, NDArray[np.int64], Array]:
+    """Closest points of the spline's boundary to points (m, 3): parameters (m, 3), cube faces (m,), distances (m,).
 
     The nearest point of the sampled triangles gives a cube face and parameters on it; Gauss-Newton steps in that face
-    then lower the distance to the spline itself. What is returned is the distance to a point of the spline's
-    boundary, so never less than the true one.
+    then lower the distance to the spline itself. The distances are to points of the spline's boundary, so never less
+    than the true ones.
     """
     _, triangle, weights = _closest(points, boundary.points, boundary.triangles)
     corners = boundary.triangles[triangle]  # (m, 3)
     where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
-    axis = 3 * triangle // len(boundary.triangles)  # the direction that is constant on the face
+    cube_face = 6 * triangle // len(boundary.triangles)
+    axis = cube_face // 2  # the direction that is constant on the face
     where[np.arange(len(where)), axis] = boundary.parameters[corners[:, 0]][np.arange(len(where)), axis]
     best: Array = np.linalg.norm(volume(where) - points, axis=1)
     active = np.arange(len(points))
@@ -93,7 +101,7 @@ def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary)
         active = active[gain > _CONVERGED * best[active]]
         if not active.size:
             break
-    return best
+    return where, cube_face, best
 
 
 def _foot_step(volume: BSplineVolume, where: Array, points: Array, axis: NDArray[np.int64]) -> Array:

@@ -23,9 +23,9 @@ def _minus(step: tuple[int, int, int]) -> tuple[int, int, int]:
 
 
 def stencil_jacobian(mapped: Tensor, cell: float) -> Tensor:
-    """Central differences of G at the stencil centres (r, 19, 3) -> (r, 3, 3), last index the space direction."""
-    columns = [_neighbour(mapped, e) - _neighbour(mapped, _minus(e)) for e in _UNITS]
-    return torch.stack(columns, dim=-1) / (2.0 * cell)
+    """Central differences of G at the stencil centres (r, 19, 3) -> (3, 3, r), second index the space direction."""
+    columns = [(_neighbour(mapped, e) - _neighbour(mapped, _minus(e))).T for e in _UNITS]
+    return torch.stack(columns, dim=1) / (2.0 * cell)
 
 
 def bijectivity(det: Tensor, alpha: float) -> Tensor:
@@ -40,8 +40,8 @@ def distortion(jacobian: Tensor, det: Tensor, det_floor: float) -> Tensor:
     held there: the bijectivity term rules over such points, and 1 / det must not blow up.
     """
     safe = det.clamp_min(det_floor)
-    inverse = cofactor(jacobian).transpose(-1, -2) / safe[:, None, None]
-    return (safe * (inverse - closest_rotation(inverse.detach())).square().sum(dim=(-2, -1))).mean()
+    inverse = cofactor(jacobian).transpose(0, 1) / safe
+    return (safe * (inverse - closest_rotation(inverse)).square().sum(dim=(0, 1))).mean()
 
 
 def fairness(mapped: Tensor, cell: float) -> Tensor:

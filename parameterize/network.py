@@ -16,6 +16,7 @@ class ResidualModule(nn.Module):
         self.linear = nn.Linear(width, width)
 
     def forward(self, x: Tensor) -> Tensor:
+        """(m, width) -> (m, width)."""
         return x + torch.relu(self.linear(x))
 
 
@@ -24,6 +25,8 @@ class InverseMap(nn.Module):
 
     The last layer starts at zero, so G *is* the identity before the first step; the paper trains towards it.
     """
+
+    multiples: Tensor
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()

@@ -265,4 +265,4 @@ def _make_orthogonal(a: Array, b: Array) -> float:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _dot(a: Array, b: Array) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]  # type: ignore[no-any-return]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -13,12 +13,15 @@ from torch import Tensor
 from .bspline import Array
 
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
-OFFSETS = np.array(
-    sorted(
-        (o for o in np.ndindex(3, 3, 3) if np.count_nonzero(np.array(o) != 1) <= 2),
-        key=lambda o: np.count_nonzero(np.array(o) != 1),
+OFFSETS = (
+    np.array(
+        sorted(
+            (o for o in np.ndindex(3, 3, 3) if np.count_nonzero(np.array(o) != 1) <= 2),
+            key=lambda o: np.count_nonzero(np.array(o) != 1),
+        )
     )
-) - 1
+    - 1
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,11 @@
-"""The four training stages as one loop: smooth cuboids S(2) and S(1), cube, fixed corners, fixed edges (section 4.3.1)."""
+"""The training stages as one loop: smooth cuboids S(2), S(1), cube, fixed corners, fixed edges (section 4.3.1)."""
 
 from __future__ import annotations
 
-import logging
 import math
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,6 +13,7 @@ from torch import Tensor
 
 from . import losses
 from .bspline import Array
+from .checkpoint import Checkpoints
 from .config import Config, StageConfig
 from .corners import CORNERS, CubeSurface, choose_corners, cut_surface, edge_targets
 from .cutting import IntArray
@@ -22,7 +22,8 @@ from .progress import Progress, ProgressCallback, ignore
 from .sample import Stencils, TriangleSampler, stencils
 from .targets import nearest, nearest_on_cube_face
 
-_log = logging.getLogger(__name__)
+State = dict[str, Tensor]
+_CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
 TERMS = ("bij", "arap", "fair", "dist", "norm", "star", "cor", "edge")
 
 
@@ -47,6 +48,7 @@ class History:
     rows: list[tuple[str, int, float, int, dict[str, float]]] = field(default_factory=list)
 
     def add(self, stage: str, step: int, loss: float, folded: int, terms: dict[str, float]) -> None:
+        """Append a row."""
         self.rows.append((stage, step, loss, folded, terms))
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -71,11 +73,22 @@ class Trained:
     surface: CubeSurface
 
 
+@dataclass
+class _Run:
+    """Where the training stands within a stage; what a checkpoint holds beside the network and the optimiser."""
+
+    number: int
+    step: int
+    start: State  # the network at the start of the stage: corners and cuts were taken from it
+    best: State
+    best_key: tuple[float, float] = (math.inf, math.inf)  # folded samples, then loss
+
+
 class Trainer:
     """Trains G on one surface.
 
     vertices (n, 3) at volume 1, faces (m, 3); given_corners (8,) vertex numbers or None.
-    The random numbers of a step depend on the seed and the step alone.
+    The random numbers of a step depend on the seed, the stage and the step alone.
     """
 
     def __init__(
@@ -90,38 +103,52 @@ class Trainer:
         given_corners: IntArray | None = None,
         history: History | None = None,
         progress: ProgressCallback = ignore,
+        checkpoints: Checkpoints | None = None,
     ) -> None:
         torch.manual_seed(seed)
         self.config, self.seed, self.device, self.dtype = config, seed, device, dtype
         self.vertices, self.faces = vertices, faces
-        self.given_corners = given_corners
+        self.corners = given_corners
         self.network = InverseMap(config.network).to(device=device, dtype=dtype)
         self.stencils: Stencils = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
         self.history = history if history is not None else History()
         self.progress = progress
+        self.checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
         self.generator = torch.Generator()
+        self._corner_targets = self._tensor(CORNERS)
 
     def run(self) -> Trained:
-        """All stages. Raises PathError where the cube's edges cannot be traced after the third."""
-        corners, surface = self.given_corners, None
-        boundary = self._boundary(self.vertices, self.faces, corners=corners)
-        for number, stage in enumerate(self.config.stages):
-            if stage.weights.cor > 0.0 and corners is None:
-                corners = choose_corners(self.map(self.vertices))
-                boundary = self._boundary(self.vertices, self.faces, corners=corners)
-            if stage.weights.edge > 0.0:
-                assert corners is not None
-                surface = cut_surface(self.map(self.vertices), self.faces, corners)
-                boundary = self._cut_boundary(surface)
-            self._train(number, stage, boundary)
+        """All stages, or those that a checkpoint leaves. Raises PathError where the cube's edges cannot be traced."""
+        saved = self.checkpoints.load(_CHECKPOINT)
+        first = 0 if saved is None else int(saved[1]["number"])
+        surface = None
+        for number in range(first, len(self.config.stages)):
+            stage = self.config.stages[number]
+            run = _Run(number, 0, self._state(), self._state())
+            if saved is not None and number == first:
+                run = self._load_run(*saved)
+            boundary, surface = self._prepare(stage)
+            optimizer = torch.optim.Adam(self.network.parameters(), lr=self.config.train.learning_rate)
+            if saved is not None and number == first:
+                self._load_progress(saved[0], optimizer)
+            self._train(run, boundary, optimizer)
         if surface is None:
             raise ValueError("the last stage must fix the cube's edges (weight edge > 0)")
         return Trained(self.network, surface)
 
-    @torch.no_grad()
-    def map(self, points: Array, block: int = 65_536) -> Array:
+    def map(self, points: Array) -> Array:
         """G at points (m, 3), as float64."""
-        return map_points(self.network, points, self.device, self.dtype, block)
+        return map_points(self.network, points, self.device, self.dtype)
+
+    def _prepare(self, stage: StageConfig) -> tuple[BoundarySamples, CubeSurface | None]:
+        """Choose corners and cut the surface, where the stage asks for it, by the network as it is."""
+        if stage.weights.cor > 0.0 and self.corners is None:
+            self.corners = choose_corners(self.map(self.vertices))
+        if stage.weights.edge == 0.0:
+            return self._boundary(self.vertices, self.faces, self.corners), None
+        assert self.corners is not None
+        surface = cut_surface(self.map(self.vertices), self.faces, self.corners)
+        return self._cut_boundary(surface), surface
 
     def _boundary(self, vertices: Array, faces: IntArray, corners: IntArray | None) -> BoundarySamples:
         return BoundarySamples(
@@ -149,39 +176,80 @@ class Trainer:
     def _tensor(self, values: Array) -> Tensor:
         return torch.as_tensor(values, dtype=self.dtype, device=self.device)
 
-    def _train(self, number: int, stage: StageConfig, boundary: BoundarySamples) -> None:
+    def _train(self, run: _Run, boundary: BoundarySamples, optimizer: torch.optim.Adam) -> None:
         """One stage; ends with the network at its best state (fewest folded samples, then lowest loss)."""
-        optimizer = torch.optim.Adam(self.network.parameters(), lr=self.config.train.learning_rate)
-        best_key, best_state = (math.inf, math.inf), self._state()
-        started = time.perf_counter()
-        for step, rate in enumerate(self._learning_rates(stage.steps)):
-            self.generator.manual_seed(1_000_003 * self.seed + 100_003 * number + step)
-            for group in optimizer.param_groups:
-                group["lr"] = rate
-            optimizer.zero_grad(set_to_none=True)
-            loss, folded, terms = self._loss(stage, boundary)
-            loss.backward()  # type: ignore[no-untyped-call]
-            value = float(loss.detach())
-            if not math.isfinite(value):
-                raise FloatingPointError(f"stage {stage.name}, step {step}: the loss is not finite")
-            if (folded, value) < best_key:
-                best_key, best_state = (folded, value), self._state()
-            optimizer.step()
-            self.history.add(stage.name, step, value, folded, terms)
-            pace = (time.perf_counter() - started) / (step + 1)
-            later = sum(s.steps for s in self.config.stages[number + 1 :])
-            left = pace * (stage.steps - step - 1 + later)
-            self.progress(Progress(stage.name, step + 1, stage.steps, value, folded, left))
-        self.network.load_state_dict(best_state)
+        stage = self.config.stages[run.number]
+        later = sum(s.steps for s in self.config.stages[run.number + 1 :])
+        started, begun = time.perf_counter(), run.step
+        try:
+            while run.step < stage.steps:
+                self._step(run, stage, boundary, optimizer)
+                pace = (time.perf_counter() - started) / (run.step - begun)
+                _, _, loss, folded, _ = self.history.rows[-1]
+                left = pace * (stage.steps - run.step + later)
+                self.progress(Progress(stage.name, run.step, stage.steps, loss, folded, left))
+                if run.step % _CHECKPOINT_STEPS == 0 or run.step == stage.steps:
+                    self._save(run, optimizer)
+        except KeyboardInterrupt:
+            self._save(run, optimizer)
+            raise
+        self.network.load_state_dict(run.best)
 
-    def _state(self) -> dict[str, Tensor]:
+    def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: torch.optim.Adam) -> None:
+        """One Adam step; nothing of the state changes before the loss is known."""
+        self.generator.manual_seed(1_000_003 * self.seed + 100_003 * run.number + run.step)
+        optimizer.zero_grad(set_to_none=True)
+        loss, folded, terms = self._loss(stage, boundary)
+        loss.backward()  # type: ignore[no-untyped-call]
+        value = float(loss.detach())
+        if not math.isfinite(value):
+            raise FloatingPointError(f"stage {stage.name}, step {run.step}: the loss is not finite")
+        if (folded, value) < run.best_key:
+            run.best_key, run.best = (folded, value), self._state()
+        for group in optimizer.param_groups:
+            group["lr"] = self._learning_rate(run.step, stage.steps)
+        optimizer.step()
+        self.history.add(stage.name, run.step, value, folded, terms)
+        run.step += 1
+
+    def _state(self) -> State:
         return {name: value.clone() for name, value in self.network.state_dict().items()}
 
-    def _learning_rates(self, steps: int) -> Iterator[float]:
+    def _save(self, run: _Run, optimizer: torch.optim.Adam) -> None:
+        parts = {"now": self.network.state_dict(), "start": run.start, "best": run.best}
+        tensors = {f"{part}.{name}": value for part, state in parts.items() for name, value in state.items()}
+        for index, moments in optimizer.state_dict()["state"].items():
+            tensors |= {f"adam.{index}.{name}": value for name, value in moments.items()}
+        state = {
+            "number": run.number,
+            "step": run.step,
+            "best_key": run.best_key,
+            "corners": None if self.corners is None else self.corners.tolist(),
+            "history": self.history.rows,
+        }
+        self.checkpoints.save(_CHECKPOINT, tensors, state)
+
+    def _load_run(self, tensors: State, state: dict[str, Any]) -> _Run:
+        """Bring back everything but network and optimiser as they were; the network is left at the stage's start."""
+        self.corners = None if state["corners"] is None else np.array(state["corners"])
+        self.history.rows[:] = [tuple(row) for row in state["history"]]
+        start, best = _part(tensors, "start"), _part(tensors, "best")
+        self.network.load_state_dict(start)
+        folded, loss = state["best_key"]
+        return _Run(state["number"], state["step"], start, best, (folded, loss))
+
+    def _load_progress(self, tensors: State, optimizer: torch.optim.Adam) -> None:
+        self.network.load_state_dict(_part(tensors, "now"))
+        moments: dict[int, State] = {}
+        for key, value in _part(tensors, "adam").items():
+            index, name = key.split(".")
+            moments.setdefault(int(index), {})[name] = value
+        optimizer.load_state_dict({"state": moments, "param_groups": optimizer.state_dict()["param_groups"]})
+
+    def _learning_rate(self, step: int, steps: int) -> float:
         """Cosine decay from the first to the final learning rate."""
         first, last = self.config.train.learning_rate, self.config.train.final_learning_rate
-        for step in range(steps):
-            yield last + 0.5 * (first - last) * (1.0 + math.cos(math.pi * step / steps))
+        return last + 0.5 * (first - last) * (1.0 + math.cos(math.pi * step / steps))
 
     def _loss(self, stage: StageConfig, boundary: BoundarySamples) -> tuple[Tensor, int, dict[str, float]]:
         """Weighted sum (eq. 2 and 3), folded stencils, and the unweighted terms in use."""
@@ -208,7 +276,7 @@ class Trainer:
         }
         weight = {name: getattr(weights, name) for name in TERMS}
         if boundary.corners is not None:
-            terms["cor"] = losses.distance(mapped[2], self._tensor(CORNERS))
+            terms["cor"] = losses.distance(mapped[2], self._corner_targets)
             weight["cor"] = weights.cor or stage.given_corner_weight
         if boundary.path is not None and boundary.path_target is not None and boundary.path_following is not None:
             terms["edge"] = losses.edge_path(mapped[3], boundary.path_target, boundary.path_following)
@@ -223,10 +291,15 @@ class Trainer:
         return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
 
 
+def _part(tensors: State, prefix: str) -> State:
+    """The entries named `prefix`.something, under that something."""
+    return {key.removeprefix(f"{prefix}."): value for key, value in tensors.items() if key.startswith(f"{prefix}.")}
+
+
 @torch.no_grad()
 def map_points(
     network: InverseMap, points: Array, device: torch.device, dtype: torch.dtype, block: int = 65_536
 ) -> Array:
     """G at points (m, 3) in blocks, as float64."""
-    blocks = [network(torch.as_tensor(p, dtype=dtype, device=device)) for p in np.array_split(points, -(-len(points) // block))]
-    return np.asarray(torch.cat(blocks).double().cpu())
+    pieces = torch.as_tensor(points, dtype=dtype, device=device)
+    return np.asarray(torch.cat([network(piece) for piece in torch.split(pieces, block)]).double().cpu())

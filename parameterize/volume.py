@@ -69,7 +69,7 @@ class BSplineVolume:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Number of control points per direction."""
-        return self.control_points.shape[:3]  # type: ignore[return-value]
+        return self.control_points.shape[:3]
 
     def __call__(self, points: ArrayLike) -> Array:
         """F at points (m, 3) of the unit cube: (m, 3)."""

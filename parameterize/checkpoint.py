@@ -1,0 +1,69 @@
+"""Checkpoints of a run: tensors and a JSON header in one safetensors file, replaced as a whole."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+FORMAT = 1
+
+
+class CheckpointError(ValueError):
+    """A checkpoint that does not belong to this run, or cannot be read."""
+
+
+class Checkpoints:
+    """The checkpoint files of one run in one folder.
+
+    identity: what must be equal for a checkpoint to be continued (surface, options, seed, device); plain JSON values.
+    folder None keeps nothing; `resume` False ignores what is there.
+    """
+
+    def __init__(self, folder: Path | None, identity: Mapping[str, Any], *, resume: bool) -> None:
+        self._folder, self._resume = folder, resume
+        self._identity = json.dumps({"format": FORMAT, **identity}, sort_keys=True)
+        if folder is not None and not resume:
+            for path in folder.glob("*.safetensors"):
+                path.unlink()
+
+    def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:
+        """Write checkpoint `name`, replacing an older one."""
+        if self._folder is None:
+            return
+        self._folder.mkdir(parents=True, exist_ok=True)
+        temporary = self._folder / f".{name}.{os.getpid()}.part"
+        header = {"identity": self._identity, "state": json.dumps(state)}
+        save_file({k: v.detach().cpu().contiguous() for k, v in tensors.items()}, temporary, metadata=header)
+        temporary.replace(self._folder / f"{name}.safetensors")
+
+    def load(self, name: str) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
+        """Tensors and state of checkpoint `name`; None where there is none or the run starts afresh.
+
+        Raises CheckpointError naming what differs, or for an unreadable file.
+        """
+        if self._folder is None or not self._resume:
+            return None
+        path = self._folder / f"{name}.safetensors"
+        if not path.exists():
+            return None
+        try:
+            with safe_open(path, framework="pt") as file:
+                header = file.metadata() or {}
+                tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - not a mapping
+            found, state = json.loads(header["identity"]), json.loads(header["state"])
+        except (SafetensorError, OSError, KeyError, ValueError) as error:
+            raise CheckpointError(f"{path}: not a readable checkpoint ({error}); run without --resume") from None
+        wanted = json.loads(self._identity)
+        differing = sorted(key for key in wanted.keys() | found.keys() if wanted.get(key) != found.get(key))
+        if differing:
+            raise CheckpointError(
+                f"{path}: belongs to another run ({', '.join(differing)} differ); run without --resume"
+            )
+        return tensors, state

@@ -1,0 +1,116 @@
+"""The final boundary map: every surface point's place on the cube, one-to-one, cut along the cube's edges."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from .boundary import BoundaryMap
+from .bspline import Array
+from .cutting import CutMesh, IntArray, cut_along_rays
+from .volume import BSplineVolume
+
+_NEAR_EDGE = 1e-5  # parameters closer than this to an edge of the cube are put on it: no slivers from the cut
+_FLAT = 1e-13  # orientation of a triangle that counts as flipped
+_SWEEPS = 600
+_PATIENCE = 60
+_SETTLE_STEPS = 8
+_UNDO_ROUNDS = 10
+_MARGIN = 1e-2  # share of a mesh edge that a cut keeps from its ends
+
+
+def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parameters: Array) -> BoundaryMap:
+    """Cut the surface (vertices (n, 3), user's units) where its parameters (n, 3) pass an edge of the cube.
+
+    Parameters come from closest points of the volume's boundary, which may turn a few triangles over where the spline
+    smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
+    """
+    placed = _snap(_untangle(_snap(parameters), faces))
+    cut = cut_along_rays(placed, faces, 0.0)
+    spread = _snap(cut.carry(placed))
+    spread[: len(placed)] = placed
+    plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
+    closer = _settle_cuts(volume, vertices, cut, spread)
+    return plain if len(closer.flipped()) > len(plain.flipped()) else closer
+
+
+def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameters: Array) -> BoundaryMap:
+    """Move each cut vertex along its mesh edge and its parameter along the cube's edge until F(p) is close to it.
+
+    Gauss-Newton in those two unknowns; corners of the cube keep their parameter. Steps that turn a triangle are undone.
+    """
+    n = len(vertices)
+    new = np.arange(n, len(parameters))
+    inner = (parameters[new] > 0.0) & (
+        parameters[new] < 1.0
+    )  # (k, 3), at most one True a row: the cube edge's direction
+    best = BoundaryMap(cut.carry(vertices), parameters, cut.faces)
+    for _ in range(_SETTLE_STEPS):
+        where, carried = best.parameters[new], best.vertices
+        along_mesh = carried[cut.parents[new, 1]] - carried[cut.parents[new, 0]]
+        along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
+        shift, slide = _fit_two(along_mesh, along_cube, volume(where) - carried[new])
+        share, moved = cut.share.copy(), best.parameters.copy()
+        share[new] = np.clip(share[new] + shift, _MARGIN, 1.0 - _MARGIN)
+        moved[new] = np.where(inner, np.clip(where + slide[:, None], _MARGIN**2, 1.0 - _MARGIN**2), where)
+        trial = replace(cut, share=share)
+        for _ in range(_UNDO_ROUNDS):
+            candidate = BoundaryMap(trial.carry(vertices), moved, cut.faces)
+            turned = np.setdiff1d(cut.faces[candidate.flipped()].ravel(), np.arange(n))
+            if not turned.size:
+                cut, best = trial, candidate
+                break
+            trial.share[turned] = cut.share[turned]
+            moved[turned] = best.parameters[turned]
+    return best
+
+
+def _fit_two(first: Array, second: Array, right: Array) -> tuple[Array, Array]:
+    """Coefficients a, b (k,) that minimise |a first - b second - right|, damped against parallel directions."""
+    aa, bb, ab = (first * first).sum(1), (second * second).sum(1), -(first * second).sum(1)
+    ra, rb = (first * right).sum(1), -(second * right).sum(1)
+    damping = 1e-3 * (aa + bb) + 1e-300
+    aa, bb = aa + damping, bb + damping
+    determinant = aa * bb - ab * ab
+    return (bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant
+
+
+def _snap(parameters: Array) -> Array:
+    """Radially onto the cube's boundary, and onto an edge or corner where within _NEAR_EDGE of it."""
+    centred = parameters - 0.5
+    scaled = centred / (2.0 * np.abs(centred).max(axis=1, keepdims=True))
+    at_side = np.abs(scaled) >= 0.5 - _NEAR_EDGE
+    return np.where(at_side, 0.5 + 0.5 * np.sign(scaled), 0.5 + scaled)
+
+
+def _orientation(centred: Array, faces: IntArray) -> Array:
+    """Six times the signed volume of each triangle of places (n, 3) with the origin (m,)."""
+    a, b, c = np.moveaxis(centred[faces], 1, 0)
+    return np.asarray(np.einsum("mi,mi->m", a, np.cross(b, c)))
+
+
+def _untangle(parameters: Array, faces: IntArray) -> Array:
+    """Relax the vertices around flipped triangles until none is left, moving as few and as little as possible.
+
+    A relaxed vertex goes half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
+    are flipped at the time move; where they stay so, rings of neighbours join, one after every _PATIENCE sweeps.
+    """
+    n = len(parameters)
+    i, j = faces.ravel(), faces[:, [1, 2, 0]].ravel()  # closed surface: both directions appear
+    adjacency = csr_array((np.ones(len(i)), (i, j)), shape=(n, n))
+    direction = parameters - 0.5
+    direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    for sweep in range(_SWEEPS):
+        bad = _orientation(direction, faces) <= _FLAT
+        if not bad.any():
+            break
+        free = np.zeros(n, dtype=bool)
+        free[faces[bad].ravel()] = True
+        for _ in range(sweep // _PATIENCE):
+            free |= (adjacency @ free.astype(float)) > 0.0
+        mean = adjacency[free] @ direction
+        moved = direction[free] + mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        direction[free] = moved / np.linalg.norm(moved, axis=1, keepdims=True)
+    return _snap(0.5 + direction)

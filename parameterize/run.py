@@ -1,0 +1,226 @@
+"""parameterize: a closed surface to a trivariate B-spline volume, certified where that succeeds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from .boundary import BoundaryMap
+from .bspline import Array, open_uniform_knots
+from .certificate import Certificate
+from .checkpoint import Checkpoints
+from .config import Config, SplineConfig, preset
+from .correspondence import boundary_map
+from .cutting import IntArray, subdivide_long_edges
+from .fit import fit_pairs
+from .mesh import Surface
+from .optimize import Optimized, optimize
+from .progress import ProgressCallback, ignore
+from .quality import QualityReport, measure
+from .sample import interior_points
+from .stages import History, Trained, Trainer, map_points
+from .surface_fit import SurfaceFit, vertex_quadrics, vertex_weights
+from .targets import nearest_on_cube_face
+from .volume import BSplineVolume
+
+_BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit
+_LAST_SLIDES = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Parameterization:
+    """What `parameterize` returns; lengths in the user's units.
+
+    volume: F. boundary: every surface vertex with its parameter. certificate, quality: what is proved and measured.
+    history: columns of equal length, one row a step. seconds: wall seconds of train, fit, optimize and certify.
+    """
+
+    volume: BSplineVolume
+    boundary: BoundaryMap
+    certificate: Certificate
+    quality: QualityReport
+    history: dict[str, NDArray[Any]]
+    seconds: dict[str, float]
+    device: str
+    seed: int
+    config: Config
+
+
+def parameterize(
+    surface: Surface,
+    config: Config | None = None,
+    *,
+    seed: int = 0,
+    device: str = "auto",
+    dtype: torch.dtype = torch.float32,
+    corners: ArrayLike | None = None,
+    progress: ProgressCallback | None = None,
+    checkpoint_dir: str | Path | None = None,
+    resume: bool = False,
+) -> Parameterization:
+    """Map the unit cube onto the solid inside a closed surface (paper, section 4.3).
+
+    config: options, `preset("fast")` by default. device: "auto", "cpu" or "cuda"; dtype: of the network.
+    corners: (8, 3) points in the surface's units or 8 vertex numbers, in the order (0,0,0), (0,0,1), (0,1,0), ...
+    checkpoint_dir: where checkpoints go; with `resume` the run goes on from the last one.
+
+    Raises ValueError for bad corners or a device that is not there, CheckpointError for a checkpoint of another run,
+    PathError where the training stays too far from a cube for its edges to be found.
+    """
+    config = config or preset("fast")
+    place = choose_device(device)
+    given = None if corners is None else corner_vertices(surface, corners)
+    identity = {
+        "surface": surface.sha256,
+        "config": asdict(config),
+        "seed": seed,
+        "device": place.type,
+        "dtype": str(dtype),
+        "corners": None if given is None else given.tolist(),
+    }
+    checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), _plain(identity), resume=resume)
+    progress = progress or ignore
+    history, seconds = History(), dict[str, float]()
+    spline = config.spline
+    longest = 1.0 / (spline.control_points - spline.degree)  # a span's length: no triangle larger than that
+    vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
+    options: dict[str, Any] = {"history": history, "progress": progress, "checkpoints": checkpoints}
+    with _timed(seconds, "train"):
+        trainer = Trainer(vertices, faces, config, seed=seed, device=place, dtype=dtype, given_corners=given, **options)
+        trained = trainer.run()
+    with _timed(seconds, "fit"):
+        knots = (open_uniform_knots(spline.control_points, spline.degree),) * 3
+        fit = _surface_fit(trained, vertices, faces, spline, knots, place, dtype)
+        control = _first_spline(trained, fit, vertices, faces, spline, place, dtype)
+    with _timed(seconds, "optimize"):
+        found = optimize(control, knots, fit, spline, **options)
+        volume, boundary = _in_users_units(found, surface, vertices, faces, fit, spline, knots)
+    with _timed(seconds, "certify"):
+        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, found.certificate)
+    return Parameterization(
+        volume, boundary, found.certificate, quality, history.arrays(), seconds, place.type, seed, config
+    )
+
+
+def choose_device(name: str) -> torch.device:
+    """The torch device for "auto", "cpu" or "cuda". Raises ValueError where it is not there."""
+    if name not in ("auto", "cpu", "cuda"):
+        raise ValueError(f"device {name!r}: choose auto, cpu or cuda")
+    available = torch.cuda.is_available()
+    if name == "cuda" and not available:
+        raise ValueError("device cuda: torch finds no CUDA device here; use --device cpu")
+    return torch.device("cuda" if available and name != "cpu" else "cpu")
+
+
+def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
+    """Vertex numbers (8,) for given corners: 8 vertex numbers, or (8, 3) points that take their nearest vertices.
+
+    Raises ValueError unless these are eight different vertices.
+    """
+    given = np.asarray(corners)
+    if given.shape == (8, 3):
+        gaps = np.linalg.norm(surface.vertices[:, None] - given.astype(np.float64), axis=2)
+        numbers = gaps.argmin(axis=0)
+    elif given.shape == (8,) and given.dtype.kind in "iu":
+        numbers = given.astype(np.int64)
+    else:
+        raise ValueError(f"corners must be 8 vertex numbers or 8 points of 3 coordinates, got shape {given.shape}")
+    if numbers.min() < 0 or numbers.max() >= len(surface.vertices):
+        raise ValueError(f"corners: vertex numbers must lie between 0 and {len(surface.vertices) - 1}")
+    if len(np.unique(numbers)) != 8:
+        raise ValueError("corners: two of them fall on the same vertex; give eight places farther apart")
+    return np.asarray(numbers, dtype=np.int64)
+
+
+def _surface_fit(
+    trained: Trained,
+    vertices: Array,
+    faces: IntArray,
+    spline: SplineConfig,
+    knots: tuple[Array, Array, Array],
+    device: torch.device,
+    dtype: torch.dtype,
+) -> SurfaceFit:
+    """Boundary parameters by nearest points of G(v) on each vertex's cube face (section 4.3.2, step 1)."""
+    labels = trained.surface.vertex_labels()[: len(vertices)]
+    mapped = torch.as_tensor(map_points(trained.network, vertices, device, dtype))
+    return SurfaceFit(
+        knots,
+        spline.degree,
+        vertices,
+        vertex_quadrics(vertices, faces, spline.tangential),
+        vertex_weights(vertices, faces),
+        nearest_on_cube_face(mapped, torch.as_tensor(labels)).numpy(),
+        labels,
+        device=device,
+    )
+
+
+def _first_spline(
+    trained: Trained,
+    fit: SurfaceFit,
+    vertices: Array,
+    faces: IntArray,
+    spline: SplineConfig,
+    device: torch.device,
+    dtype: torch.dtype,
+) -> torch.Tensor:
+    """Least squares on interior pairs (G(x), x) and the boundary's (section 4.3.2, step 2)."""
+    inside = interior_points(vertices, faces, spline.fit_cell)
+    mapped = map_points(trained.network, inside, device, dtype).clip(0.0, 1.0)
+    weights = np.concatenate(
+        [
+            np.full(len(inside), (1.0 - _BOUNDARY_SHARE) / max(len(inside), 1)),
+            np.full(len(vertices), _BOUNDARY_SHARE / len(vertices)),
+        ]
+    )
+    return fit_pairs(
+        np.concatenate([mapped, fit.parameters]),
+        np.concatenate([inside, vertices]),
+        weights,
+        fit.knots,
+        spline.degree,
+        fairness=spline.fit_fairness,
+        device=device,
+    )
+
+
+def _in_users_units(
+    found: Optimized,
+    surface: Surface,
+    vertices: Array,
+    faces: IntArray,
+    fit: SurfaceFit,
+    spline: SplineConfig,
+    knots: tuple[Array, Array, Array],
+) -> tuple[BSplineVolume, BoundaryMap]:
+    """The volume and its boundary map; the parameters are first brought to the closest points of this volume."""
+    fit.reproject(found.control)
+    for _ in range(_LAST_SLIDES):
+        fit.slide(found.control, 0.5 / spline.control_points)
+    points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
+    volume = BSplineVolume((spline.degree,) * 3, knots, points)
+    own = np.concatenate([surface.vertices, surface.from_unit(vertices[len(surface.vertices) :])])
+    return volume, boundary_map(volume, own, faces, fit.parameters)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[name] = time.perf_counter() - start
+
+
+def _plain(value: Any) -> Any:
+    """Tuples as lists, as JSON gives them back."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value

@@ -1,0 +1,185 @@
+"""How well the boundary of F lies on the surface: residuals at surface points whose parameters slide.
+
+Each surface point v has a parameter p on the cube's boundary. The energy is a weighted sum of r^T (Q + t I) r with
+r = F(p) - v and Q the mean of n n^T over the triangles around v: on smooth parts that measures along the normal only, on sharp
+edges across both sides, at corners in all directions. Between optimisation steps every parameter moves to the
+closest point, over the cube's edges where it must: the paper keeps them fixed (section 4.3.2), which freezes the
+network's correspondence; letting them slide lowers boundary error and distortion together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.sparse import csr_array
+from torch import Tensor
+
+from .bspline import Array, basis_derivatives
+from .cutting import IntArray
+from .distances import SampledBoundary, foot_points
+from .tensor_grid import to_torch
+from .volume import BSplineVolume
+
+_SAMPLES = 61  # a direction and cube face, two a span of the default spline
+
+
+class SurfaceFit:
+    """points (N, 3) at volume 1, quadrics (N, 3, 3), weights (N,) that sum to 1, parameters (N, 3), faces (N,)."""
+
+    def __init__(
+        self,
+        knots: tuple[Array, Array, Array],
+        degree: int,
+        points: Array,
+        quadrics: Array,
+        weights: Array,
+        parameters: Array,
+        cube_faces: IntArray,
+        *,
+        device: torch.device,
+    ) -> None:
+        self.knots, self.degree, self.device = knots, degree, device
+        self.points = points
+        self._points = torch.as_tensor(points, device=device)
+        self._metric = torch.as_tensor(weights[:, None, None] * quadrics, device=device)
+        self.place(parameters, cube_faces)
+
+    def place(self, parameters: Array, cube_faces: IntArray) -> None:
+        """Take these parameters (N, 3) on these cube faces (N,)."""
+        self.parameters, self.cube_faces = parameters, cube_faces
+        indices, values, _, _ = self._rows(derivatives=False)
+        count = int(np.prod([len(k) - self.degree - 1 for k in self.knots]))
+        starts = np.arange(0, indices.size + 1, indices.shape[1])
+        rows = csr_array((values.ravel(), indices.ravel(), starts), shape=(len(values), count))
+        columns = csr_array(rows.T)
+        self._matrix, self._transposed = (to_torch(m, self.device) for m in (rows, columns))
+
+    def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
+        """Sum of r^T Q r at the present parameters and its gradient (3, n_u, n_v, n_w)."""
+        residual = self._apply(control) - self._points  # (N, 3)
+        pulled = (self._metric @ residual[:, :, None])[:, :, 0]
+        return float((residual * pulled).sum()), 2.0 * self._apply_transposed(pulled, control)
+
+    def hessian_product(self, direction: Tensor) -> Tensor:
+        """Second derivative of the energy times a direction, parameters held."""
+        moved = self._apply(direction)
+        return 2.0 * self._apply_transposed((self._metric @ moved[:, :, None])[:, :, 0], direction)
+
+    def residuals(self, control: Tensor) -> Array:
+        """F(p) - v: (N, 3)."""
+        return np.asarray((self._apply(control) - self._points).cpu())
+
+    def slide(self, control: Tensor, max_step: float) -> None:
+        """One Gauss-Newton step of every parameter towards the point of F's boundary closest to its surface point.
+
+        A step over an edge of the cube goes on upon the next face; `max_step` limits a step in the parameters.
+        """
+        net = np.asarray(control.cpu()).reshape(3, -1).T  # (n, 3)
+        indices, values, d_a, d_b = self._rows(derivatives=True)
+        local = net[indices]  # (N, 16, 3)
+        residual = np.einsum("nk,nkc->nc", values, local) - self.points
+        ta, tb = np.einsum("nk,nkc->nc", d_a, local), np.einsum("nk,nkc->nc", d_b, local)
+        step = -_solve_2x2(ta, tb, residual)
+        step *= np.minimum(1.0, max_step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
+        a, b = _face_axes(self.cube_faces)
+        moved = self.parameters.copy()
+        rows = np.arange(len(moved))
+        moved[rows, a] += step[:, 0]
+        moved[rows, b] += step[:, 1]
+        self.place(*fold_over_edges(moved, self.cube_faces))
+
+    def reproject(self, control: Tensor) -> None:
+        """Look for every parameter anew over the whole boundary; take the find where it is clearly closer.
+
+        Sliding alone leaves a few points behind in valleys of the distance, far from the closest point.
+        """
+        volume = BSplineVolume((self.degree,) * 3, self.knots, control.permute(1, 2, 3, 0).cpu().numpy())
+        parameters, cube_faces, distance = foot_points(self.points, volume, SampledBoundary.of(volume, _SAMPLES))
+        better = distance < 0.9 * np.linalg.norm(self.residuals(control), axis=1)
+        self.place(
+            np.where(better[:, None], parameters, self.parameters), np.where(better, cube_faces, self.cube_faces)
+        )
+
+    def _apply(self, control: Tensor) -> Tensor:
+        return self._matrix @ control.reshape(3, -1).T
+
+    def _apply_transposed(self, dual: Tensor, like: Tensor) -> Tensor:
+        return (self._transposed @ dual).T.reshape(like.shape)
+
+    def _rows(self, derivatives: bool) -> tuple[IntArray, Array, Array, Array]:
+        """Control point numbers (N, k) and weights of F and its two derivatives within the face, k = (p + 1)^2."""
+        tables = [basis_derivatives(k, self.degree, self.parameters[:, d], 1) for d, k in enumerate(self.knots)]
+        first = np.stack([t[0] for t in tables])  # (3, N)
+        values = np.stack([t[1] for t in tables])  # (3, 2, N, p + 1)
+        sizes = [len(k) - self.degree - 1 for k in self.knots]
+        stride = np.array([sizes[1] * sizes[2], sizes[2], 1])
+        axis, side = self.cube_faces // 2, self.cube_faces % 2
+        a, b = _face_axes(self.cube_faces)
+        rows = np.arange(len(axis))
+        window = np.arange(self.degree + 1)
+        base = side * (np.array(sizes)[axis] - 1) * stride[axis]
+        along_a = (first[a, rows][:, None] + window) * stride[a][:, None]
+        along_b = (first[b, rows][:, None] + window) * stride[b][:, None]
+        indices = base[:, None, None] + along_a[:, :, None] + along_b[:, None, :]
+        va, vb = values[a, 0, rows], values[b, 0, rows]
+        flat = (len(rows), -1)
+        plain = (va[:, :, None] * vb[:, None, :]).reshape(flat)
+        if not derivatives:
+            return indices.reshape(flat), plain, plain, plain
+        d_a = (values[a, 1, rows][:, :, None] * vb[:, None, :]).reshape(flat)
+        d_b = (va[:, :, None] * values[b, 1, rows][:, None, :]).reshape(flat)
+        return indices.reshape(flat), plain, d_a, d_b
+
+
+def _face_axes(cube_faces: IntArray) -> tuple[IntArray, IntArray]:
+    """The two parametric directions within each face."""
+    axis = cube_faces // 2
+    return (axis + 1) % 3, (axis + 2) % 3
+
+
+def _solve_2x2(ta: Array, tb: Array, residual: Array) -> Array:
+    """Least-squares coefficients (N, 2) of the residual in the tangents, slightly damped."""
+    aa, bb, ab = (ta * ta).sum(1), (tb * tb).sum(1), (ta * tb).sum(1)
+    damping = 1e-6 * (aa + bb)
+    aa, bb = aa + damping, bb + damping
+    ra, rb = (ta * residual).sum(1), (tb * residual).sum(1)
+    determinant = aa * bb - ab * ab
+    return np.stack([(bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant], axis=1)
+
+
+def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:
+    """Continue steps that left their face on the neighbouring one: what overshot goes inwards there."""
+    parameters, cube_faces = parameters.copy(), cube_faces.copy()
+    rows = np.arange(len(parameters))
+    outside = np.maximum(-parameters, parameters - 1.0)  # (N, 3), positive beyond a side
+    outside[rows, cube_faces // 2] = -1.0
+    axis = outside.argmax(axis=1)
+    overshoot = outside[rows, axis]
+    crossed = rows[overshoot > 0.0]
+    old_axis, side = cube_faces[crossed] // 2, cube_faces[crossed] % 2
+    inwards = np.where(side == 1, 1.0 - overshoot[crossed], overshoot[crossed])
+    parameters[crossed, old_axis] = inwards
+    cube_faces[crossed] = 2 * axis[crossed] + (parameters[crossed, axis[crossed]] > 0.5)
+    return np.clip(parameters, 0.0, 1.0), cube_faces
+
+
+def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float) -> Array:
+    """Area-weighted mean of n n^T over the triangles at each vertex, plus `tangential` times the identity (n, 3, 3)."""
+    corners = vertices[faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    normal = cross / np.maximum(area, 1e-300)[:, None]
+    share = area[:, None, None] * normal[:, :, None] * normal[:, None, :]
+    sums, total = np.zeros((len(vertices), 3, 3)), np.zeros(len(vertices))
+    for k in range(3):
+        np.add.at(sums, faces[:, k], share)
+        np.add.at(total, faces[:, k], area)
+    return sums / np.maximum(total, 1e-300)[:, None, None] + tangential * np.eye(3)
+
+
+def vertex_weights(vertices: Array, faces: IntArray) -> Array:
+    """Half by count, half by area: the report counts vertices, the surface is made of area; sums to 1 (n,)."""
+    corners = vertices[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    share = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
+    return np.asarray(0.5 / len(vertices) + 0.5 * share / share.sum())
