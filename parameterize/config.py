@@ -52,7 +52,7 @@ class TrainConfig:
     learning_rate: float = 1e-3
     final_learning_rate: float = 2e-5  # reached by cosine decay at the end of each stage
     cell: float = 0.08  # edge h of the interior cells (section 4.4.2)
-    triangles: int = 2000  # surface triangles sampled a step
+    triangles: int = 2000  # surface triangles sampled a step; all of them where there are fewer
     min_det: float = 0.1  # alpha of the bijectivity term
     wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
 
@@ -116,7 +116,7 @@ PRESETS = {
     "paper": Config(
         "paper",
         NetworkConfig(width=512, modules=6),
-        TrainConfig(learning_rate=5e-4, final_learning_rate=5e-4, cell=0.04, triangles=20_000),
+        TrainConfig(learning_rate=5e-4, final_learning_rate=5e-4, cell=0.04, triangles=1_000_000),
         _stages((600, 400, 1000, 500, 1000)),
         SplineConfig(),
     ),

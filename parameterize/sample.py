@@ -77,7 +77,7 @@ def interior_points(vertices: Array, faces: NDArray[np.int64], cell: float) -> A
 
 
 class TriangleSampler:
-    """Draws triangles with probability proportional to area, without replacement where the mesh allows it."""
+    """Draws triangles with probability proportional to area; all of them where `count` covers the mesh."""
 
     def __init__(self, vertices: Array, faces: NDArray[np.int64], count: int, device: torch.device) -> None:
         corners = vertices[faces]
@@ -88,6 +88,8 @@ class TriangleSampler:
 
     def draw(self, generator: torch.Generator) -> Tensor:
         """Indices (count,) of triangles: systematic sampling, one random offset along the cumulated area."""
+        if self._count == len(self._cumulative):
+            return torch.arange(self._count, device=self._device)
         start = torch.rand(1, generator=generator, dtype=torch.float64)
         ticks = (torch.arange(self._count) + start) / self._count
         picks = torch.searchsorted(self._cumulative, ticks).clamp(max=len(self._cumulative) - 1)

@@ -255,10 +255,11 @@ class Trainer:
         """Weighted sum (eq. 2 and 3), folded stencils, and the unweighted terms in use."""
         train, weights = self.config.train, stage.weights
         picks = boundary.sampler.draw(self.generator)
-        parts = [self.stencils.shifted(self.generator), boundary.vertices[boundary.faces[picks]].reshape(-1, 3)]
+        used, place = torch.unique(boundary.faces[picks].flatten(), return_inverse=True)
+        parts = [self.stencils.shifted(self.generator), boundary.vertices[used]]
         parts += [boundary.vertices[index] for index in (boundary.corners, boundary.path) if index is not None]
         mapped = list(self.network(torch.cat(parts)).split([len(p) for p in parts]))
-        nodes, surface = mapped[0][self.stencils.index], mapped[1]  # (r, 19, 3), (3 t, 3)
+        nodes, surface = mapped[0][self.stencils.index], mapped[1][place]  # (r, 19, 3), (3 t, 3)
 
         jacobian = losses.stencil_jacobian(nodes, self.stencils.cell)
         det = losses.determinant(jacobian)

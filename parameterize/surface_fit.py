@@ -1,9 +1,9 @@
 """How well the boundary of F lies on the surface: residuals at surface points whose parameters slide.
 
 Each surface point v has a parameter p on the cube's boundary. The energy is a weighted sum of r^T (Q + t I) r with
-r = F(p) - v and Q the mean of n n^T over the triangles around v: on smooth parts that measures along the normal only, on sharp
-edges across both sides, at corners in all directions. Between optimisation steps every parameter moves to the
-closest point, over the cube's edges where it must: the paper keeps them fixed (section 4.3.2), which freezes the
+r = F(p) - v and Q the mean of n n^T over the triangles around v: on smooth parts that measures along the normal only,
+on sharp edges across both sides, at corners in all directions. Between optimisation steps every parameter moves to
+the closest point, over the cube's edges where it must: the paper keeps them fixed (section 4.3.2), which freezes the
 network's correspondence; letting them slide lowers boundary error and distortion together.
 """
 
