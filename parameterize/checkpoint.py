@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
@@ -40,7 +41,8 @@ class Checkpoints:
         self._folder.mkdir(parents=True, exist_ok=True)
         temporary = self._folder / f".{name}.{os.getpid()}.part"
         header = {"identity": self._identity, "state": json.dumps(state)}
-        save_file({k: v.detach().cpu().contiguous() for k, v in tensors.items()}, temporary, metadata=header)
+        copies = {k: v.detach().cpu().clone(memory_format=torch.contiguous_format) for k, v in tensors.items()}
+        save_file(copies, temporary, metadata=header)  # copies: the file format refuses tensors that share memory
         temporary.replace(self._folder / f"{name}.safetensors")
 
     def load(self, name: str) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
