@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike
 
 from .mesh_check import check_genus, check_manifold, check_volume, choose_component, warnings
 from .mesh_clean import orient, signed_volume, weld_and_drop
-from .mesh_error import MeshError
+from .mesh_common import Array, IntArray, MeshError
 from .mesh_headers import check_face_count
-from .mesh_obj import Array, IntArray
 from .mesh_place import deepest_point
 from .mesh_read import LARGEST, check_finite, check_indices, read_mesh
 

@@ -13,8 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .mesh_clean import components, edge_table, signed_volume
-from .mesh_error import MeshError
-from .mesh_obj import Array, IntArray
+from .mesh_common import Array, IntArray, MeshError
 
 Where = Callable[[int], str]
 LEAST_VOLUME = 1e-12  # of the cube over the box's longest side

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from .mesh_obj import Array, IntArray
+from .mesh_common import Array, IntArray
 
 WELD_TOLERANCE = 1e-7  # of the box's longest side: what single precision cannot tell apart
 FLAT = 1e-14  # twice a face's area over its longest edge squared, below which it counts as degenerate

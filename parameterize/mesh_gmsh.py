@@ -9,8 +9,7 @@ import re
 
 import numpy as np
 
-from .mesh_error import MeshError
-from .mesh_obj import IntArray
+from .mesh_common import IntArray, MeshError
 
 NUMBERS_PER_NODE = 100  # the highest node number, over the number of nodes
 NUMBERS_AT_LEAST = 10_000_000

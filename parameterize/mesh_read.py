@@ -15,14 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from .mesh_error import MeshError
+from .mesh_common import Array, IntArray, MeshError
 from .mesh_gmsh import trim_gmsh
 from .mesh_headers import DAMAGED, check_header
-from .mesh_obj import Array, IntArray, parse_obj, triangulate
+from .mesh_obj import trim_obj
+from .mesh_polygons import triangulate
 
 TRIMESH_FORMATS = (".stl", ".ply", ".off")
-MESHIO_FORMATS = {".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
-FORMATS = (".obj", *TRIMESH_FORMATS, *MESHIO_FORMATS)
+MESHIO_FORMATS = {".obj": "obj", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
+FORMATS = (*MESHIO_FORMATS, *TRIMESH_FORMATS)
+POLYGONS = ("triangle", "quad", "polygon")
 BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
 BYTES_AT_LEAST = 64 << 20
 LARGEST = 1e90  # coordinate: volumes beyond its cube leave double precision
@@ -56,12 +58,11 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     header = check_header(data, suffix[0], max_faces)
     notices = [*(["unpacked from .gz"] if packed else []), *header.notices]
     if suffix[0] == ".obj":
-        vertices, polygons, remarks = parse_obj(data, max_faces)
+        data, remarks = trim_obj(data, max_faces)
         notices += remarks
-        check_finite(vertices)
-        check_indices(vertices, np.array([index for polygon in polygons for index in polygon]))
-        faces, count = triangulate(vertices, polygons), len(polygons)
-    elif suffix[0] in TRIMESH_FORMATS:
+    elif suffix[0] == ".msh":
+        data = trim_gmsh(data)
+    if suffix[0] in TRIMESH_FORMATS:
         vertices, faces = _parse_trimesh(data, suffix[0])
         count = header.polygons or 0
     else:
@@ -140,30 +141,28 @@ def _parse_meshio(data: bytes, suffix: str) -> tuple[Array, IntArray, int]:
 
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder, f"mesh{suffix}")
-        copy.write_bytes(trim_gmsh(data) if suffix == ".msh" else data)
+        copy.write_bytes(data)
         try:
             with _quiet():
                 mesh = meshio.read(copy, file_format=MESHIO_FORMATS[suffix])
         except (Exception, SystemExit) as error:  # meshio exits the process on some files
             raise MeshError(f"not readable as {suffix} ({_first_line(error)}); {DAMAGED}") from None
-    cells: dict[str, IntArray] = {}
-    for block in mesh.cells:
-        old = cells.get(block.type)
-        rows = np.asarray(block.data, dtype=np.int64)
-        cells[block.type] = rows if old is None else np.concatenate([old, rows])
     vertices = np.asarray(mesh.points, dtype=np.float64)
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise MeshError(f"points of shape {vertices.shape} are not in space: export three coordinates each")
     check_finite(vertices)
-    others = sorted(set(cells) - {"vertex", "line", "triangle", "quad", "tetra"})
+    others = [block for block in mesh.cells if block.type not in (*POLYGONS, "tetra", "vertex", "line")]
     if others:
-        raise MeshError(f"holds {len(cells[others[0]])} cells of type {others[0]}: save linear tetrahedra or triangles")
-    for rows in cells.values():
+        found = f"{len(others[0].data)} cells of type {others[0].type}"
+        raise MeshError(f"holds {found}: save linear tetrahedra or triangles")
+    blocks = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
+    for _, rows in blocks:
         check_indices(vertices, rows)
-    if "tetra" in cells:
-        faces = tetrahedra_boundary(vertices, cells["tetra"])
+    tetrahedra = [rows for kind, rows in blocks if kind == "tetra"]
+    if tetrahedra:
+        faces = tetrahedra_boundary(vertices, np.concatenate(tetrahedra))
         return vertices, faces, len(faces)
-    polygons = cells.get("triangle", np.empty((0, 3), int)).tolist() + cells.get("quad", np.empty((0, 4), int)).tolist()
+    polygons = [polygon for kind, rows in blocks if kind in POLYGONS for polygon in rows.tolist()]
     if not polygons:
         raise MeshError("no tetrahedra and no triangles in the file: export the volume or its surface")
     return vertices, triangulate(vertices, polygons), len(polygons)

@@ -10,8 +10,8 @@ import trimesh
 
 from parameterize.mesh import MeshError, load_surface, surface_from_arrays
 from parameterize.mesh_clean import signed_volume
-from parameterize.mesh_obj import triangulate
 from parameterize.mesh_place import deepest_point
+from parameterize.mesh_polygons import triangulate
 from parameterize.mesh_read import BYTES_AT_LEAST
 
 MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).parents[2] / "shared" / "models"))
@@ -92,6 +92,9 @@ ACCEPTED = {
     "negative.obj": (obj(faces=[[i - 9 for i in quad] for quad in QUADS]), "negative (relative) vertex numbers"),
     "seams.obj": (obj(CUBE[np.ravel(QUADS)], np.arange(24).reshape(6, 4)), "welded 16 duplicate vertices"),
     "texture.obj": (obj().replace("f 1 3", "vt 0 0\nvn 0 0 1\nf 1/1/1 3//1"), "6 polygons"),
+    "colours.obj": (obj().replace("v 0.0 0.0 0.0", "v 0.0 0.0 0.0 0.5 0.5 0.5"), "6 polygons"),
+    "groups.obj": (obj().replace("f 1", "o cube\ng side\nusemtl grey\nf 1", 1) + "l 1 2\n", "6 polygons"),
+    "mixed.obj": (obj(faces=[*QUADS[:3], *TRIANGLES[6:].tolist()]), "9 polygons cut into 12 triangles"),
     "unused.obj": ("v 5 5 5\n" + obj(faces=np.array(QUADS) + 1), "dropped 1 vertices that no face uses"),
     "degenerate.obj": (obj() + "f 1 1 2\n", "dropped 1 degenerate faces"),
     "inverted.obj": (obj(faces=[q[::-1] for q in QUADS]), "inverted orientation flipped"),
@@ -403,11 +406,25 @@ def test_the_deepest_point_of_an_angle_is_in_its_elbow():
     assert surface.center[:2] == pytest.approx([2 - np.sqrt(2)] * 2, abs=0.02)
 
 
-def test_concave_quadrilaterals_are_cut_along_the_inner_diagonal():
-    dart = np.array([[0, 0, 0], [2, 1, 0], [0, 0.5, 0], [-2, 1, 0]], dtype=float)  # reflex at vertex 2
-    triangles = triangulate(dart, [[0, 1, 2, 3]])
-    areas = np.cross(dart[triangles[:, 1]] - dart[triangles[:, 0]], dart[triangles[:, 2]] - dart[triangles[:, 0]])[:, 2]
-    assert areas / 2 == pytest.approx([0.5, 0.5])
+@pytest.mark.parametrize("size", [1.0, 1e-40, 1e40])
+@pytest.mark.parametrize(
+    "outline",
+    [
+        [[0, 0], [2, 1], [0, 0.5], [-2, 1]],  # a dart
+        [[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]],  # a U: no corner sees all of it
+    ],
+)
+def test_concave_polygons_are_cut_inside(outline, size):
+    """Triangles turned like the polygon that add up to its area (shoelace formula) neither overlap nor leave it."""
+    points = np.c_[outline, np.zeros(len(outline))]
+    x, y = points[:, :2].T
+    area = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2
+    triangles = triangulate(points * size, [list(range(len(points)))])
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    areas = np.cross(b - a, c - a)[:, 2] / 2
+    assert len(areas) == len(points) - 2
+    assert areas.min() > 0
+    assert areas.sum() == pytest.approx(area)
 
 
 def test_polygons_keep_their_order():
