@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .mesh_check import check_genus, check_manifold, check_volume, choose_component, warnings
+from .mesh_check import check_genus, check_manifold, check_volume, choose_component, slivers
 from .mesh_clean import orient, signed_volume, weld_and_drop
 from .mesh_common import Array, IntArray, MeshError
 from .mesh_headers import check_face_count
@@ -157,7 +157,7 @@ def _gate(
     check_manifold(triangles, where)
     triangles, turned = _wind_outward(points, triangles)
     check_genus(triangles)
-    doubts = warnings(points, triangles, where)
+    doubts = slivers(points, triangles, where)
     deepest, _ = deepest_point(points, triangles)
     return Surface(
         name=name,

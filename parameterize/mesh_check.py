@@ -99,12 +99,8 @@ def check_volume(vertices: Array, faces: IntArray) -> None:
         raise MeshError("encloses no volume (a flat or doubled sheet): give it thickness")
 
 
-def warnings(vertices: Array, faces: IntArray, where: Where) -> list[str]:
-    """What is accepted but may spoil the result, one line each."""
-    return _slivers(vertices, faces, where)
-
-
-def _slivers(vertices: Array, faces: IntArray, where: Where) -> list[str]:
+def slivers(vertices: Array, faces: IntArray, where: Where) -> list[str]:
+    """A notice of the triangles with a tiny angle, if any: accepted, but they may spoil the result."""
     corners = vertices[faces]  # (m, 3, 3)
     ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     doubled = np.linalg.norm(np.cross(ahead[:, 0], behind[:, 0]), axis=1)  # (m,) twice the area

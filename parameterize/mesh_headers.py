@@ -13,6 +13,14 @@ from .mesh_common import MeshError
 
 PLY_BYTES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
 PLY_BYTES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
+PLY_FACES = (
+    rb"element\s+face\s+\d+\s+property\s+list\s+(?:uchar|uint8|int|int32)\s+u?int(?:32)?\s+vertex_ind(?:ex|ices)"
+)
+PLY_POINTS = rb"element\s+vertex\s+\d+" + b"".join(
+    rb"\s+property\s+(?:float|float32|double)\s+" + axis for axis in (b"x", b"y", b"z")
+)
+PLY_MORE = rb"(?:\s+property\s+(?:float|float32|double|uchar|uint8|int|int32|uint|uint32)\s+\w+)*"
+PLAIN_PLY = re.compile(rb"\s" + PLY_POINTS + PLY_MORE + rb"\s+" + PLY_FACES + rb"\s*\Z")
 DAMAGED = "the file is truncated or damaged, export it again"
 
 
@@ -95,6 +103,12 @@ def _check_ply(data: bytes) -> Header:
     if is_text and rows < sum(counts.values()):
         raise MeshError(f"PLY promises {promised} elements, {rows} rows follow; {DAMAGED}")
     return Header(counts["face"])
+
+
+def plain_ply(data: bytes) -> bytes | None:
+    """A PLY for meshio, which keeps polygons whole, or None where it holds more than meshio reads."""
+    head, mark, body = data.partition(b"end_header")
+    return re.sub(rb"\bvertex_index\b", b"vertex_indices", head) + mark + body if PLAIN_PLY.search(head) else None
 
 
 def _check_off(data: bytes) -> Header:

@@ -10,7 +10,6 @@ import re
 from .mesh_common import MeshError
 from .mesh_headers import check_face_count
 
-MAX_CORNERS = 256
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[-+]?(?:nan|inf|infinity)"
 VERTEX = re.compile(rf"(?:(?:{NUMBER})(?: |$)){{3}}", re.ASCII | re.IGNORECASE)
 FACE = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*", re.ASCII)
@@ -58,10 +57,8 @@ def _face(words: list[str], number: int) -> str:
     corners = " ".join(indices)
     if indices and not FACE.fullmatch(corners):
         raise MeshError(f"line {number}: a face needs vertex numbers, got {' '.join(words[1:5])[:40]!r}")
-    if not 3 <= len(indices) <= MAX_CORNERS:
-        raise MeshError(
-            f"line {number}: a face has {len(indices)} corners, expected 3 to {MAX_CORNERS}: triangulate it"
-        )
+    if len(indices) < 3:
+        raise MeshError(f"line {number}: a face has {len(indices)} corners, expected at least 3; export it again")
     if any(not index.strip("+-0") for index in indices):
         raise MeshError(f"line {number}: vertex number 0, OBJ counts from 1; export the file again")
     return corners

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from .mesh_common import Array, IntArray
+from .mesh_common import Array, IntArray, MeshError
+
+MAX_CORNERS = 256
 
 
 def triangulate(vertices: Array, polygons: list[list[int]]) -> IntArray:
     """Triangles (m, 3) in the polygons' order; concave polygons are cut inside (VTK's ear cutting).
 
     Vertex numbers must be in range and coordinates finite. A polygon of n corners gives n - 2 triangles, fewer where
-    corners repeat.
+    corners repeat. Raises MeshError for a polygon of more than 256 corners.
     """
     if all(len(polygon) == 3 for polygon in polygons):
         return np.array(polygons, dtype=np.int64)
+    if max(map(len, polygons)) > MAX_CORNERS:
+        raise MeshError(f"a face has {max(map(len, polygons))} corners, more than {MAX_CORNERS}: triangulate it")
     import pyvista
 
     low, high = vertices.min(axis=0), vertices.max(axis=0)

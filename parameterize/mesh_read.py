@@ -17,13 +17,13 @@ import numpy as np
 
 from .mesh_common import Array, IntArray, MeshError
 from .mesh_gmsh import trim_gmsh
-from .mesh_headers import DAMAGED, check_header
+from .mesh_headers import DAMAGED, check_header, plain_ply
 from .mesh_obj import trim_obj
 from .mesh_polygons import triangulate
 
 TRIMESH_FORMATS = (".stl", ".ply", ".off")
-MESHIO_FORMATS = {".obj": "obj", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
-FORMATS = (*MESHIO_FORMATS, *TRIMESH_FORMATS)
+MESHIO_FORMATS = {".obj": "obj", ".ply": "ply", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
+FORMATS = (".obj", *TRIMESH_FORMATS, ".mesh", ".msh", ".vtu")
 POLYGONS = ("triangle", "quad", "polygon")
 BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
 BYTES_AT_LEAST = 64 << 20
@@ -62,13 +62,15 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
         notices += remarks
     elif suffix[0] == ".msh":
         data = trim_gmsh(data)
-    if suffix[0] in TRIMESH_FORMATS:
+    promised = header.polygons or 0
+    plain = plain_ply(data) if suffix[0] == ".ply" else None
+    if suffix[0] in TRIMESH_FORMATS and plain is None:
         vertices, faces = _parse_trimesh(data, suffix[0])
-        count = header.polygons or 0
+        count = min(len(faces), promised)
     else:
-        vertices, faces, count = _parse_meshio(data, suffix[0])
-    if len(faces) < count:
-        raise MeshError(f"{count} faces promised, {len(faces)} read; {DAMAGED}")
+        vertices, faces, count = _parse_meshio(plain or data, suffix[0])
+    if count < promised:
+        raise MeshError(f"{promised} faces promised, {count} read; {DAMAGED}")
     if len(faces) > count:
         notices.append(f"{count} polygons cut into {len(faces)} triangles")
     return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), tuple(notices))

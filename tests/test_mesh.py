@@ -18,6 +18,7 @@ MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).parents[2] / "shared"
 CUBE = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
 QUADS = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]  # outward
 TRIANGLES = np.array([[q[0], q[i], q[i + 1]] for q in QUADS for i in (1, 2)])
+MIXED = [*QUADS[:3], *TRIANGLES[6:].tolist()]
 TETRAHEDRON = (np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
 
 
@@ -68,6 +69,13 @@ def ply(vertices=CUBE, faces=TRIANGLES, counts=None, binary=False):
     return (head + "\n".join(rows) + "\n").encode()
 
 
+def flagged_ply():
+    """Faces with a property beside the corners."""
+    head, mark, body = ply().decode().partition("end_header\n")
+    rows = body.splitlines()
+    return head + "property uchar flags\n" + mark + "\n".join([*rows[:8], *(row + " 7" for row in rows[8:]), ""])
+
+
 def write(folder, name, content):
     path = folder / name
     path.write_bytes(content.encode() if isinstance(content, str) else content)
@@ -94,7 +102,7 @@ ACCEPTED = {
     "texture.obj": (obj().replace("f 1 3", "vt 0 0\nvn 0 0 1\nf 1/1/1 3//1"), "6 polygons"),
     "colours.obj": (obj().replace("v 0.0 0.0 0.0", "v 0.0 0.0 0.0 0.5 0.5 0.5"), "6 polygons"),
     "groups.obj": (obj().replace("f 1", "o cube\ng side\nusemtl grey\nf 1", 1) + "l 1 2\n", "6 polygons"),
-    "mixed.obj": (obj(faces=[*QUADS[:3], *TRIANGLES[6:].tolist()]), "9 polygons cut into 12 triangles"),
+    "mixed.obj": (obj(faces=MIXED), "9 polygons cut into 12 triangles"),
     "unused.obj": ("v 5 5 5\n" + obj(faces=np.array(QUADS) + 1), "dropped 1 vertices that no face uses"),
     "degenerate.obj": (obj() + "f 1 1 2\n", "dropped 1 degenerate faces"),
     "inverted.obj": (obj(faces=[q[::-1] for q in QUADS]), "inverted orientation flipped"),
@@ -109,6 +117,9 @@ ACCEPTED = {
     "crlf.ply": (ply().replace(b"\n", b"\r\n"), None),
     "binary.ply": (ply(binary=True), None),
     "quads.ply": (ply(faces=QUADS), "6 polygons cut"),
+    "mixed.ply": (ply(faces=MIXED, binary=True), "9 polygons cut into 12 triangles"),
+    "index.ply": (ply(faces=MIXED).replace(b"vertex_indices", b"vertex_index"), "9 polygons cut"),
+    "flags.ply": (flagged_ply(), None),
     "quads.off": (off(), "6 polygons cut"),
     "comments.off": (off().replace("OFF\n", "OFF\n# a cube\n\n").replace("\n", "\r\n"), "6 polygons cut"),
 }
@@ -147,6 +158,8 @@ REFUSED = {
     "decimal_comma.obj": (obj().replace("v 0.0 0.0 0.0", "v 0,0 0,0 0,0"), "line 1: a vertex"),
     "face_word.obj": (obj() + "f 1 two 3\n", "line 15: a face needs vertex numbers"),
     "two_corners.obj": (obj() + "f 1 2\n", "line 15: a face has 2 corners"),
+    "corners.obj": (obj() + "f" + " 1 2 3" * 100 + "\n", "a face has 300 corners, more than 256"),
+    "pair.ply": (ply(faces=[*QUADS, [0, 1]], binary=True), "7 faces promised, 6 read"),
     "zero.obj": (obj() + "f 0 1 2\n", "vertex number 0"),
     "nan.obj": (obj(NOT_A_NUMBER), "1 vertices with NaN or infinite coordinates, the first is vertex 3"),
     "infinite.obj": (obj().replace("v 0.0 0.0 0.0", "v 1e999 0 0"), "1 vertices with NaN or infinite"),
