@@ -106,21 +106,18 @@ class PoissonOptions:
             return Poisson(exact=exact, source=self.source, boundary=self.boundary)
 
 
-def read_corners(path: Path, n_vertices: int) -> np.ndarray[Any, Any]:
-    """Eight rows of three coordinates, or eight vertex numbers. Raises InputError."""
+def read_corners(path: Path) -> np.ndarray[Any, Any]:
+    """Corners from a text file, points (8, 3) or vertex numbers (8,). Raises InputError for a file that is neither."""
     try:
         rows = np.loadtxt(path, ndmin=2)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except ValueError:
         raise InputError(f"{path}: corners must be numbers, eight lines of three (or of one vertex number)") from None
-    if not np.all(np.isfinite(rows)) or rows.shape not in ((8, 3), (8, 1), (1, 8)):
-        raise InputError(
-            f"{path}: corners need eight lines of three numbers (or one vertex number), found {rows.shape}"
-        )
+    if rows.shape not in ((8, 3), (8, 1), (1, 8)) or not np.all(np.isfinite(rows)):
+        raise InputError(f"{path}: corners need eight lines of three numbers (or of one vertex number)")
     if rows.shape == (8, 3):
         return rows
-    numbers = rows.ravel().astype(np.int64)
-    if np.any(numbers != rows.ravel()) or numbers.min() < 0 or numbers.max() >= n_vertices:
-        raise InputError(f"{path}: vertex numbers must be whole, from 0 to {n_vertices - 1}")
-    return numbers
+    if np.any(rows != np.rint(rows)):
+        raise InputError(f"{path}: vertex numbers must be whole")
+    return rows.ravel().astype(np.int64)

@@ -173,24 +173,35 @@ def _parameterize(
     config = options.config()
     with state.timed("load"):
         surface = _load(mesh, options.component, options.max_faces)
-        corners = read_corners(options.corners, len(surface.vertices)) if options.corners else None
+        corners = read_corners(options.corners) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
         log.warning("%s: %s", surface.name, notice)
-    state.begin()
-    from parameterize.run import parameterize
+    from parameterize.checkpoint import CheckpointError
+    from parameterize.corners import PathError
+    from parameterize.run import choose_device, corner_vertices, parameterize
 
+    with input_errors():
+        choose_device(options.device)
+        if corners is not None:
+            corner_vertices(surface, corners)
+    state.begin()
     checkpoint = state.folder / CHECKPOINT
-    result = parameterize(
-        surface,
-        config,
-        seed=options.seed,
-        device=options.device,
-        corners=corners,
-        progress=progress,
-        checkpoint_dir=checkpoint,
-        resume=options.resume,
-    )
+    try:
+        result = parameterize(
+            surface,
+            config,
+            seed=options.seed,
+            device=options.device,
+            corners=corners,
+            progress=progress,
+            checkpoint_dir=checkpoint,
+            resume=options.resume,
+        )
+    except CheckpointError as error:
+        raise InputError(str(error)) from None
+    except PathError as error:
+        raise InputError(f"{surface.name}: {error}; train longer, or give --corners") from None
     state.seconds.update(result.seconds)
     result.volume.save(state.folder / "volume.npz")
     result.boundary.save(state.folder / "boundary.npz")

@@ -14,11 +14,10 @@ import pytest
 import iga_nn
 import solve
 from iga_nn.cli import main
-from parameterize.volume import BSplineVolume
+from parameterize.checkpoint import CheckpointError
 from solve.study import benchmark_volume
 
 FILES = ("volume.npz", "boundary.npz", "history.npz", "solution.npz", "report.json", "history.png")
-SHORT = ["--steps-factor", "0.005", "--control-points", "8"]
 
 
 def one_line(text: str) -> str:
@@ -156,6 +155,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["parameterize", "cube", "--corners", "words.txt"], "eight lines"),
         (["parameterize", "cube", "--corners", "seven.txt"], "eight lines"),
         (["parameterize", "cube", "--corners", "numbers.txt"], "vertex numbers"),
+        (["parameterize", "cube", "--corners", "same.txt"], "same vertex"),
         (["parameterize", "cube", "--max-faces", "10"], "face"),
         (["parameterize", "cube", "--out", "words.txt/deeper"], "cannot be written"),
         (["solve", "poisson", "missing.npz"], "missing.npz"),
@@ -174,6 +174,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, says, in_folder, capsy
     Path("words.txt").write_text("once upon a time\n")
     Path("seven.txt").write_text("0 0 0\n" * 7)
     Path("numbers.txt").write_text("99999999\n" * 8)
+    Path("same.txt").write_text("0 0 0\n" * 8)
     if "--max-faces" in arguments:
         main(["sample", "cube", "--out", "cube.obj"])
         arguments = ["cube.obj" if word == "cube" else word for word in arguments]
@@ -212,14 +213,10 @@ def test_corners_reach_the_training(in_folder, monkeypatch):
     assert np.array_equal(seen["corners"], np.arange(8)) and seen["corners"].dtype.kind == "i"
 
 
-def test_real_training_in_short(in_folder, capsys):
-    code = main(["run", "poisson", "bean", "--refine", "0", *SHORT])
-    assert code in (0, 3)  # so short a training promises nothing about folds
-    report = json.loads(Path("bean/report.json").read_text())
-    assert BSplineVolume.load("bean/volume.npz").shape == (8, 8, 8)
-    assert report["parameterization"]["control_points"] == [8, 8, 8]
-    assert set(np.load("bean/history.npz")["stage"]) >= {"S(2)", "S(1)", "cube", "corners", "edges"}
-    assert not Path("bean/checkpoint").exists()
+def test_checkpoint_of_another_run_is_said(formula_training, in_folder, capsys):
+    formula_training(error=CheckpointError("belongs to another run"))
+    assert main(["parameterize", "cube", "--resume"]) == 2
+    assert "another run" in one_line(capsys.readouterr().err)
 
 
 def test_ctrl_c_in_the_middle_of_a_training_leaves_a_checkpoint(in_folder):

@@ -34,15 +34,15 @@ def test_convergence_rates():
         assert rows[-1].rate_h1 == pytest.approx(degree, abs=0.25)
 
 
-def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(in_folder, capsys):
+def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(formula_training, in_folder, capsys):
+    formula_training()
     Path("models").mkdir()
     main(["sample", "ellipsoid", "--out", "models/conch.obj"])
-    short = ["--steps-factor", "0.005", "--control-points", "8"]
-    assert load("validation").main(["--models", "models", "--out", "out", *short]) == 0
+    assert load("validation").main(["--models", "models", "--out", "out", "--steps-factor", "0.1"]) == 0
     text = Path("out/validation.md").read_text()
     assert text.strip() in capsys.readouterr().out
     assert "| conch | paper | 1.468 | 50.818 | 0.00169 | - |" in text
     assert "| santa4 | ours | model not public |" in text
     assert "| santa4 | paper | 194.23 | 38.71 | 232.93 |" in text
     assert "no measurement" in text
-    assert text.count("| conch | 0 | 512 |") == 1 and "![error](conch/error.png)" in text
+    assert text.count("| conch | 0 | 343 |") == 1 and "![error](conch/error.png)" in text

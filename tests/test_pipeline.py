@@ -73,6 +73,9 @@ def test_same_seed_gives_the_same_volume_bit_for_bit(in_folder):
     for out in ("first", "second"):
         pipeline.parameterize_to("ellipsoid", out, mapping=short)
     assert (in_folder / "first" / "volume.npz").read_bytes() == (in_folder / "second" / "volume.npz").read_bytes()
+    with np.load(in_folder / "first" / "history.npz") as history:
+        assert set(history["stage"]) >= {"S(2)", "S(1)", "cube", "corners", "edges"}
+    assert not (in_folder / "first" / "checkpoint").exists()
 
 
 @pytest.mark.slow
