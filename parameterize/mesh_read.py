@@ -158,7 +158,9 @@ def _parse_meshio(data: bytes, suffix: str) -> tuple[Array, IntArray, int]:
         found = f"{len(others[0].data)} cells of type {others[0].type}"
         raise MeshError(f"holds {found}: save linear tetrahedra or triangles")
     blocks = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
-    for _, rows in blocks:
+    for kind, rows in blocks:
+        if kind in POLYGONS and (rows.ndim != 2 or rows.shape[1] < 3):
+            raise MeshError(f"a face with fewer corners than it promises; {DAMAGED}")
         check_indices(vertices, rows)
     tetrahedra = [rows for kind, rows in blocks if kind == "tetra"]
     if tetrahedra:

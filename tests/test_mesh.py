@@ -159,6 +159,7 @@ REFUSED = {
     "face_word.obj": (obj() + "f 1 two 3\n", "line 15: a face needs vertex numbers"),
     "two_corners.obj": (obj() + "f 1 2\n", "line 15: a face has 2 corners"),
     "corners.obj": (obj() + "f" + " 1 2 3" * 100 + "\n", "a face has 300 corners, more than 256"),
+    "short_row.ply": (ply().replace(b"\n3 0 2 3\n", b"\n36\n"), "a face with fewer corners"),
     "pair.ply": (ply(faces=[*QUADS, [0, 1]], binary=True), "7 faces promised, 6 read"),
     "zero.obj": (obj() + "f 0 1 2\n", "vertex number 0"),
     "nan.obj": (obj(NOT_A_NUMBER), "1 vertices with NaN or infinite coordinates, the first is vertex 3"),
