@@ -13,6 +13,9 @@ from .cutting import CutMesh, IntArray, cut_along_rays
 from .volume import BSplineVolume
 
 _NEAR_EDGE = 1e-5  # parameters closer than this to an edge of the cube are put on it: no slivers from the cut
+_SAME = (
+    1e-7  # share of a mesh edge: cuts this close to a vertex take the vertex, which _NEAR_EDGE then puts on the edge
+)
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
 _SWEEPS = 600
 _PATIENCE = 60
@@ -28,7 +31,7 @@ def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parame
     smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
     """
     placed = _snap(_untangle(_snap(parameters), faces))
-    cut = cut_along_rays(placed, faces, 0.0)
+    cut = cut_along_rays(placed, faces, _SAME)
     spread = _snap(cut.carry(placed))
     spread[: len(placed)] = placed
     plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
@@ -39,13 +42,12 @@ def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parame
 def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameters: Array) -> BoundaryMap:
     """Move each cut vertex along its mesh edge and its parameter along the cube's edge until F(p) is close to it.
 
-    Gauss-Newton in those two unknowns; corners of the cube keep their parameter. Steps that turn a triangle are undone.
+    Gauss-Newton in those two unknowns; corners of the cube and cuts within a face keep their parameter. Steps that turn a triangle are undone.
     """
     n = len(vertices)
     new = np.arange(n, len(parameters))
-    inner = (parameters[new] > 0.0) & (
-        parameters[new] < 1.0
-    )  # (k, 3), at most one True a row: the cube edge's direction
+    inner = (parameters[new] > 0.0) & (parameters[new] < 1.0)  # (k, 3)
+    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; ends of cuts within a face stay
     best = BoundaryMap(cut.carry(vertices), parameters, cut.faces)
     for _ in range(_SETTLE_STEPS):
         where, carried = best.parameters[new], best.vertices

@@ -1,7 +1,7 @@
 """Cutting a surface that surrounds the cube's centre along the rays through the cube's 12 edges.
 
 Each edge of the cube spans, with the centre, a half plane where two coordinates (counted from the centre) are equal in
-size and no smaller than the third. Splitting every mesh edge that crosses such a half plane puts mesh vertices and
+size and no smaller than the third. Splitting the triangles that such a half plane crosses puts mesh vertices and
 edges on it; seen from the centre the mesh then resolves the 12 edges and 8 corners of the cube.
 """
 
@@ -16,7 +16,6 @@ from .bspline import Array
 
 IntArray = NDArray[np.int64]
 _PLANES = [(a, b, sign) for a, b in ((0, 1), (0, 2), (1, 2)) for sign in (1.0, -1.0)]
-_SECTOR_SLACK = 1.25  # cut a little past the corners, so that a triangle around a corner is split by all three planes
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,16 +81,25 @@ def mesh_edges(faces: IntArray) -> IntArray:
 def _crossings(
     height: Array, position: Array, faces: IntArray, axes: tuple[int, int, int], snap: float
 ) -> tuple[IntArray, Array]:
-    """Mesh edges (k, 2) that cross the plane within the half planes of cube edges, and where (k,)."""
-    edges = mesh_edges(faces)
-    start, end = height[edges[:, 0]], height[edges[:, 1]]
-    crossing = start * end < 0.0
-    edges, start, end = edges[crossing], start[crossing], end[crossing]
-    where = start / (start - end)
-    point = (1.0 - where)[:, None] * position[edges[:, 0]] + where[:, None] * position[edges[:, 1]]
-    a, _, c = axes
-    keep = (where > snap) & (where < 1.0 - snap) & (np.abs(point[:, c]) <= _SECTOR_SLACK * np.abs(point[:, a]))
-    return edges[keep], where[keep]
+    """Mesh edges (k, 2) to split at the plane, and where (k,): of triangles that a cube edge's half plane crosses.
+
+    A triangle meets the plane in a segment. It is left whole only where that segment stays beyond one of the cube's
+    corners; so, after all planes, no half plane passes through the inside of a triangle.
+    """
+    level = height[faces]
+    sides = faces[(level.min(axis=1) < 0.0) & (level.max(axis=1) > 0.0)][:, [[0, 1], [1, 2], [2, 0]]]  # (k, 3, 2)
+    sides.sort(axis=2)
+    start, end = height[sides[:, :, 0]], height[sides[:, :, 1]]
+    crossing = start * end < 0.0  # (k, 3)
+    where = np.where(crossing, start, 0.0) / np.where(crossing, start - end, 1.0)
+    where[end == 0.0] = 1.0
+    point = position[sides[:, :, 0]] + where[..., None] * (position[sides[:, :, 1]] - position[sides[:, :, 0]])
+    meets = crossing | (start == 0.0) | (end == 0.0)
+    size, third = np.abs(point[..., axes[0]]), point[..., axes[2]]
+    above, below = (meets & (third > -size)).any(axis=1), (meets & (third < size)).any(axis=1)
+    split = crossing & (above & below)[:, None] & (where > snap) & (where < 1.0 - snap)
+    edges, first = np.unique(sides[split], axis=0, return_index=True)
+    return edges, where[split][first]
 
 
 def split_edges(faces: IntArray, edges: IntArray, first_new: int) -> IntArray:

@@ -29,7 +29,7 @@ def closest_rotation(j: Tensor, iterations: int = 7) -> Tensor:
 
     Scaled Newton steps R <- (g R + R^-T / g) / 2 (Higham 1986) where det J is safely positive, in single precision
     but for the last step. Elsewhere Newton would end at a reflection or divide by zero; those few are done by SVD with
-    the smallest direction flipped.
+    the smallest direction flipped. A matrix that is not finite gets some rotation: the energy made of both tells.
     """
     size = j.square().sum(dim=(0, 1)).sqrt().clamp_min(torch.finfo(j.dtype).tiny)
     regular = determinant(j) > 1e-3 * size**3
@@ -45,7 +45,7 @@ def closest_rotation(j: Tensor, iterations: int = 7) -> Tensor:
         r = (cofactor(r) / determinant(r)).add_(r).mul_(0.5)
     if not bool(regular.all()):
         rest = ~regular
-        r[:, :, rest] = _rotation_by_svd(j[:, :, rest])
+        r[:, :, rest] = _rotation_by_svd(torch.nan_to_num(j[:, :, rest], 0.0, 0.0, 0.0))
     return r
 
 

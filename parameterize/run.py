@@ -90,6 +90,7 @@ def parameterize(
     progress = progress or ignore
     history, seconds = History(), dict[str, float]()
     spline = config.spline
+    knots = (open_uniform_knots(spline.control_points, spline.degree),) * 3
     longest = 1.0 / (spline.control_points - spline.degree)  # a span's length: no triangle larger than that
     vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
     options: dict[str, Any] = {"history": history, "progress": progress, "checkpoints": checkpoints}
@@ -97,7 +98,6 @@ def parameterize(
         trainer = Trainer(vertices, faces, config, seed=seed, device=place, dtype=dtype, given_corners=given, **options)
         trained = trainer.run()
     with _timed(seconds, "fit"):
-        knots = (open_uniform_knots(spline.control_points, spline.degree),) * 3
         fit = _surface_fit(trained, vertices, faces, spline, knots, place, dtype)
         control = _first_spline(trained, fit, vertices, faces, spline, place, dtype)
     with _timed(seconds, "optimize"):
