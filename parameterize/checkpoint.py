@@ -14,6 +14,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 FORMAT = 1
+NAMES = ("training", "spline")
 
 
 class CheckpointError(ValueError):
@@ -24,15 +25,15 @@ class Checkpoints:
     """The checkpoint files of one run in one folder.
 
     identity: what must be equal for a checkpoint to be continued (surface, options, seed, device); plain JSON values.
-    folder None keeps nothing; `resume` False ignores what is there.
+    folder None keeps nothing; `resume` False removes the checkpoints (NAMES) that are there.
     """
 
     def __init__(self, folder: Path | None, identity: Mapping[str, Any], *, resume: bool) -> None:
         self._folder, self._resume = folder, resume
         self._identity = json.dumps({"format": FORMAT, **identity}, sort_keys=True)
         if folder is not None and not resume:
-            for path in folder.glob("*.safetensors"):
-                path.unlink()
+            for name in NAMES:
+                (folder / f"{name}.safetensors").unlink(missing_ok=True)
 
     def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:
         """Write checkpoint `name`, replacing an older one."""
@@ -58,7 +59,8 @@ class Checkpoints:
         try:
             with safe_open(path, framework="pt") as file:
                 header = file.metadata() or {}
-                tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - not a mapping
+                # copies lie aligned in memory as in the first run; sums over tensors within the file round differently
+                tensors = {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118 - not a mapping
             found, state = json.loads(header["identity"]), json.loads(header["state"])
         except (SafetensorError, OSError, KeyError, ValueError) as error:
             raise CheckpointError(f"{path}: not a readable checkpoint ({error}); run without --resume") from None

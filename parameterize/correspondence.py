@@ -42,7 +42,8 @@ def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parame
 def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameters: Array) -> BoundaryMap:
     """Move each cut vertex along its mesh edge and its parameter along the cube's edge until F(p) is close to it.
 
-    Gauss-Newton in those two unknowns; corners of the cube and cuts within a face keep their parameter. Steps that turn a triangle are undone.
+    Gauss-Newton in those two unknowns; corners of the cube and cuts within a face keep their parameter. Steps that turn
+    a triangle are undone.
     """
     n = len(vertices)
     new = np.arange(n, len(parameters))
