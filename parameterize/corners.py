@@ -57,12 +57,16 @@ def choose_corners(mapped: Array) -> IntArray:
 def cut_surface(mapped: Array, faces: IntArray, corners: IntArray) -> CubeSurface:
     """Cut the mapped surface (n, 3), close to the cube's boundary, along paths between its eight corners.
 
-    Raises PathError where the paths do not bound six discs, which happens only far from a cube.
+    Raises PathError where the paths do not bound six discs, which happens only far from a cube, or where the corners
+    come in the order of a mirrored cube.
     """
     cut = cut_along_rays(mapped, faces, _SNAP)
     position = cut.carry(mapped)
     paths = _trace_paths(position, cut.faces, corners)
-    return CubeSurface(cut, corners, paths, _patches(cut.faces, paths, corners))
+    labels = _patches(cut.faces, paths, corners)
+    if _mirrored(cut.faces, labels, paths[0]):
+        raise PathError("the corners are those of a mirrored cube: swap corners 0-3 with 4-7, or let them be chosen")
+    return CubeSurface(cut, corners, paths, labels)
 
 
 def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
@@ -138,6 +142,13 @@ def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntAr
     if len(set(labels.tolist())) != 6:
         raise PathError("two patches belong to the same face of the cube")
     return np.asarray(labels[patch], dtype=np.int64)
+
+
+def _mirrored(faces: IntArray, labels: IntArray, path: IntArray) -> bool:
+    """Whether the face to the left of the path from corner (0,0,0) to (0,0,1), seen from outside, is not u0."""
+    sides = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    left = np.flatnonzero((sides == path[:2]).all(axis=1))[0] // 3
+    return bool(labels[left] != 0)
 
 
 def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array, IntArray]:

@@ -41,7 +41,7 @@ def fit_pairs(
 
     right = (transposed @ torch.as_tensor(points, **kind)).T.reshape(shape)  # type: ignore[arg-type]
     control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
-    return control
+    return control.contiguous()  # components first also in memory, as a checkpoint gives them back
 
 
 def _collocation_3d(parameters: Array, knots: tuple[Array, Array, Array], degree: int) -> csr_array:

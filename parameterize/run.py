@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -75,7 +76,7 @@ def parameterize(
     Raises ValueError for bad corners or a device that is not there, CheckpointError for a checkpoint of another run,
     PathError where the training stays too far from a cube for its edges to be found.
     """
-    config = config or preset("fast")
+    config, seed = config or preset("fast"), operator.index(seed)
     place = choose_device(device)
     given = None if corners is None else corner_vertices(surface, corners)
     identity = {
@@ -127,6 +128,8 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     """
     given = np.asarray(corners)
     if given.shape == (8, 3):
+        if not np.all(np.isfinite(given.astype(np.float64))):
+            raise ValueError("corners: the coordinates must be finite")
         gaps = np.linalg.norm(surface.vertices[:, None] - given.astype(np.float64), axis=2)
         numbers = gaps.argmin(axis=0)
     elif given.shape == (8,) and given.dtype.kind in "iu":

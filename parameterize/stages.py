@@ -105,7 +105,7 @@ class Trainer:
         progress: ProgressCallback = ignore,
         checkpoints: Checkpoints | None = None,
     ) -> None:
-        torch.manual_seed(seed)
+        torch.manual_seed(seed % 2**63)
         self.config, self.seed, self.device, self.dtype = config, seed, device, dtype
         self.vertices, self.faces = vertices, faces
         self.corners = given_corners
@@ -197,7 +197,7 @@ class Trainer:
 
     def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: torch.optim.Adam) -> None:
         """One Adam step; nothing of the state changes before the loss is known."""
-        self.generator.manual_seed(1_000_003 * self.seed + 100_003 * run.number + run.step)
+        self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
         optimizer.zero_grad(set_to_none=True)
         loss, folded, terms = self._loss(stage, boundary)
         loss.backward()  # type: ignore[no-untyped-call]
