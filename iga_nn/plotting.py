@@ -108,6 +108,7 @@ def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
         upper.plot(steps, _positive(history[name]), linewidth=0.8, alpha=0.8, label=name)
     upper.plot(steps, _positive(history["loss"]), color="black", linewidth=1.4, label="loss")
     upper.set_yscale("log")
+    upper.set_ylim(bottom=max(upper.get_ylim()[0], 1e-8 * float(np.nanmax(history["loss"]))))  # terms start at zero
     upper.set_ylabel("loss, and its terms without their weights")
     upper.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     lower.plot(steps, history["folded"], color="firebrick", linewidth=1.0)
@@ -194,6 +195,8 @@ def _write_numbers(panel: Any, solution: Solution) -> None:
     norms = [("L2 error", report.l2), ("relative", report.l2_relative), ("H1 seminorm", report.h1_seminorm)]
     lines = [f"{report.dofs:,} unknowns".replace(",", " ")]
     lines += [f"{name} {value:.3e}" for name, value in norms if value is not None]
+    if not report.converged:
+        lines.append("NOT CONVERGED")
     panel.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", fontsize=14, linespacing=1.8)
 
 
