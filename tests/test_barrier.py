@@ -1,0 +1,77 @@
+import numpy as np
+import pytest
+import torch
+
+from parameterize.barrier import SpanBarrier, edge_spans
+from parameterize.bspline import greville, open_uniform_knots
+from parameterize.certificate import bernstein_coefficients
+from parameterize.volume import BSplineVolume
+
+CPU = torch.device("cpu")
+
+
+def setting(degree, amplitude, seed=0, n=(6, 5, 7)):
+    knots = tuple(open_uniform_knots(m, degree) for m in n)
+    rows = [greville(k, degree) for k in knots]
+    points = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1)
+    points = points + amplitude * np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape)
+    return knots, torch.as_tensor(np.moveaxis(points, -1, 0).copy()), BSplineVolume((degree,) * 3, knots, points)
+
+
+def all_spans(volume):
+    return np.indices([len(np.unique(k)) - 1 for k in volume.knots]).reshape(3, -1).T
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_energy_is_the_shortfall_of_the_certificates_coefficients(degree):
+    knots, control, volume = setting(degree, 0.1)
+    barrier = SpanBarrier(knots, degree, 0.8, device=CPU)
+    spans = all_spans(volume)
+    chosen = spans[::3]
+    barrier.activate(chosen)
+    energy, _ = barrier.energy_and_gradient(control)
+    coefficients = bernstein_coefficients(volume, chosen)
+    expected = (np.maximum(0.8 - coefficients, 0.0) ** 2).mean(axis=(1, 2, 3)).sum() / len(spans)
+    assert expected > 1e-4
+    assert energy == pytest.approx(expected, rel=1e-9)
+
+
+def test_gradient_against_finite_differences():
+    knots, control, volume = setting(3, 0.08)
+    barrier = SpanBarrier(knots, 3, 0.8, device=CPU)
+    barrier.activate(all_spans(volume))
+    _, gradient = barrier.energy_and_gradient(control)
+    for seed in range(3):
+        direction = torch.randn(control.shape, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+        h = 1e-6
+        ahead, behind = (barrier.energy_and_gradient(control + s * h * direction)[0] for s in (1.0, -1.0))
+        assert float((gradient * direction).sum()) == pytest.approx((ahead - behind) / (2.0 * h), rel=1e-5)
+
+
+def test_nothing_to_pay_above_the_floor_or_without_spans():
+    knots, control, volume = setting(3, 0.0)
+    barrier = SpanBarrier(knots, 3, 0.5, device=CPU)
+    for spans in (np.zeros((0, 3), dtype=np.int64), all_spans(volume)):
+        barrier.activate(spans)
+        energy, gradient = barrier.energy_and_gradient(control)
+        assert energy == 0.0 and float(gradient.abs().max()) == 0.0
+
+
+def test_activating_twice_counts_once():
+    knots, control, volume = setting(3, 0.1)
+    once, twice = (SpanBarrier(knots, 3, 0.8, device=CPU) for _ in range(2))
+    spans = all_spans(volume)
+    once.activate(spans)
+    twice.activate(spans[:30])
+    twice.activate(spans[10:])
+    twice.activate(np.zeros((0, 3), dtype=np.int64))
+    assert np.array_equal(once.active, twice.active)
+    assert once.energy_and_gradient(control)[0] == twice.energy_and_gradient(control)[0]
+
+
+def test_edge_spans():
+    spans = edge_spans((4, 5, 6))
+    assert len(spans) == len(np.unique(spans, axis=0)) == 4 * (2 + 3 + 4) + 8
+    assert [0, 2, 0] in spans.tolist() and [3, 4, 2] in spans.tolist()
+    assert [0, 2, 2] not in spans.tolist() and [1, 1, 1] not in spans.tolist()
+    assert len(edge_spans((2, 2, 2))) == 8 and len(edge_spans((1, 1, 1))) == 1

@@ -1,0 +1,67 @@
+import pytest
+import torch
+
+from parameterize.checkpoint import CheckpointError, Checkpoints
+
+IDENTITY = {"surface": "abc", "seed": 0, "config": {"steps": [1, 2]}}
+
+
+def test_what_was_saved_comes_back(tmp_path):
+    x = torch.randn(4, 3, dtype=torch.float64)
+    tensors = {
+        "a": x,
+        "same": x,
+        "view": x[:2],
+        "turned": x.T,
+        "number": torch.tensor([1, 2]),
+        "step": torch.tensor(3.0),
+    }
+    state = {"step": 7, "loss": 0.1 + 0.2, "key": [float("inf"), 1.0], "corners": None}
+    Checkpoints(tmp_path, IDENTITY, resume=False).save("training", tensors, state)
+    found, back = Checkpoints(tmp_path, IDENTITY, resume=True).load("training")
+    assert back == state
+    assert found.keys() == tensors.keys()
+    assert all(v.data_ptr() % 64 == 0 for v in found.values())  # as new tensors are: the same rounding after a resume
+    assert all(torch.equal(found[k], v) and found[k].dtype == v.dtype for k, v in tensors.items())
+
+
+def test_the_latest_replaces_and_leaves_no_other_file(tmp_path):
+    checkpoints = Checkpoints(tmp_path / "new" / "folder", IDENTITY, resume=True)
+    assert checkpoints.load("training") is None
+    for step in range(3):
+        checkpoints.save("training", {"x": torch.tensor([step])}, {"step": step})
+    assert checkpoints.load("training")[1] == {"step": 2}
+    assert [p.name for p in (tmp_path / "new" / "folder").iterdir()] == ["training.safetensors"]
+
+
+def test_without_a_folder_nothing_is_kept():
+    checkpoints = Checkpoints(None, IDENTITY, resume=True)
+    checkpoints.save("training", {"x": torch.zeros(1)}, {})
+    assert checkpoints.load("training") is None
+
+
+@pytest.mark.parametrize("name", ["surface", "seed", "config"])
+def test_another_run_is_refused_and_the_difference_named(tmp_path, name):
+    Checkpoints(tmp_path, IDENTITY, resume=False).save("training", {"x": torch.zeros(1)}, {})
+    other = Checkpoints(tmp_path, IDENTITY | {name: "other"}, resume=True)
+    with pytest.raises(CheckpointError, match=rf"\({name} differ\)"):
+        other.load("training")
+
+
+def test_a_broken_file_is_refused(tmp_path):
+    checkpoints = Checkpoints(tmp_path, IDENTITY, resume=True)
+    checkpoints.save("training", {"x": torch.zeros(100)}, {})
+    path = tmp_path / "training.safetensors"
+    whole = path.read_bytes()
+    for content in (b"", b"nonsense", whole[: len(whole) // 2]):
+        path.write_bytes(content)
+        with pytest.raises(CheckpointError, match="not a readable checkpoint"):
+            checkpoints.load("training")
+
+
+def test_a_fresh_run_removes_its_old_checkpoints_and_nothing_else(tmp_path):
+    Checkpoints(tmp_path, IDENTITY, resume=False).save("spline", {"x": torch.zeros(1)}, {})
+    (tmp_path / "weights.safetensors").write_bytes(b"somebody's")
+    Checkpoints(tmp_path, IDENTITY, resume=False)
+    assert [p.name for p in tmp_path.iterdir()] == ["weights.safetensors"]
+    assert Checkpoints(tmp_path, IDENTITY, resume=True).load("spline") is None

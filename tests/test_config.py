@@ -1,0 +1,43 @@
+import json
+from dataclasses import asdict
+
+import pytest
+
+from parameterize.config import PRESETS, preset
+
+
+@pytest.mark.parametrize("name", sorted(PRESETS))
+def test_presets_follow_the_papers_stages(name):
+    config = preset(name)
+    assert config.name == name
+    assert [s.name for s in config.stages] == ["S(2)", "S(1)", "cube", "corners", "edges"]
+    assert [s.weights.cor > 0.0 for s in config.stages] == [False, False, False, True, True]
+    assert [s.weights.edge > 0.0 for s in config.stages] == [False, False, False, False, True]
+    assert json.loads(json.dumps(asdict(config)))["spline"]["control_points"] == 30
+
+
+def test_unknown_preset_names_the_choices():
+    with pytest.raises(ValueError, match="'quick'.*fast, paper"):
+        preset("quick")
+
+
+def test_scaled_changes_the_number_of_steps_alone():
+    config = preset("fast")
+    half = config.scaled(0.5)
+    assert [s.steps for s in half.stages] == [round(0.5 * s.steps) for s in config.stages]
+    assert half.spline.steps == round(0.5 * config.spline.steps)
+    assert half.train == config.train and half.spline.penalties == config.spline.penalties
+    shortest = config.scaled(1e-9)
+    assert {s.steps for s in shortest.stages} == {1} and shortest.spline.steps == 1
+    assert config.scaled(1.0) == config
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, float("nan")])
+def test_scaled_refuses_factors_that_are_not_positive(factor):
+    with pytest.raises(ValueError, match="factor"):
+        preset("fast").scaled(factor)
+
+
+def test_with_control_points():
+    config = preset("fast").with_control_points(12)
+    assert config.spline.control_points == 12 and config.stages == preset("fast").stages

@@ -1,0 +1,51 @@
+import pytest
+import torch
+
+from parameterize.config import NetworkConfig
+from parameterize.network import InverseMap, ResidualModule
+
+SMALL = NetworkConfig(width=16, modules=2, frequencies=3)
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_untrained_network_is_the_identity_exactly(dtype):
+    torch.manual_seed(0)
+    network = InverseMap(SMALL).to(dtype)
+    points = torch.rand(50, 3, dtype=dtype) * 3.0 - 1.0
+    assert torch.equal(network(points), points)
+
+
+def test_identity_network_still_has_a_gradient_to_leave_it():
+    torch.manual_seed(0)
+    network = InverseMap(SMALL)
+    points = torch.rand(50, 3)
+    (network(points) - 2.0 * points).square().sum().backward()
+    assert float(network.last.weight.grad.abs().max()) > 0.0
+
+
+def test_encoding_by_hand():
+    network = InverseMap(NetworkConfig(width=4, modules=1, frequencies=2)).double()
+    with torch.no_grad():
+        network.scale.fill_(1.5)
+    x = torch.tensor([[0.1, 0.2, 0.7]], dtype=torch.float64)
+    encoded = network.encode(x)
+    expected = [x]
+    for n in (1, 2):
+        phase = 1.5 * n * x
+        expected += [torch.sin(phase) / (1.5 * n), torch.cos(phase) / (1.5 * n)]
+    assert encoded.shape == (1, 6 * 2 + 3)
+    assert torch.equal(encoded.sort().values, torch.cat(expected, dim=1).sort().values)
+    assert torch.allclose(encoded, torch.cat(expected, dim=1), atol=1e-15)
+
+
+def test_residual_module_adds_to_its_input():
+    module = ResidualModule(5)
+    x = torch.randn(4, 5)
+    assert torch.equal(module(x), x + torch.relu(x @ module.linear.weight.T + module.linear.bias))
+
+
+def test_shape_follows_the_options():
+    network = InverseMap(SMALL)
+    assert network.first.in_features == 6 * 3 + 3 and network.first.out_features == 16
+    assert len(network.residual) == 2
+    assert "multiples" in network.state_dict() and "scale" in dict(network.named_parameters())

@@ -1,0 +1,159 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from shapes import rounded_cube, turned
+
+from parameterize.bspline import gauss_points, greville, open_uniform_knots
+from parameterize.certificate import certify
+from parameterize.checkpoint import Checkpoints
+from parameterize.config import SplineConfig
+from parameterize.optimize import LBFGS, Distortion, SplineEnergy, optimize
+from parameterize.quality import arap
+from parameterize.stages import History
+from parameterize.surface_fit import SurfaceFit, vertex_quadrics, vertex_weights
+from parameterize.volume import BSplineVolume
+
+CPU = torch.device("cpu")
+CONFIG = SplineConfig(control_points=7, steps=5, penalties=(20.0, 100.0, 500.0, 2500.0, 2500.0, 2500.0))
+KNOTS = (open_uniform_knots(7, 3),) * 3
+
+
+def wavy_control(amplitude, seed=0):
+    row = greville(KNOTS[0], 3)
+    points = np.stack(np.meshgrid(row, row, row, indexing="ij"))
+    return torch.as_tensor(points + amplitude * np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape))
+
+
+def as_volume(control):
+    return BSplineVolume((3,) * 3, KNOTS, control.permute(1, 2, 3, 0).numpy())
+
+
+def surface_fit():
+    """A rounded cube, slightly turned, whose parameters are the radial projection."""
+    points, faces = rounded_cube(300, power=12.0)
+    centred = points - 0.5
+    axis = np.abs(centred).argmax(axis=1)
+    size = np.abs(centred).max(axis=1, keepdims=True)
+    cube_faces = 2 * axis + (centred[np.arange(len(points)), axis] > 0.0)
+    vertices = turned(points)
+    quadrics, weights = vertex_quadrics(vertices, faces, CONFIG.tangential), vertex_weights(vertices, faces)
+    return SurfaceFit(
+        KNOTS, 3, vertices, quadrics, weights, 0.5 + centred / (2.0 * size), cube_faces.astype(np.int64), device=CPU
+    )
+
+
+def mean_arap(volume, n_gauss=3):
+    points, weights = zip(*(gauss_points(k, n_gauss) for k in volume.knots), strict=True)
+    jacobians = volume.grid_jacobian(*(p.ravel() for p in points))
+    return float(np.einsum("i,j,k,ijk->", *(w.ravel() for w in weights), arap(jacobians)))
+
+
+def test_distortion_is_the_quadrature_of_the_arap_energy():
+    control = wavy_control(0.02)
+    energy, _, folded = Distortion(KNOTS, CONFIG, device=CPU).energy_and_gradient(control, penalty=0.0)
+    assert energy == pytest.approx(mean_arap(as_volume(control), CONFIG.gauss), rel=1e-9)
+    assert folded == 0
+
+
+def test_folded_points_are_counted():
+    control = wavy_control(0.0)
+    control[0] *= -1.0
+    _, _, folded = Distortion(KNOTS, CONFIG, device=CPU).energy_and_gradient(control, penalty=1.0)
+    assert folded == (4 * CONFIG.gauss) ** 3
+
+
+@pytest.mark.parametrize("amplitude", [0.02, 0.12])
+def test_gradients_against_finite_differences(amplitude):
+    control = wavy_control(amplitude)
+    energy = SplineEnergy(CONFIG, KNOTS, surface_fit(), device=CPU)
+    energy.barrier.activate(np.indices((4, 4, 4)).reshape(3, -1).T)
+    _, inner, _ = energy.volume_part(control)
+    _, outer = energy.surface_part(control)
+    for seed in range(3):
+        direction = torch.randn(control.shape, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+        h = 1e-6
+        moved = [
+            (energy.volume_part(c)[0], energy.surface_part(c)[0])
+            for c in (control + h * direction, control - h * direction)
+        ]
+        slopes = [(a - b) / (2.0 * h) for a, b in zip(*moved, strict=True)]
+        assert float((inner * direction).sum()) == pytest.approx(slopes[0], rel=1e-4)
+        assert float((outer * direction).sum()) == pytest.approx(slopes[1], rel=1e-4)
+
+
+def test_newton_direction_undoes_a_step_of_the_quadratic_part():
+    energy = SplineEnergy(CONFIG, KNOTS, surface_fit(), device=CPU)
+    step = wavy_control(0.1, seed=3) - wavy_control(0.0)
+    image = energy._smooth(step) + CONFIG.vertex * energy.surface.hessian_product(step)
+    found = energy.newton_direction(image)
+    gap = energy._smooth(found - step) + CONFIG.vertex * energy.surface.hessian_product(found - step)
+    assert float(gap.norm()) <= 1.1e-2 * float(image.norm())
+
+
+class _Quadratic:
+    """Stands in for the energy: 1/2 x^T A x with a poor initial inverse Hessian."""
+
+    def newton_direction(self, right):
+        return 0.1 * right
+
+
+def test_lbfgs_finds_the_minimum_of_a_quadratic():
+    matrix = torch.diag(torch.tensor([1.0, 3.0, 7.0, 9.0], dtype=torch.float64))
+    x, lbfgs = torch.ones(4, dtype=torch.float64), LBFGS(8)
+    for _ in range(12):
+        gradient = matrix @ x
+        direction = lbfgs.direction(gradient, _Quadratic())
+        length = -float(gradient @ direction) / float(direction @ matrix @ direction)
+        lbfgs.remember(length * direction, length * (matrix @ direction))
+        x = x + length * direction
+    assert float(x.norm()) < 1e-6
+    lbfgs.remember(torch.ones(4), -torch.ones(4))  # negative curvature is not kept
+    assert lbfgs.direction(matrix @ torch.ones(4, dtype=torch.float64), _Quadratic()).shape == (4,)
+
+
+def optimise_from(control, config=CONFIG, **options):
+    history = History()
+    return optimize(control, KNOTS, surface_fit(), config, history=history, **options), history.arrays()
+
+
+def test_an_easy_shape_ends_certified_with_less_distortion():
+    start = wavy_control(0.08)
+    fit = surface_fit()
+    before = np.linalg.norm(fit.residuals(start), axis=1).mean()
+    history = History()
+    found = optimize(start, KNOTS, fit, CONFIG, history=history)
+    assert found.certificate.verdict == "certified"
+    volume = as_volume(found.control)
+    assert certify(volume).verdict == "certified"
+    assert mean_arap(volume) < 0.6 * mean_arap(as_volume(start))
+    assert np.linalg.norm(fit.residuals(found.control), axis=1).mean() < 0.5 * before
+    first = history.arrays()["loss"][: CONFIG.steps]
+    assert set(history.arrays()["stage"]) == {"spline"} and (np.diff(first) < 0.0).all()
+
+
+def test_a_folded_start_is_unfolded():
+    start = wavy_control(0.0)
+    start[:, 3, 3, 3] += torch.tensor([1.5, 0.3, 0.1])  # the middle control point, past its neighbours
+    assert certify(as_volume(start)).verdict == "folded"
+    found, _ = optimise_from(start)
+    assert found.certificate.verdict == "certified"
+    assert mean_arap(as_volume(found.control)) < mean_arap(as_volume(start))
+
+
+def test_interrupted_between_rounds_goes_on_to_the_same_result(tmp_path):
+    start = wavy_control(0.15, seed=1)
+    config = replace(CONFIG, steps=2, penalties=(20.0, 100.0, 500.0))
+    whole, columns = optimise_from(start, config)
+    assert len(columns["step"]) > 2 * config.steps  # more than two rounds
+
+    def interrupt(state):
+        if state.step == 2 * config.steps - 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        optimise_from(start, config, progress=interrupt, checkpoints=Checkpoints(tmp_path, {}, resume=False))
+    resumed, again = optimise_from(start, config, checkpoints=Checkpoints(tmp_path, {}, resume=True))
+    assert torch.equal(resumed.control, whole.control)
+    assert np.array_equal(again["loss"], columns["loss"]) and np.array_equal(again["step"], columns["step"])

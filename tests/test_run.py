@@ -1,0 +1,214 @@
+"""The whole way on a small surface, with options that take about a second."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from shapes import rounded_cube, turned
+
+from parameterize.boundary import BoundaryMap
+from parameterize.certificate import certify
+from parameterize.checkpoint import CheckpointError
+from parameterize.config import NetworkConfig, preset
+from parameterize.corners import CORNERS
+from parameterize.mesh import surface_from_arrays
+from parameterize.run import choose_device, corner_vertices, parameterize
+
+STEPS = (6, 4, 8, 4, 8)
+
+
+def tiny_config():
+    config = preset("fast")
+    return replace(
+        config,
+        network=NetworkConfig(width=16, modules=1, frequencies=3),
+        train=replace(config.train, cell=0.2, triangles=200),
+        stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
+        spline=replace(config.spline, control_points=6, fit_cell=0.1, steps=3, penalties=(20.0, 500.0)),
+    )
+
+
+def small_surface(stretch=2.0):
+    points, faces = rounded_cube(200, power=5.0)
+    return surface_from_arrays(stretch * turned(points) + [10.0, 0.0, -3.0], faces, "pillow")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return small_surface()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(surface):
+    return parameterize(surface, tiny_config(), seed=3, device="cpu")
+
+
+def same_result(first, second):
+    assert np.array_equal(first.volume.control_points, second.volume.control_points)
+    assert np.array_equal(first.boundary.parameters, second.boundary.parameters)
+    assert first.history.keys() == second.history.keys()
+    for name, column in first.history.items():
+        assert np.array_equal(column, second.history[name], equal_nan=column.dtype.kind == "f"), name
+
+
+def test_end_to_end(surface, undisturbed):
+    result, n = undisturbed, len(surface.vertices)
+    assert result.volume.shape == (6, 6, 6) and result.volume.degrees == (3, 3, 3)
+    assert certify(result.volume).verdict == result.certificate.verdict
+    assert np.array_equal(result.boundary.vertices[:n], surface.vertices)
+    gaps = np.linalg.norm(result.volume(result.boundary.parameters[:n]) - surface.vertices, axis=1)
+    assert np.sqrt((gaps**2).mean()) < 0.1  # of a body two units wide
+    assert result.certificate.mean_det == pytest.approx(surface.volume * surface.scale**3, rel=0.1)
+    assert result.device == "cpu" and result.seed == 3 and result.config == tiny_config()
+    assert set(result.seconds) == {"train", "fit", "optimize", "certify"}
+    assert isinstance(result.boundary, BoundaryMap) and len(result.boundary.cube_faces) == len(result.boundary.faces)
+
+
+def test_history_has_a_row_a_step(undisturbed):
+    stages, counts = np.unique(undisturbed.history["stage"], return_counts=True)
+    found = dict(zip(stages.tolist(), counts.tolist(), strict=True))
+    assert [found[s.name] for s in tiny_config().stages] == list(STEPS)
+    assert 0 < found["spline"] <= 6
+    lengths = {len(column) for column in undisturbed.history.values()}
+    assert lengths == {sum(STEPS) + found["spline"]}
+    edges = undisturbed.history["stage"] == "edges"
+    assert np.isfinite(undisturbed.history["edge"][edges]).all()
+    assert np.isnan(undisturbed.history["edge"][undisturbed.history["stage"] == "cube"]).all()
+
+
+def test_same_seed_same_volume_and_another_seed_another(surface, undisturbed):
+    same_result(undisturbed, parameterize(surface, tiny_config(), seed=np.int64(3), device="cpu"))
+    other = parameterize(surface, tiny_config(), seed=4, device="cpu")
+    assert not np.array_equal(other.volume.control_points, undisturbed.volume.control_points)
+
+
+@pytest.mark.parametrize(("stage", "step"), [("S(2)", 1), ("cube", 8), ("edges", 5), ("spline", 5)])
+def test_interrupted_and_resumed_is_undisturbed(surface, undisturbed, tmp_path, stage, step):
+    def interrupt(state):
+        if (state.stage, state.step) == (stage, step):
+            raise KeyboardInterrupt
+
+    options = {"seed": 3, "device": "cpu", "checkpoint_dir": tmp_path}
+    with pytest.raises(KeyboardInterrupt):
+        parameterize(surface, tiny_config(), progress=interrupt, **options)
+    steps = []
+    resumed = parameterize(
+        surface, tiny_config(), progress=lambda s: steps.append((s.stage, s.step)), resume=True, **options
+    )
+    same_result(undisturbed, resumed)
+    assert ("S(2)", 1) not in steps  # it did go on, not start again
+
+
+def test_progress_tells_every_step(surface, tmp_path):
+    seen = []
+
+    def stop_after_training(state):
+        seen.append(state)
+        if state.stage == "spline":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        parameterize(surface, tiny_config(), device="cpu", progress=stop_after_training)
+    training = seen[:-1]
+    assert [(s.stage, s.step) for s in training] == [
+        (stage.name, k + 1) for stage in tiny_config().stages for k in range(stage.steps)
+    ]
+    assert all(s.seconds_left >= 0.0 and np.isfinite(s.loss) and s.folded >= 0 for s in seen)
+
+
+def test_checkpoint_of_another_run_is_refused(surface, tmp_path):
+    def interrupt(state):
+        raise KeyboardInterrupt
+
+    config = tiny_config()
+    with pytest.raises(KeyboardInterrupt):
+        parameterize(surface, config, device="cpu", progress=interrupt, checkpoint_dir=tmp_path)
+
+    def resume(mesh=surface, options=config, **more):
+        parameterize(mesh, options, device="cpu", checkpoint_dir=tmp_path, resume=True, **more)
+
+    with pytest.raises(CheckpointError, match=r"\(surface differ"):
+        resume(small_surface(3.0))
+    with pytest.raises(CheckpointError, match=r"\(config differ"):
+        resume(options=config.scaled(2.0))
+    with pytest.raises(CheckpointError, match=r"\(seed differ"):
+        resume(seed=1)
+    with pytest.raises(CheckpointError, match=r"\(corners, seed differ"):
+        resume(seed=1, corners=np.arange(8))
+
+
+def test_given_corners_are_honoured(surface):
+    points = 2.0 * turned(0.1 + 0.8 * CORNERS) + [10.0, 0.0, -3.0]
+    rolled = points[[0, 2, 4, 6, 1, 3, 5, 7]]  # (u, v, w) -> (v, w, u): a third of a turn about the diagonal
+    chosen = corner_vertices(surface, rolled)
+    config = tiny_config()
+    steps = (100, 50, 100, 30, 60)
+    config = replace(
+        config,
+        network=NetworkConfig(width=32, modules=2, frequencies=4),
+        train=replace(config.train, learning_rate=3e-3),
+        stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, steps, strict=True)),
+        spline=replace(config.spline, penalties=(20.0,)),
+    )
+    result = parameterize(surface, config, device="cpu", corners=rolled)
+    assert np.linalg.norm(result.boundary.parameters[chosen] - CORNERS, axis=1).max() < 0.2
+    training = result.history["stage"] != "spline"
+    assert np.isfinite(result.history["cor"][training]).all()  # the corners pull from the first stage on
+
+
+def test_bad_corners_are_refused(surface):
+    with pytest.raises(ValueError, match="8 vertex numbers or 8 points"):
+        parameterize(surface, tiny_config(), corners=np.zeros((4, 3)))
+    with pytest.raises(ValueError, match="8 vertex numbers or 8 points"):
+        corner_vertices(surface, np.linspace(0.0, 7.0, 8))
+    with pytest.raises(ValueError, match="between 0 and 199"):
+        corner_vertices(surface, [0, 1, 2, 3, 4, 5, 6, 200])
+    with pytest.raises(ValueError, match="same vertex"):
+        corner_vertices(surface, [0, 1, 2, 3, 4, 5, 6, 6])
+    with pytest.raises(ValueError, match="same vertex"):
+        corner_vertices(surface, np.zeros((8, 3)))
+    with pytest.raises(ValueError, match="finite"):
+        corner_vertices(surface, np.full((8, 3), np.nan))
+
+
+def test_corner_points_take_the_nearest_vertices(surface):
+    points = 2.0 * turned(CORNERS) + [10.0, 0.0, -3.0]
+    gaps = np.linalg.norm(surface.vertices[:, None] - points, axis=2)
+    assert corner_vertices(surface, points).tolist() == gaps.argmin(axis=0).tolist()
+    assert corner_vertices(surface, np.arange(8, dtype=np.int32)).tolist() == list(range(8))
+
+
+def test_devices():
+    with pytest.raises(ValueError, match="'tpu'.*auto, cpu or cuda"):
+        choose_device("tpu")
+    assert choose_device("cpu").type == "cpu"
+    if torch.cuda.is_available():
+        assert choose_device("auto").type == choose_device("cuda").type == "cuda"
+    else:
+        assert choose_device("auto").type == "cpu"
+        with pytest.raises(ValueError, match="no CUDA device"):
+            choose_device("cuda")
+
+
+def test_too_few_control_points_are_refused_at_once(surface):
+    for n in (1, 2, 3):
+        with pytest.raises(ValueError, match="at least 4 control points"):
+            parameterize(surface, tiny_config().with_control_points(n))
+
+
+def test_a_seed_of_any_size_is_taken(surface):
+    def interrupt(state):
+        raise KeyboardInterrupt
+
+    for seed in (0, -1, 2**62):
+        with pytest.raises(KeyboardInterrupt):
+            parameterize(surface, tiny_config(), seed=seed, device="cpu", progress=interrupt)

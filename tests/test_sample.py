@@ -1,0 +1,101 @@
+from itertools import product
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial import cKDTree
+from shapes import ball, rounded_cube
+
+from parameterize.sample import OFFSETS, TriangleSampler, interior_points, lattice, signed_distance, stencils
+
+CELL = 0.1
+CPU = torch.device("cpu")
+
+
+def make_stencils(vertices, faces):
+    return stencils(vertices, faces, CELL, device=CPU, dtype=torch.float64)
+
+
+def test_offsets_are_the_centre_the_axes_and_the_plane_diagonals():
+    sizes = np.count_nonzero(OFFSETS, axis=1)
+    assert sizes.tolist() == [0] + [1] * 6 + [2] * 12
+    assert len(np.unique(OFFSETS, axis=0)) == 19
+
+
+def test_every_stencil_is_its_centre_plus_the_offsets():
+    found = make_stencils(*rounded_cube(300))
+    nodes = found.nodes[found.index]  # (r, 19, 3)
+    assert (nodes - nodes[:, :1]).numpy() == pytest.approx(np.broadcast_to(CELL * OFFSETS, nodes.shape), abs=1e-14)
+    assert len(torch.unique(found.index[:, 0])) == len(found.index)
+    assert len(torch.unique(found.index)) == len(found.nodes)  # no node is computed in vain
+
+
+def test_stencils_cover_the_domain_under_every_shift():
+    vertices, faces = rounded_cube(600)
+    found = make_stencils(vertices, faces)
+    centres = found.nodes[found.index[:, 0]].numpy()
+    points, _ = lattice(vertices, CELL / 3.0, 0.0)
+    points = np.concatenate([points[signed_distance(points, vertices, faces) < 0.0], vertices])
+    for corner in product((-0.5, 0.5), repeat=3):
+        reach, _ = cKDTree(centres + CELL * np.array(corner)).query(points, p=np.inf)
+        assert (reach <= CELL).mean() > 0.999  # a stencil reaches one cell from its centre
+        assert reach.max() < 1.2 * CELL
+    assert signed_distance(centres, vertices, faces).max() < CELL  # and not far beyond the surface
+
+
+def test_shifts_move_all_nodes_together_within_half_a_cell():
+    found = make_stencils(*rounded_cube(300))
+    generator = torch.Generator().manual_seed(0)
+    shifts = []
+    for _ in range(200):
+        shift = found.shifted(generator) - found.nodes
+        assert (shift - shift[0]).abs().max() < 1e-12
+        shifts.append(shift[0])
+    shifts = torch.stack(shifts) / CELL
+    assert shifts.abs().max() <= 0.5 and shifts.min() < -0.4 and shifts.max() > 0.4
+    again = found.shifted(torch.Generator().manual_seed(0)) - found.nodes
+    assert again[0] / CELL == pytest.approx(shifts[0])
+
+
+def test_interior_points_fill_the_volume():
+    vertices, faces = ball(1500)
+    points = interior_points(vertices, faces, 0.1)
+    assert np.linalg.norm(points, axis=1).max() < 1.0
+    assert len(points) * 0.1**3 == pytest.approx(4.0 / 3.0 * np.pi, rel=0.02)
+    assert signed_distance(np.zeros((1, 3)), vertices, faces)[0] == pytest.approx(-1.0, abs=0.01)
+    assert signed_distance(np.array([[0.0, 2.0, 0.0]]), vertices, faces)[0] == pytest.approx(1.0, abs=0.01)
+
+
+def strip(widths):
+    """Triangles side by side in a plane, height 1, of these widths: areas are half of them."""
+    x = np.concatenate([[0.0], np.cumsum(widths)])
+    vertices = np.array([[v, y, 0.0] for v in x for y in (0.0, 1.0)])
+    faces = np.array([[2 * i, 2 * i + 2, 2 * i + 1] for i in range(len(widths))])
+    return vertices, faces
+
+
+def test_triangles_are_drawn_by_area():
+    widths = np.array([1.0, 2.0, 0.0, 5.0, 2.0] * 10)
+    vertices, faces = strip(widths)
+    sampler, generator = TriangleSampler(vertices, faces, 10, CPU), torch.Generator().manual_seed(0)
+    counts = torch.zeros(len(widths))
+    draws = 2000
+    for _ in range(draws):
+        picks = sampler.draw(generator)
+        assert picks.shape == (10,)
+        counts += torch.bincount(picks, minlength=len(widths))
+    expected = 10 * draws * widths / widths.sum()
+    assert counts.numpy() == pytest.approx(expected, rel=0.15, abs=1e-9)  # none of the triangles without area
+
+
+def test_every_triangle_is_drawn_where_the_count_covers_the_mesh():
+    vertices, faces = strip(np.ones(7))
+    picks = TriangleSampler(vertices, faces, 100, CPU).draw(torch.Generator().manual_seed(0))
+    assert picks.tolist() == list(range(7))
+
+
+def test_draws_depend_on_the_generator_alone():
+    sampler = TriangleSampler(*ball(200), 20, CPU)
+    first, second = (sampler.draw(torch.Generator().manual_seed(3)) for _ in range(2))
+    assert torch.equal(first, second)
+    assert not torch.equal(first, sampler.draw(torch.Generator().manual_seed(4)))

@@ -1,0 +1,151 @@
+import numpy as np
+import pytest
+import torch
+from scipy.sparse import csr_array
+
+from parameterize.bspline import gauss_points, greville, open_uniform_knots
+from parameterize.conjugate import conjugate_gradients
+from parameterize.tensor_grid import FastDiagonalization, SmoothnessOperator, along, gauss_grid, gram, to_torch
+from parameterize.volume import BSplineVolume
+
+CPU = torch.device("cpu")
+KIND = {"device": CPU, "dtype": torch.float64}
+DEGREES = (3, 2, 3)
+KNOTS = (open_uniform_knots(6, 3), np.array([0.0, 0.0, 0.0, 0.3, 1.0, 1.0, 1.0]), open_uniform_knots(5, 3))
+SHAPE = (3, 6, 4, 5)
+
+
+def random_field(seed, shape=SHAPE):
+    return torch.randn(shape, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+
+
+def as_volume(control):
+    return BSplineVolume(DEGREES, KNOTS, control.permute(1, 2, 3, 0).numpy())
+
+
+def points_and_weights(n_gauss):
+    points, weights = zip(*(gauss_points(k, n_gauss) for k in KNOTS), strict=True)
+    return [p.ravel() for p in points], np.einsum("i,j,k->ijk", *(w.ravel() for w in weights))
+
+
+def grams():
+    return [tuple(gram(k, p, d, **KIND) for k, p in zip(KNOTS, DEGREES, strict=True)) for d in range(3)]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_along_is_a_matrix_product_on_one_axis(axis):
+    field = random_field(0)
+    matrix = torch.randn(7, SHAPE[axis + 1], dtype=torch.float64)
+    expected = torch.movedim(torch.tensordot(matrix, field, dims=([1], [axis + 1])), 0, axis + 1)
+    assert torch.allclose(along(matrix, field, axis), expected, atol=1e-13)
+
+
+def test_sparse_matrix_becomes_a_torch_matrix():
+    dense = np.array([[0.0, 2.0, 0.0], [1.0, 0.0, 3.0]])
+    assert to_torch(csr_array(dense), CPU).to_dense().numpy().tolist() == dense.tolist()
+
+
+def test_jacobian_agrees_with_the_volume():
+    grid, weights = gauss_grid(KNOTS, DEGREES, 2, **KIND)
+    control = random_field(1)
+    points, products = points_and_weights(2)
+    expected = as_volume(control).grid_jacobian(*points)  # (m_u, m_v, m_w, 3, 3)
+    assert grid.jacobian(control).permute(2, 3, 4, 0, 1).numpy() == pytest.approx(expected)
+    assert np.einsum("i,j,k->ijk", *(w.numpy() for w in weights)) == pytest.approx(products)
+    assert [float(w.sum()) for w in weights] == pytest.approx([1.0] * 3)
+
+
+def test_adjoint_identity():
+    grid, _ = gauss_grid(KNOTS, DEGREES, 2, **KIND)
+    x = random_field(2)
+    image = grid.jacobian(x)
+    y = random_field(3, image.shape)
+    assert float((image * y).sum()) == pytest.approx(float((x * grid.adjoint(y)).sum()), rel=1e-12)
+
+
+def test_smoothness_operator_against_quadrature():
+    mass, slope, curve = grams()
+    control = random_field(4)
+    volume = as_volume(control)
+    points, weights = points_and_weights(4)
+    grid_points = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
+    weights = weights.ravel()
+    slopes = (weights * (volume.jacobian(grid_points) ** 2).sum(axis=(1, 2))).sum()
+    bends = (weights * (volume.hessian(grid_points) ** 2).sum(axis=(1, 2, 3))).sum()
+    for stiffness, bending in ((1.0, 0.0), (0.0, 1.0), (0.7, 0.2)):
+        operator = SmoothnessOperator(mass, slope, curve, stiffness, bending)
+        expected = stiffness * slopes + bending * bends
+        assert float((control * operator(control)).sum()) == pytest.approx(expected, rel=1e-10)
+
+
+def test_smoothness_operator_is_symmetric_and_leaves_affine_maps_unbent():
+    mass, slope, curve = grams()
+    operator = SmoothnessOperator(mass, slope, curve, 0.3, 0.2)
+    x, y = random_field(5), random_field(6)
+    assert float((x * operator(y)).sum()) == pytest.approx(float((y * operator(x)).sum()), rel=1e-12)
+    rows = [greville(k, p) for k, p in zip(KNOTS, DEGREES, strict=True)]
+    identity = torch.as_tensor(np.stack(np.meshgrid(*rows, indexing="ij")))
+    bending = SmoothnessOperator(mass, slope, curve, 0.0, 1.0)
+    assert float(bending(identity).abs().max()) < 1e-10
+    stiffness = SmoothnessOperator(mass, slope, curve, 1.0, 0.0)
+    assert float((identity * stiffness(identity)).sum()) == pytest.approx(3.0)  # |grad id|^2
+
+
+def test_gram_integrates_exactly():
+    mass = gram(KNOTS[0], 3, 0, **KIND)
+    assert float(mass.sum()) == pytest.approx(1.0)  # partition of unity
+    x = torch.as_tensor(greville(KNOTS[0], 3))
+    assert float(x @ mass @ x) == pytest.approx(1.0 / 3.0)
+    assert float(x @ gram(KNOTS[0], 3, 1, **KIND) @ x) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.5])
+def test_fast_diagonalization_is_the_inverse(shift):
+    mass, slope, curve = grams()
+    ends = [torch.zeros_like(m) for m in mass]
+    for e in ends:
+        e[0, 0] = e[-1, -1] = 2.0
+    rough = tuple(k + 0.1 * h + e for k, h, e in zip(slope, curve, ends, strict=True))
+    solve = FastDiagonalization(rough, mass, shift)
+    x = random_field(7)
+    m0, m1, m2 = mass
+    image = shift * along(m2, along(m1, along(m0, x, 0), 1), 2)
+    for axis in range(3):
+        term = x
+        for other in range(3):
+            term = along(rough[other] if other == axis else mass[other], term, other)
+        image = image + term
+    assert torch.allclose(solve(image), x, atol=1e-9)
+
+
+def spd(n, seed):
+    root = torch.randn(n, n, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+    return root @ root.T + torch.eye(n)
+
+
+def test_conjugate_gradients_solve_in_at_most_n_steps():
+    matrix, x = spd(8, 0), torch.arange(8.0, dtype=torch.float64)
+    found, count = conjugate_gradients(
+        lambda v: matrix @ v, matrix @ x, lambda r: r.clone(), tolerance=1e-10, max_iterations=20
+    )
+    assert torch.allclose(found, x, atol=1e-8)
+    assert count <= 10
+
+
+def test_an_exact_preconditioner_needs_one_step():
+    matrix, x = spd(8, 1), torch.ones(8, dtype=torch.float64)
+    found, count = conjugate_gradients(
+        lambda v: matrix @ v, matrix @ x, lambda r: torch.linalg.solve(matrix, r), tolerance=1e-10, max_iterations=20
+    )
+    assert count == 1 and torch.allclose(found, x)
+
+
+def test_conjugate_gradients_stop_where_told():
+    matrix = spd(30, 2)
+    right = torch.ones(30, dtype=torch.float64)
+    _, count = conjugate_gradients(lambda v: matrix @ v, right, lambda r: r, tolerance=0.0, max_iterations=3)
+    assert count == 3
+    zero, count = conjugate_gradients(lambda v: matrix @ v, 0.0 * right, lambda r: r, tolerance=1e-3, max_iterations=3)
+    assert count == 0 and float(zero.abs().max()) == 0.0
+    loose, _ = conjugate_gradients(lambda v: matrix @ v, right, lambda r: r, tolerance=1e-2, max_iterations=99)
+    assert float((matrix @ loose - right).norm()) <= 1e-2 * float(right.norm())
