@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from parameterize.config import Config
     from solve import Poisson
 
+_CORNERS_BYTES = 65_536
 DEFAULT_EXACT = "exp(x+z)*sin(y)"  # the paper's problem, section 5.5
 
 
@@ -39,8 +41,8 @@ class MapOptions:
         seed: equal seeds give equal volumes, bit for bit.
         device: where the network is trained; "auto" takes CUDA where there is one.
         control_points: per direction.
-        corners: text file with eight lines, one a corner of the cube in the order (0,0,0), (0,0,1), (0,1,0), ...,
-            (1,1,1): three coordinates in the surface's units, or one vertex number counted from 0.
+        corners: JSON file with a list of eight, one a corner of the cube in the order (0,0,0), (0,0,1), (0,1,0), ...,
+            (1,1,1): points of three coordinates in the surface's units, or vertex numbers counted from 0.
         resume: go on from the checkpoint in the output folder.
         component: which connected piece of the file to take, counted from 0.
         max_faces: refuse larger surfaces.
@@ -107,17 +109,23 @@ class PoissonOptions:
 
 
 def read_corners(path: Path) -> np.ndarray[Any, Any]:
-    """Corners from a text file, points (8, 3) or vertex numbers (8,). Raises InputError for a file that is neither."""
+    """Eight points (8, 3) or eight whole numbers (8,) from a JSON list. Raises InputError."""
     try:
-        rows = np.loadtxt(path, ndmin=2)
+        with path.open(encoding="utf-8") as stream:
+            given = json.loads(stream.read(_CORNERS_BYTES))
+        rows = np.array(given, dtype=np.float64)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except ValueError:
-        raise InputError(f"{path}: corners must be numbers, eight lines of three (or of one vertex number)") from None
-    if rows.shape not in ((8, 3), (8, 1), (1, 8)) or not np.all(np.isfinite(rows)):
-        raise InputError(f"{path}: corners need eight lines of three numbers (or of one vertex number)")
+    except (ValueError, TypeError, OverflowError, RecursionError):
+        raise InputError(f"{path}: corners must be a JSON list of eight points or of eight vertex numbers") from None
+    if rows.shape not in ((8, 3), (8,)) or not np.all(np.isfinite(rows)):
+        raise InputError(
+            f"{path}: corners must be eight points of three finite coordinates or eight vertex numbers, "
+            f"found an array of shape {rows.shape}"
+        )
     if rows.shape == (8, 3):
         return rows
-    if np.any(rows != np.rint(rows)):
+    numbers = rows.astype(np.int64)
+    if np.any(numbers != rows):
         raise InputError(f"{path}: vertex numbers must be whole")
-    return rows.ravel().astype(np.int64)
+    return numbers

@@ -37,12 +37,6 @@ class CubeSurface:
     paths: list[IntArray]
     face_labels: IntArray
 
-    def vertex_labels(self) -> IntArray:
-        """A cube face for each vertex: that of one of its triangles (n,)."""
-        labels = np.zeros(len(self.cut.parents), dtype=np.int64)
-        labels[self.cut.faces.ravel()] = np.repeat(self.face_labels, 3)
-        return labels
-
 
 def choose_corners(mapped: Array) -> IntArray:
     """The vertex farthest towards each corner of the cube: argmax <v - A, P - A>, eight different vertices."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -31,6 +31,7 @@ from .volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
+_SHORTEST_STEP = 1e-6
 Knots = tuple[Array, Array, Array]
 
 
@@ -125,7 +126,7 @@ class LBFGS:
         self._changes: list[Tensor] = []
 
     def forget(self) -> None:
-        """Start afresh, after the energy has changed."""
+        """Start afresh."""
         self._steps.clear()
         self._changes.clear()
 
@@ -214,45 +215,66 @@ def _restore(
     return int(state["number"]), control, Optimized(kept, certify(_as_volume(kept, knots, energy.config.degree)))
 
 
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Control points with energy and gradient, the boundary's part apart: it alone changes when parameters slide."""
+
+    control: Tensor
+    inner: tuple[float, Tensor]
+    outer: tuple[float, Tensor]
+    folded: int
+
+    @property
+    def total(self) -> float:
+        return self.inner[0] + self.outer[0]
+
+    @property
+    def gradient(self) -> Tensor:
+        return self.inner[1] + self.outer[1]
+
+
+def _evaluate(control: Tensor, energy: SplineEnergy) -> _Point:
+    value, gradient, folded = energy.volume_part(control)
+    return _Point(control, (value, gradient), energy.surface_part(control), folded)
+
+
+def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> _Point | None:
+    """Halve the step until the energy falls enough (Armijo); None where the direction does not lead down."""
+    slope = float((direction * point.gradient).sum())
+    length = 1.0
+    while slope < 0.0 and length > _SHORTEST_STEP:
+        trial = _evaluate(point.control + length * direction, energy)
+        if trial.total <= point.total + 1e-4 * length * slope:
+            return trial
+        length *= 0.5
+    return None
+
+
 def _descend(
-    control: Tensor,
-    energy: SplineEnergy,
-    number: int,
-    history: History,
-    progress: ProgressCallback,
+    control: Tensor, energy: SplineEnergy, number: int, history: History, progress: ProgressCallback
 ) -> Tensor:
     """One round of L-BFGS steps with sliding boundary parameters."""
     steps = energy.config.steps
     total_steps = steps * len(energy.config.penalties)
     lbfgs = LBFGS(energy.config.history)
-    max_slide = 0.5 / control.shape[1]
     started = time.perf_counter()
-    inner, inner_gradient, folded = energy.volume_part(control)
-    outer, outer_gradient = energy.surface_part(control)
+    point = _evaluate(control, energy)
     for step in range(steps):
-        gradient = inner_gradient + outer_gradient
-        direction = lbfgs.direction(gradient, energy)
-        slope = float((direction * gradient).sum())
-        total, length = inner + outer, 1.0
-        while True:
-            trial = control + length * direction
-            new_inner, new_inner_gradient, new_folded = energy.volume_part(trial)
-            new_outer, new_outer_gradient = energy.surface_part(trial)
-            if new_inner + new_outer <= total + 1e-4 * length * slope or length < 1e-6:
-                break
-            length *= 0.5
-        if length < 1e-6:
+        found = _line_search(point, lbfgs.direction(point.gradient, energy), energy)
+        if found is None:
+            lbfgs.forget()
+            found = _line_search(point, lbfgs.direction(point.gradient, energy), energy)
+        if found is None:
             _log.info("round %d: no descent after step %d", number, step)
             break
-        lbfgs.remember(trial - control, new_inner_gradient + new_outer_gradient - gradient)
-        control, inner, inner_gradient, folded = trial, new_inner, new_inner_gradient, new_folded
-        energy.surface.slide(control, max_slide)
-        outer, outer_gradient = energy.surface_part(control)
-        history.add("spline", number * steps + step, inner + outer, folded, {"surface": outer})
+        lbfgs.remember(found.control - point.control, found.gradient - point.gradient)
+        energy.surface.slide(found.control, 0.5 / control.shape[1])
+        point = replace(found, outer=energy.surface_part(found.control))
         done = number * steps + step + 1
+        history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
         left = (time.perf_counter() - started) / (step + 1) * (total_steps - done)
-        progress(Progress("spline", done, total_steps, inner + outer, folded, left))
-    return control
+        progress(Progress("spline", done, total_steps, point.total, point.folded, left))
+    return point.control
 
 
 def _as_volume(control: Tensor, knots: Knots, degree: int) -> BSplineVolume:

@@ -23,13 +23,14 @@ from .correspondence import boundary_map
 from .cutting import IntArray, subdivide_long_edges
 from .fit import fit_pairs
 from .mesh import Surface
+from .network import InverseMap
 from .optimize import Optimized, optimize
 from .progress import ProgressCallback, ignore
 from .quality import QualityReport, measure
 from .sample import interior_points
-from .stages import History, Trained, Trainer, map_points
+from .stages import History, Trainer, map_points
 from .surface_fit import SurfaceFit, vertex_quadrics, vertex_weights
-from .targets import nearest_on_cube_face
+from .targets import nearest_on_cube
 from .volume import BSplineVolume
 
 _BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit
@@ -97,10 +98,10 @@ def parameterize(
     options: dict[str, Any] = {"history": history, "progress": progress, "checkpoints": checkpoints}
     with _timed(seconds, "train"):
         trainer = Trainer(vertices, faces, config, seed=seed, device=place, dtype=dtype, given_corners=given, **options)
-        trained = trainer.run()
+        network = trainer.run()
     with _timed(seconds, "fit"):
-        fit = _surface_fit(trained, vertices, faces, spline, knots, place, dtype)
-        control = _first_spline(trained, fit, vertices, faces, spline, place, dtype)
+        fit = _surface_fit(network, vertices, faces, spline, knots, place, dtype)
+        control = _first_spline(network, fit, vertices, faces, spline, place, dtype)
     with _timed(seconds, "optimize"):
         found = optimize(control, knots, fit, spline, **options)
         volume, boundary = _in_users_units(found, surface, vertices, faces, fit, spline, knots)
@@ -144,7 +145,7 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
 
 
 def _surface_fit(
-    trained: Trained,
+    network: InverseMap,
     vertices: Array,
     faces: IntArray,
     spline: SplineConfig,
@@ -152,23 +153,25 @@ def _surface_fit(
     device: torch.device,
     dtype: torch.dtype,
 ) -> SurfaceFit:
-    """Boundary parameters by nearest points of G(v) on each vertex's cube face (section 4.3.2, step 1)."""
-    labels = trained.surface.vertex_labels()[: len(vertices)]
-    mapped = torch.as_tensor(map_points(trained.network, vertices, device, dtype))
+    """Boundary parameters by nearest points of G(v) on the cube (section 4.3.2, step 1)."""
+    parameters = nearest_on_cube(torch.as_tensor(map_points(network, vertices, device, dtype))).numpy()
+    centred = parameters - 0.5
+    axis = np.abs(centred).argmax(axis=1)
+    cube_faces = 2 * axis + (centred[np.arange(len(axis)), axis] > 0.0)
     return SurfaceFit(
         knots,
         spline.degree,
         vertices,
         vertex_quadrics(vertices, faces, spline.tangential),
         vertex_weights(vertices, faces),
-        nearest_on_cube_face(mapped, torch.as_tensor(labels)).numpy(),
-        labels,
+        parameters,
+        cube_faces,
         device=device,
     )
 
 
 def _first_spline(
-    trained: Trained,
+    network: InverseMap,
     fit: SurfaceFit,
     vertices: Array,
     faces: IntArray,
@@ -178,7 +181,7 @@ def _first_spline(
 ) -> torch.Tensor:
     """Least squares on interior pairs (G(x), x) and the boundary's (section 4.3.2, step 2)."""
     inside = interior_points(vertices, faces, spline.fit_cell)
-    mapped = map_points(trained.network, inside, device, dtype).clip(0.0, 1.0)
+    mapped = map_points(network, inside, device, dtype).clip(0.0, 1.0)
     weights = np.concatenate(
         [
             np.full(len(inside), (1.0 - _BOUNDARY_SHARE) / max(len(inside), 1)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from dataclasses import dataclass, field
@@ -15,13 +16,14 @@ from . import losses
 from .bspline import Array
 from .checkpoint import Checkpoints
 from .config import Config, StageConfig
-from .corners import CORNERS, CubeSurface, choose_corners, cut_surface, edge_targets
+from .corners import CORNERS, CubeSurface, PathError, choose_corners, cut_surface, edge_targets
 from .cutting import IntArray
 from .network import InverseMap
 from .progress import Progress, ProgressCallback, ignore
 from .sample import Stencils, TriangleSampler, stencils
 from .targets import nearest, nearest_on_cube_face
 
+_log = logging.getLogger(__name__)
 State = dict[str, Tensor]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
 TERMS = ("bij", "arap", "fair", "dist", "norm", "star", "cor", "edge")
@@ -63,14 +65,6 @@ class History:
         for name in names:
             columns[name] = np.array([row[4].get(name, math.nan) for row in self.rows])
         return columns
-
-
-@dataclass(frozen=True, eq=False)
-class Trained:
-    """The network after its last stage (best state), and the surface cut along the cube's edges."""
-
-    network: InverseMap
-    surface: CubeSurface
 
 
 @dataclass
@@ -117,38 +111,46 @@ class Trainer:
         self.generator = torch.Generator()
         self._corner_targets = self._tensor(CORNERS)
 
-    def run(self) -> Trained:
-        """All stages, or those that a checkpoint leaves. Raises PathError where the cube's edges cannot be traced."""
+    def run(self) -> InverseMap:
+        """All stages, or those that a checkpoint leaves; the network at the best state of the last one.
+
+        Where the mapped surface is still too far from a cube for its edges to be traced, the stages that fix them are
+        left out and a warning says so: the spline stage moves edges anyway. Raises PathError where the user gave the
+        corners.
+        """
+        given = self.corners is not None
         saved = self.checkpoints.load(_CHECKPOINT)
         first = 0 if saved is None else int(saved[1]["number"])
-        surface = None
         for number in range(first, len(self.config.stages)):
             stage = self.config.stages[number]
             run = _Run(number, 0, self._state(), self._state())
             if saved is not None and number == first:
                 run = self._load_run(*saved)
-            boundary, surface = self._prepare(stage)
+            try:
+                boundary = self._prepare(stage)
+            except PathError as error:
+                if given:
+                    raise
+                _log.warning("training ends before stage %s: %s", stage.name, error)
+                break
             optimizer = torch.optim.Adam(self.network.parameters(), lr=self.config.train.learning_rate)
             if saved is not None and number == first:
                 self._load_progress(saved[0], optimizer)
             self._train(run, boundary, optimizer)
-        if surface is None:
-            raise ValueError("the last stage must fix the cube's edges (weight edge > 0)")
-        return Trained(self.network, surface)
+        return self.network
 
     def map(self, points: Array) -> Array:
         """G at points (m, 3), as float64."""
         return map_points(self.network, points, self.device, self.dtype)
 
-    def _prepare(self, stage: StageConfig) -> tuple[BoundarySamples, CubeSurface | None]:
+    def _prepare(self, stage: StageConfig) -> BoundarySamples:
         """Choose corners and cut the surface, where the stage asks for it, by the network as it is."""
         if stage.weights.cor > 0.0 and self.corners is None:
             self.corners = choose_corners(self.map(self.vertices))
         if stage.weights.edge == 0.0:
-            return self._boundary(self.vertices, self.faces, self.corners), None
+            return self._boundary(self.vertices, self.faces, self.corners)
         assert self.corners is not None
-        surface = cut_surface(self.map(self.vertices), self.faces, self.corners)
-        return self._cut_boundary(surface), surface
+        return self._cut_boundary(cut_surface(self.map(self.vertices), self.faces, self.corners))
 
     def _boundary(self, vertices: Array, faces: IntArray, corners: IntArray | None) -> BoundarySamples:
         return BoundarySamples(

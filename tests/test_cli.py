@@ -152,10 +152,10 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson"], "requires an argument"),
         (["run", "heat", "cube"], "heat"),
         (["parameterize", "cube", "--corners", "missing.txt"], "missing.txt"),
-        (["parameterize", "cube", "--corners", "words.txt"], "eight lines"),
-        (["parameterize", "cube", "--corners", "seven.txt"], "eight lines"),
-        (["parameterize", "cube", "--corners", "numbers.txt"], "vertex numbers"),
-        (["parameterize", "cube", "--corners", "same.txt"], "same vertex"),
+        (["parameterize", "cube", "--corners", "words.txt"], "eight points"),
+        (["parameterize", "cube", "--corners", "seven.json"], "shape (7, 3)"),
+        (["parameterize", "cube", "--corners", "numbers.json"], "vertex numbers"),
+        (["parameterize", "cube", "--corners", "same.json"], "same vertex"),
         (["parameterize", "cube", "--max-faces", "10"], "face"),
         (["parameterize", "cube", "--out", "words.txt/deeper"], "cannot be written"),
         (["solve", "poisson", "missing.npz"], "missing.npz"),
@@ -172,9 +172,9 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
 def test_bad_input_is_one_line_and_exit_code_2(arguments, says, in_folder, capsys, monkeypatch):
     monkeypatch.setattr("parameterize.run.parameterize", lambda *_, **__: pytest.fail("training must not start"))
     Path("words.txt").write_text("once upon a time\n")
-    Path("seven.txt").write_text("0 0 0\n" * 7)
-    Path("numbers.txt").write_text("99999999\n" * 8)
-    Path("same.txt").write_text("0 0 0\n" * 8)
+    Path("seven.json").write_text(json.dumps([[0, 0, 0]] * 7))
+    Path("numbers.json").write_text(json.dumps([99999999] * 8))
+    Path("same.json").write_text(json.dumps([[0, 0, 0]] * 8))
     if "--max-faces" in arguments:
         main(["sample", "cube", "--out", "cube.obj"])
         arguments = ["cube.obj" if word == "cube" else word for word in arguments]
@@ -205,11 +205,11 @@ def test_corners_reach_the_training(in_folder, monkeypatch):
 
     monkeypatch.setattr("parameterize.run.parameterize", parameterize)
     points = np.indices((2, 2, 2)).reshape(3, 8).T.astype(float)
-    np.savetxt("corners.txt", points)
-    main(["parameterize", "cube", "--corners", "corners.txt"])
+    Path("corners.json").write_text(json.dumps(points.tolist()))
+    main(["parameterize", "cube", "--corners", "corners.json"])
     assert np.array_equal(seen["corners"], points)
-    np.savetxt("numbers.txt", np.arange(8), fmt="%d")
-    main(["parameterize", "cube", "--corners", "numbers.txt"])
+    Path("numbers.json").write_text("[0, 1, 2, 3, 4, 5, 6, 7]")
+    main(["parameterize", "cube", "--corners", "numbers.json"])
     assert np.array_equal(seen["corners"], np.arange(8)) and seen["corners"].dtype.kind == "i"
 
 

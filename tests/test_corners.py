@@ -57,16 +57,6 @@ def test_paths_are_disjoint_walks_along_mesh_edges():
     assert len(set(inner)) == len(inner) and not set(inner) & set(surface.corners.tolist())
 
 
-def test_vertex_labels_belong_to_a_triangle_at_the_vertex():
-    mapped, faces = near_cube(1)
-    surface = cut_surface(mapped, faces, choose_corners(mapped))
-    labels = surface.vertex_labels()
-    allowed = np.zeros((len(labels), 6), dtype=bool)
-    for k in range(3):
-        allowed[surface.cut.faces[:, k], surface.face_labels] = True
-    assert allowed[np.arange(len(labels)), labels].all()
-
-
 def test_edge_targets_follow_the_edges_by_arc_length():
     mapped, faces = near_cube(2)
     surface = cut_surface(mapped, faces, choose_corners(mapped))
