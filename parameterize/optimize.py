@@ -13,6 +13,7 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -32,6 +33,9 @@ from .volume import BSplineVolume
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
 _SHORTEST_STEP = 1e-6
+_PATIENT_ROUNDS = (
+    2  # after so many, the surface gives way where the map is not proved: a cube edge in a valley cannot fit
+)
 Knots = tuple[Array, Array, Array]
 
 
@@ -165,7 +169,8 @@ def optimize(
     """Minimise from `control` (3, n_u, n_v, n_w), volume 1, in rounds: descend, certify, watch the spans not proved.
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
-    unfold what is left. The result is the first certified map, else the one with the fewest unproved spans.
+    unfold what is left. Where spans stay unproved, the surface data near them loses weight. The result is the first
+    certified map, else the one with the fewest unproved spans.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
@@ -187,6 +192,9 @@ def optimize(
         if number == 0 or len(certificate.unproved) <= len(best.certificate.unproved):
             best = Optimized(control, certificate)
         energy.barrier.activate(certificate.unproved)
+        if number >= _PATIENT_ROUNDS and len(certificate.unproved):
+            near = surface.near_spans(certificate.unproved)
+            surface.give_way(np.where(near, 0.5, 1.0) * surface.yielding)
         _save(checkpoints, number + 1, control, best, energy, history)
     return best
 
@@ -199,6 +207,7 @@ def _save(
         "best": best.control,
         "parameters": torch.as_tensor(energy.surface.parameters),
         "cube_faces": torch.as_tensor(energy.surface.cube_faces),
+        "yielding": torch.as_tensor(energy.surface.yielding),
         "active": torch.as_tensor(energy.barrier.active),
     }
     checkpoints.save(_CHECKPOINT, tensors, {"number": number, "history": history.rows})
@@ -210,6 +219,7 @@ def _restore(
     """Next round, control points and best result of a checkpoint; parameters and active spans go back in place."""
     device = best.control.device
     energy.surface.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
+    energy.surface.give_way(tensors["yielding"].numpy())
     energy.barrier.activate(tensors["active"].numpy())
     control, kept = tensors["control"].to(device), tensors["best"].to(device)
     return int(state["number"]), control, Optimized(kept, certify(_as_volume(kept, knots, energy.config.degree)))

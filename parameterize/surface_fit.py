@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from .bspline import Array, basis_derivatives
+from .bspline import Array, basis_derivatives, breakpoints
 from .cutting import IntArray
 from .distances import SampledBoundary, foot_points
 from .tensor_grid import to_torch
@@ -40,9 +42,11 @@ class SurfaceFit:
     ) -> None:
         self.knots, self.degree, self.device = knots, degree, device
         self.points = points
+        self._quadrics, self._weights = quadrics, weights
         self._points = torch.as_tensor(points, device=device)
-        self._metric = torch.as_tensor(weights[:, None, None] * quadrics, device=device)
+        self.yielding = np.ones(len(points))
         self.place(parameters, cube_faces)
+        self.give_way(self.yielding)
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
         """Take these parameters (N, 3) on these cube faces (N,)."""
@@ -53,6 +57,24 @@ class SurfaceFit:
         rows = csr_array((values.ravel(), indices.ravel(), starts), shape=(len(values), count))
         columns = csr_array(rows.T)
         self._matrix, self._transposed = (to_torch(m, self.device) for m in (rows, columns))
+
+    def give_way(self, yielding: Array) -> None:
+        """Multiply the points' weights by `yielding` (N,), in place of earlier such factors."""
+        self.yielding = yielding
+        self._metric = torch.as_tensor((yielding * self._weights)[:, None, None] * self._quadrics, device=self.device)
+
+    def near_spans(self, spans: IntArray) -> NDArray[np.bool_]:
+        """Which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
+        breaks = [breakpoints(k) for k in self.knots]
+        shape = [len(b) - 1 for b in breaks]
+        marked = np.zeros(shape, dtype=bool)
+        marked[tuple(spans.T)] = True
+        marked = binary_dilation(marked, np.ones((3, 3, 3), dtype=bool))
+        where = [
+            np.clip(np.searchsorted(b, x, "right") - 1, 0, n - 1)
+            for b, x, n in zip(breaks, self.parameters.T, shape, strict=True)
+        ]
+        return marked[tuple(where)]
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """Sum of r^T Q r at the present parameters and its gradient (3, n_u, n_v, n_w)."""
