@@ -59,7 +59,7 @@ def lattice(vertices: Array, cell: float, margin: float) -> tuple[Array, NDArray
 def stencils(
     vertices: Array, faces: NDArray[np.int64], cell: float, *, device: torch.device, dtype: torch.dtype
 ) -> Stencils:
-    """Centres at every lattice point inside the surface or within h/2 of it, so that no shift uncovers the domain."""
+    """Centres at every lattice point inside the surface or within h/2 of it: about the domain, whatever the shift."""
     points, index = lattice(vertices, cell, cell / 2.0)
     centres = index[signed_distance(points, vertices, faces) < cell / 2.0]
     needed, inverse = np.unique((centres[:, None, :] + OFFSETS).reshape(-1, 3), axis=0, return_inverse=True)
