@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save as to_bytes
 from torch import Tensor
+
+from .files import save_bytes
 
 FORMAT = 1
 NAMES = ("training", "spline")
@@ -36,15 +37,14 @@ class Checkpoints:
                 (folder / f"{name}.safetensors").unlink(missing_ok=True)
 
     def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:
-        """Write checkpoint `name`, replacing an older one."""
+        """Write checkpoint `name`, replacing an older one. Raises OSError naming the file, say on a full disk."""
         if self._folder is None:
             return
         self._folder.mkdir(parents=True, exist_ok=True)
-        temporary = self._folder / f".{name}.{os.getpid()}.part"
         header = {"identity": self._identity, "state": json.dumps(state)}
         copies = {k: v.detach().cpu().clone(memory_format=torch.contiguous_format) for k, v in tensors.items()}
-        save_file(copies, temporary, metadata=header)  # copies: the file format refuses tensors that share memory
-        temporary.replace(self._folder / f"{name}.safetensors")
+        content = to_bytes(copies, metadata=header)  # copies: the file format refuses tensors that share memory
+        save_bytes(self._folder / f"{name}.safetensors", content)
 
     def load(self, name: str) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
         """Tensors and state of checkpoint `name`; None where there is none or the run starts afresh.

@@ -2,64 +2,86 @@
 
 from __future__ import annotations
 
+import math
 import os
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-MAX_UNPACKED_BYTES = 4 << 30
+MAX_UNPACKED_BYTES = 512 << 20
 
 
 def save_arrays(path: str | Path, **arrays: NDArray[Any]) -> None:
     """Write a compressed .npz under a temporary name, then rename it: a reader never sees half a file.
 
-    The bytes depend on the arrays alone, so equal results are equal files.
+    The bytes depend on the arrays alone, so equal results are equal files. Raises OSError naming the file.
     """
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with temporary.open("wb") as stream:
-            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with _replacing(Path(path)) as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+
+
+def save_bytes(path: str | Path, content: bytes) -> None:
+    """Write a file under a temporary name, then rename it. Raises OSError naming the file."""
+    with _replacing(Path(path)) as stream:
+        stream.write(content)
 
 
 def save_text(path: str | Path, text: str) -> None:
-    """Write a text file under a temporary name, then rename it."""
-    target = Path(path)
+    """Write a text file (UTF-8) under a temporary name, then rename it. Raises OSError naming the file."""
+    save_bytes(path, text.encode())
+
+
+@contextmanager
+def _replacing(target: Path) -> Iterator[IO[bytes]]:
     temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        temporary.write_text(text, encoding="utf-8")
+        with temporary.open("wb") as stream:
+            yield stream
         temporary.replace(target)
+    except OSError as error:
+        error.filename = str(target)  # a full disk is reported without one
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 
 
 def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Read the named arrays of an .npz.
+    """Read the named arrays of an .npz, and no others.
 
     Raises FileNotFoundError, or ValueError for anything that is not such a file: not an archive, a missing array,
-    pickled content, or more than 4 GiB once unpacked.
+    pickled content, a header that does not match the data behind it, or more than 512 MiB once unpacked.
     """
     source = Path(path)
     if not source.exists():
         raise FileNotFoundError(f"{source}: no such file")
     try:
         with zipfile.ZipFile(source) as archive:
-            unpacked = sum(entry.file_size for entry in archive.infolist())
-        if unpacked > MAX_UNPACKED_BYTES:
-            raise ValueError(f"{source}: unpacks to {unpacked} bytes, more than {MAX_UNPACKED_BYTES}")
-        with np.load(source, allow_pickle=False) as data:
-            missing = [name for name in names if name not in data.files]
-            if missing:
-                raise ValueError(f"{source}: has no array named {', '.join(missing)}")
-            return {name: data[name] for name in names}
-    except ValueError as error:
-        text = str(error)
-        raise ValueError(text if text.startswith(str(source)) else f"{source}: {text}") from None
-    except (zipfile.BadZipFile, OSError, EOFError, KeyError, NotImplementedError, zipfile.error) as error:
-        raise ValueError(f"{source}: not a readable .npz archive ({error})") from None
+            held = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
+            missing = [name for name in names if name not in held]
+            unpacked = sum(held[name].file_size for name in names if name in held)
+            refused = missing or unpacked > MAX_UNPACKED_BYTES
+            arrays = {} if refused else {name: _read_array(archive, held[name]) for name in names}
+    except Exception as error:  # of a damaged archive: zipfile, its decompressors and numpy raise a dozen kinds
+        raise ValueError(f"{source}: not a readable .npz archive ({str(error) or type(error).__name__})") from None
+    if missing:
+        raise ValueError(f"{source}: has no array named {', '.join(missing)}")
+    if refused:
+        raise ValueError(f"{source}: unpacks to {unpacked} bytes, more than {MAX_UNPACKED_BYTES}")
+    return arrays
+
+
+def _read_array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
+    """One array; its header is compared with the size before any memory is taken for it."""
+    with archive.open(entry) as stream:
+        read_header = npy.read_array_header_1_0 if npy.read_magic(stream) == (1, 0) else npy.read_array_header_2_0
+        shape, _, dtype = read_header(stream)
+        if not dtype.hasobject and math.prod(shape) * dtype.itemsize != entry.file_size - stream.tell():
+            raise ValueError(f"{entry.filename} does not have the size its header says")
+    with archive.open(entry) as stream:
+        return np.asarray(npy.read_array(stream, allow_pickle=False))

@@ -1,3 +1,6 @@
+import errno
+import resource
+
 import pytest
 import torch
 
@@ -32,6 +35,21 @@ def test_the_latest_replaces_and_leaves_no_other_file(tmp_path):
         checkpoints.save("training", {"x": torch.tensor([step])}, {"step": step})
     assert checkpoints.load("training")[1] == {"step": 2}
     assert [p.name for p in (tmp_path / "new" / "folder").iterdir()] == ["training.safetensors"]
+
+
+def test_a_full_disk_leaves_the_older_checkpoint_and_no_other_file(tmp_path):
+    checkpoints = Checkpoints(tmp_path, IDENTITY, resume=True)
+    checkpoints.save("training", {"x": torch.zeros(1)}, {"step": 1})
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(OSError, match=r"training\.safetensors") as caught:
+            checkpoints.save("training", {"x": torch.zeros(10_000)}, {"step": 2})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert caught.value.errno == errno.EFBIG
+    assert [p.name for p in tmp_path.iterdir()] == ["training.safetensors"]
+    assert checkpoints.load("training")[1] == {"step": 1}
 
 
 def test_without_a_folder_nothing_is_kept():

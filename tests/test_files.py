@@ -1,13 +1,16 @@
 """Array files: atomic, without pickles, and refused with a reason."""
 
+import errno
 import hashlib
+import io
+import resource
 import zipfile
 
 import numpy as np
 import pytest
 
 from parameterize import files
-from parameterize.files import load_arrays, save_arrays, save_text
+from parameterize.files import load_arrays, save_arrays, save_bytes, save_text
 
 
 def test_round_trip_is_exact(tmp_path):
@@ -37,14 +40,30 @@ def test_failed_write_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch):
 
     def fail(stream, **arrays):
         stream.write(b"half a file")
-        raise OSError("disk full")
+        raise OSError(errno.ENOSPC, "disk full")
 
     monkeypatch.setattr(files.np, "savez_compressed", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(OSError, match=r"disk full: .*/a\.npz'"):
         save_arrays(path, values=np.zeros(3))
     monkeypatch.undo()
     assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
     np.testing.assert_array_equal(load_arrays(path, ("values",))["values"], np.ones(3))
+
+
+def test_a_full_disk_is_told_with_the_file(tmp_path):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(OSError) as bytes_error:
+            save_bytes(tmp_path / "a.bin", bytes(100_000))
+        with pytest.raises(OSError) as arrays_error:
+            save_arrays(tmp_path / "a.npz", values=np.random.default_rng(0).random(100_000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [e.value.errno for e in (bytes_error, arrays_error)] == [errno.EFBIG] * 2
+    assert bytes_error.value.filename == str(tmp_path / "a.bin")
+    assert arrays_error.value.filename == str(tmp_path / "a.npz")
+    assert not list(tmp_path.iterdir())
 
 
 def test_text_replaces_what_was_there(tmp_path):
@@ -117,3 +136,33 @@ def test_archive_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "MAX_UNPACKED_BYTES", 9_999)
     with pytest.raises(ValueError, match=r"a\.npz: unpacks to 10000 bytes"):
         load_arrays(path, ("values",))
+
+
+def test_archives_are_limited_by_the_arrays_that_are_wanted(tmp_path, monkeypatch):
+    save_arrays(tmp_path / "a.npz", wanted=np.ones(2), other=np.zeros(10_000))
+    monkeypatch.setattr(files, "MAX_UNPACKED_BYTES", 9_999)
+    np.testing.assert_array_equal(load_arrays(tmp_path / "a.npz", ("wanted",))["wanted"], np.ones(2))
+
+
+@pytest.mark.parametrize("shape", [(2000, 2000, 2000, 3), (13,), (12, 0), (-1, -12), (10**30, 0)])
+def test_a_header_that_does_not_match_the_data_is_refused_before_memory_is_taken(tmp_path, shape):
+    path, member = tmp_path / "a.npz", io.BytesIO()
+    np.lib.format.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("values.npy", member.getvalue() + bytes(96))
+    with pytest.raises(ValueError, match=r"a\.npz: not a readable \.npz archive"):
+        load_arrays(path, ("values",))
+
+
+def test_any_damaged_byte_is_refused_or_harmless(tmp_path):
+    path, values = tmp_path / "a.npz", np.random.default_rng(1).random(20)
+    save_arrays(path, values=values)
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
+        try:
+            read = load_arrays(path, ("values",))["values"]
+        except ValueError as error:
+            assert str(error).startswith(f"{path}: ")
+        else:
+            np.testing.assert_array_equal(read, values)
