@@ -29,9 +29,17 @@ def open_uniform_knots(n_control_points: int, degree: int) -> Array:
     return np.concatenate([np.zeros(degree), breaks, np.ones(degree)])
 
 
+def real_array(values: ArrayLike, name: str) -> Array:
+    """`values` in double precision; raises ValueError where they are not real numbers."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must be real numbers, got {array.dtype}")
+    return array.astype(np.float64, copy=False)
+
+
 def check_knots(knots: ArrayLike, degree: int) -> Array:
     """Return `knots` as a float array; raise ValueError where it is not an open, non-decreasing knot vector."""
-    values = np.asarray(knots, dtype=np.float64)
+    values = real_array(knots, "knots")
     if degree < 1:
         raise ValueError(f"degree must be at least 1, got {degree}")
     if values.ndim != 1 or values.size < 2 * (degree + 1):

@@ -17,11 +17,13 @@ from .bspline import (
     insert_knots,
     midpoints,
     open_uniform_knots,
+    real_array,
 )
 from .files import load_arrays, save_arrays
 
 AXES = "uvw"
 FACE_NAMES = ("u0", "u1", "v0", "v1", "w0", "w1")
+LARGEST = 1e100  # coordinate: determinants of larger ones leave double precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +44,13 @@ class BSplineVolume:
     def __post_init__(self) -> None:
         if len(self.degrees) != 3 or len(self.knots) != 3:
             raise ValueError("a volume has three degrees and three knot vectors")
-        points = np.asarray(self.control_points, dtype=np.float64)
+        points = real_array(self.control_points, "control_points")
         if points.ndim != 4 or points.shape[3] != 3:
             raise ValueError(f"control_points must have shape (n_u, n_v, n_w, 3), got {points.shape}")
         if not np.all(np.isfinite(points)):
             raise ValueError("control_points must be finite")
+        if np.abs(points).max(initial=0.0) > LARGEST:
+            raise ValueError(f"control_points must not exceed {LARGEST:g} in magnitude; choose other units")
         checked = []
         for axis, degree, knots, n in zip(AXES, self.degrees, self.knots, points.shape, strict=False):
             values = check_knots(knots, int(degree))
@@ -62,7 +66,7 @@ class BSplineVolume:
     @classmethod
     def uniform(cls, control_points: ArrayLike, degree: int = 3) -> BSplineVolume:
         """Volume with the same degree and equal spans in the three directions."""
-        points = np.asarray(control_points, dtype=np.float64)
+        points = real_array(control_points, "control_points")
         knots = tuple(open_uniform_knots(n, degree) for n in points.shape[:3])
         return cls((degree, degree, degree), knots, points)  # type: ignore[arg-type]
 

@@ -329,3 +329,11 @@ def test_bad_arguments():
                 1e-3 * np.ones((3, 3, 3, 3)) * np.arange(3)[:, None, None, None],
             )
         )
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_largest_coordinates_stay_within_double_precision():
+    knots = (open_uniform_knots(6, 3),) * 3
+    cube = BSplineVolume((3, 3, 3), knots, grid_of(knots, (3, 3, 3)))
+    found = certify(cube.transformed(2e100, [-1e100] * 3))
+    assert found.verdict == "certified" and found.mean_det == pytest.approx(8e300)

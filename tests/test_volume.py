@@ -92,6 +92,10 @@ def parts(**change):
         ({"degrees": (3, 2)}, "three degrees"),
         ({"control_points": np.zeros((6, 5, 4))}, "control_points must have shape"),
         ({"control_points": np.full((6, 5, 4, 3), np.inf)}, "finite"),
+        ({"control_points": np.full((6, 5, 4, 3), -1.1e100)}, "exceed 1e\\+100"),
+        ({"control_points": np.zeros((6, 5, 4, 3), complex)}, "control_points must be real numbers, got complex128"),
+        ({"control_points": np.zeros((6, 5, 4, 3), bool)}, "control_points must be real numbers, got bool"),
+        ({"knots": (open_uniform_knots(6, 3) + 0j, *make_volume().knots[1:])}, "knots must be real numbers, got comp"),
         ({"control_points": np.zeros((6, 6, 4, 3))}, "direction v: 6 control points of degree 2 need 9 knots"),
         (
             {"knots": (2.0 * open_uniform_knots(6, 3), *make_volume().knots[1:])},
@@ -103,6 +107,11 @@ def parts(**change):
 def test_parts_that_do_not_fit(change, message):
     with pytest.raises(ValueError, match=message):
         BSplineVolume(**parts(**change))
+
+
+def test_uniform_refuses_complex_control_points():
+    with pytest.raises(ValueError, match="control_points must be real numbers, got complex128"):
+        BSplineVolume.uniform(np.zeros((4, 4, 4, 3), complex))
 
 
 def test_save_and_load(tmp_path):
@@ -129,6 +138,7 @@ def stored(**change):
         ({"degrees": np.array([3.0, 2.0, 1.0])}, r"volume\.npz: degrees must be three integers"),
         ({"degrees": np.array([3, 2])}, r"volume\.npz: degrees must be three integers"),
         ({"knots_v": np.array(["a"])}, r"volume\.npz"),
+        ({"knots_v": make_volume().knots[1] + 0j}, r"volume\.npz: knots must be real numbers"),
         ({"knots_v": np.zeros(8)}, r"volume\.npz: the knot vector is not open"),
         ({"control_points": np.full((6, 5, 4, 3), np.nan)}, r"volume\.npz: control_points must be finite"),
     ],
