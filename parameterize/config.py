@@ -87,9 +87,9 @@ class Config:
     spline: SplineConfig
 
     def scaled(self, factor: float) -> Config:
-        """The same run with every stage shortened (or lengthened) by `factor`; at least one step each."""
-        if not factor > 0.0:
-            raise ValueError(f"steps factor must be positive, got {factor}")
+        """The same run with every stage shortened (or lengthened) by `factor` (at most 100); at least one step each."""
+        if not 0.0 < factor <= 100.0:
+            raise ValueError(f"steps factor must be positive and at most 100, got {factor}")
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
         return replace(self, stages=stages, spline=spline)

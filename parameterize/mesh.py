@@ -87,8 +87,11 @@ def load_surface(path: str | Path, *, component: int | None = None, max_faces: i
     """Read a surface (.obj, .stl, .ply, .off) or the boundary of tetrahedra (.mesh, .msh, .vtu), each also as .gz.
 
     component: which one to take where the file holds several, 0 the largest. max_faces: refuse more.
-    Raises MeshError (a ValueError) of one line for a file that cannot be read or is no closed surface of genus 0.
+    Raises MeshError (a ValueError) of one line for a file that cannot be read or is no closed surface of genus 0,
+    TypeError for a path that is none.
     """
+    if not isinstance(path, (str, Path)):
+        raise TypeError(f"path must be a str or Path, got {path!r:.80}; for arrays there is surface_from_arrays")
     source = str(path)
     try:
         raw = read_mesh(Path(path), max_faces)

@@ -74,10 +74,11 @@ def parameterize(
     corners: (8, 3) points in the surface's units or 8 vertex numbers, in the order (0,0,0), (0,0,1), (0,1,0), ...
     checkpoint_dir: where checkpoints go; with `resume` the run goes on from the last one.
 
-    Raises ValueError for bad corners or a device that is not there, CheckpointError for a checkpoint of another run,
-    PathError where the training stays too far from a cube for its edges to be found.
+    Raises TypeError for a surface or config of another type, ValueError for a negative seed, bad corners or a device
+    that is not there, CheckpointError for a checkpoint of another run, PathError where the training stays too far
+    from a cube for its edges to be found.
     """
-    config, seed = config or preset("fast"), operator.index(seed)
+    config, seed = _checked(surface, config, seed)
     place = choose_device(device)
     given = None if corners is None else corner_vertices(surface, corners)
     identity = {
@@ -110,6 +111,16 @@ def parameterize(
     return Parameterization(
         volume, boundary, found.certificate, quality, history.arrays(), seconds, place.type, seed, config
     )
+
+
+def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config, int]:
+    if not isinstance(surface, Surface):
+        raise TypeError(f"surface must be a Surface, got {surface!r:.80}; read one with load_surface(path)")
+    if config is not None and not isinstance(config, Config):
+        raise TypeError(f"config must be a Config, got {config!r:.80}; take one from preset('fast')")
+    if operator.index(seed) < 0:
+        raise ValueError(f"seed must not be negative, got {seed}")
+    return config or preset("fast"), operator.index(seed)
 
 
 def choose_device(name: str) -> torch.device:

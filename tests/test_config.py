@@ -30,10 +30,11 @@ def test_scaled_changes_the_number_of_steps_alone():
     shortest = config.scaled(1e-9)
     assert {s.steps for s in shortest.stages} == {1} and shortest.spline.steps == 1
     assert config.scaled(1.0) == config
+    assert config.scaled(100.0).stages[0].steps == 100 * config.stages[0].steps
 
 
-@pytest.mark.parametrize("factor", [0.0, -1.0, float("nan")])
-def test_scaled_refuses_factors_that_are_not_positive(factor):
+@pytest.mark.parametrize("factor", [0.0, -1.0, float("nan"), float("inf"), 100.1])
+def test_scaled_refuses_factors_out_of_range(factor):
     with pytest.raises(ValueError, match="factor"):
         preset("fast").scaled(factor)
 

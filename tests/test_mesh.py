@@ -491,3 +491,8 @@ def test_real_models_are_accepted_unchanged(path):
     assert len(surface.faces) == sum(row[:1] == ["f"] for row in rows)
     _, depth = deepest_point(surface.unit_vertices, surface.faces)
     assert 0.2 < depth < 0.62035  # the ball of volume 1 has radius 0.62035
+
+
+def test_a_path_that_is_none_is_refused_with_the_remedy():
+    with pytest.raises(TypeError, match=r"path .*None.*surface_from_arrays"):
+        load_surface(None)
