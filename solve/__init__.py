@@ -2,7 +2,7 @@
 
 from .expressions import Expression, ExpressionError
 from .field import SplineField
-from .poisson import ConvergenceError, Solution, solve_poisson
+from .poisson import ConvergenceError, Solution, check_data, solve_poisson
 from .problem import Poisson
 from .report import SolveReport
 from .study import ConvergenceRow, benchmark_volume, convergence, rates
@@ -17,6 +17,7 @@ __all__ = [
     "SolveReport",
     "SplineField",
     "benchmark_volume",
+    "check_data",
     "convergence",
     "rates",
     "solve_poisson",

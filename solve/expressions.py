@@ -202,7 +202,8 @@ class _Translator:
             tree = ast.parse(self.text, mode="eval")
         except SyntaxError as error:
             column = f", column {error.offset}" if error.offset else ""
-            raise ExpressionError(f"expression{column}, {_shorten(self.text)!r}: {error.msg}") from None
+            hint = "; a product is written with *, as in 2*x" if "decimal literal" in error.msg else ""
+            raise ExpressionError(f"expression{column}, {_shorten(self.text)!r}: {error.msg}{hint}") from None
         except (ValueError, MemoryError, RecursionError) as error:
             raise ExpressionError(f"expression, {_shorten(self.text)!r}: cannot be parsed ({error})") from None
         self.result = self._node(tree.body, 1)
@@ -231,6 +232,8 @@ class _Translator:
             return lambda p: _scale(-1.0, inner(p))
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
             return self._binary(node, depth)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
+            raise self._refuse(node, "a power is written with **, as in x**2")
         if isinstance(node, ast.Call):
             return self._call(node, depth)
         raise self._refuse(node, f"not allowed; use numbers, x y z pi e, + - * / ** and {' '.join(FUNCTIONS)}")

@@ -13,9 +13,10 @@ from parameterize.volume import BSplineVolume
 
 from .boundary import boundary_coefficients
 from .field import SplineField
-from .linear import conjugate_gradients
+from .linear import LinearResult, conjugate_gradients
 from .norms import error_norms
 from .operators import System, assemble
+from .planes import map_planes
 from .precondition import fast_diagonalization
 from .problem import Poisson
 from .quadrature import gauss_rule
@@ -27,7 +28,10 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Solution(SplineField):
-    """The discrete solution: a scalar spline of the parameters, the map it lives on, and the report."""
+    """The discrete solution: a scalar spline of the parameters, the map it lives on, and the report.
+
+    The coefficients inside are NaN where the map is folded at Gauss points (`report.folded`): nothing is solved there.
+    """
 
     geometry: BSplineVolume
     report: SolveReport
@@ -78,6 +82,19 @@ def solve_poisson(
     return solution
 
 
+def check_data(volume: BSplineVolume, problem: Poisson) -> None:
+    """Evaluate a problem's data where the coarsest solve needs them; finer levels need them at points between.
+
+    Raises ExpressionError where they are not finite.
+    """
+    space = trial_space(volume)
+    boundary_coefficients(volume, space, problem.boundary_at)
+    for _, fields in map_planes(volume, gauss_rule(space)):
+        problem.source_at(*fields[:, 0])
+        if problem.exact is not None:
+            problem.exact_at(*fields[:, 0])
+
+
 @functools.cache
 def _warm_up() -> None:
     """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
@@ -102,11 +119,14 @@ def _solve(
     residual = (system.load - system.stiffness.apply(coefficients))[1:-1, 1:-1, 1:-1]
     preconditioner = fast_diagonalization(system.stiffness, rule)
     clock.append(time.process_time())
-    result = conjugate_gradients(system.stiffness.apply_inside, residual, preconditioner, tolerance, max_iterations)
+    if system.folded:
+        result = LinearResult(np.full_like(residual, np.nan), (1.0,), False)
+    else:
+        result = conjugate_gradients(system.stiffness.apply_inside, residual, preconditioner, tolerance, max_iterations)
     coefficients[1:-1, 1:-1, 1:-1] = result.x
     clock.append(time.process_time())
     errors = None
-    if problem.exact is not None:
+    if problem.exact is not None and not system.folded:
         errors = error_norms(volume, space, coefficients, problem.exact_at)
     clock.append(time.process_time())
     report = SolveReport(
@@ -117,6 +137,7 @@ def _solve(
         converged=result.converged,
         residual=result.residuals[-1],
         seconds=dict(zip(("setup", "solve", "errors"), np.diff(clock).tolist(), strict=True)),
+        folded=system.folded,
         errors=errors,
         notices=_notices(system, certified),
         residuals=result.residuals,

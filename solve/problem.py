@@ -12,6 +12,8 @@ from parameterize.bspline import Array
 
 from .expressions import Expression, ExpressionError
 
+LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
+
 Data = str | Callable[[Array, Array, Array], ArrayLike]
 
 
@@ -88,10 +90,12 @@ def _values(name: str, data: Expression | Data | None, x: Array, y: Array, z: Ar
 
 
 def _finite(name: str, values: Array, x: Array, y: Array, z: Array) -> Array:
-    """Values unchanged; ExpressionError naming the first point where they are not finite."""
-    bad = ~np.isfinite(values)
+    """Values unchanged; ExpressionError naming the first point where they are not finite, or beyond LARGEST."""
+    bad = ~(np.abs(values) <= LARGEST)  # NaN included
     if bad.any():
         at = tuple(np.argwhere(bad)[0][-x.ndim :])
         where = f"x={x[at]:.6g}, y={y[at]:.6g}, z={z[at]:.6g}"
+        if np.isfinite(values[bad].flat[0]):
+            raise ExpressionError(f"{name} exceeds {LARGEST:.0e} at {where}, a point of the domain: scale the data")
         raise ExpressionError(f"{name} is not finite at {where}, a point of the domain")
     return values

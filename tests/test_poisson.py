@@ -5,7 +5,7 @@ import pytest
 
 from parameterize.bspline import greville, open_uniform_knots
 from parameterize.volume import BSplineVolume
-from solve import ConvergenceError, ExpressionError, Poisson, SplineField, benchmark_volume, solve_poisson
+from solve import ConvergenceError, ExpressionError, Poisson, SplineField, benchmark_volume, check_data, solve_poisson
 
 WAVE = Poisson(exact="exp(x+z)*sin(y)")
 
@@ -154,6 +154,8 @@ def test_a_map_that_is_not_certified_is_said_loudly(caplog):
 def test_a_fold_seen_at_the_gauss_points_is_said():
     report = solve_poisson(benchmark_volume(8, amplitude=0.3), WAVE, max_iterations=20).report
     assert any("folded" in notice for notice in report.notices)
+    assert report.l2 is None and not report.converged and report.iterations == 0
+    assert "NOT SOLVED" in str(report)
 
 
 @pytest.mark.parametrize(
@@ -168,6 +170,14 @@ def test_a_fold_seen_at_the_gauss_points_is_said():
 def test_data_that_are_not_finite_name_the_point(problem, name):
     """The benchmark map reaches x < 0."""
     with pytest.raises(ExpressionError, match=rf"{name}.* not finite at x=-?\d.*, y=.*, z="):
+        solve_poisson(benchmark_volume(3), problem)
+    with pytest.raises(ExpressionError, match=rf"{name}.* not finite"):
+        check_data(benchmark_volume(3), problem)
+
+
+@pytest.mark.parametrize("problem", [Poisson(source="1e300"), Poisson(source="0", boundary="1e300*x")])
+def test_data_whose_squares_overflow_are_refused(problem):
+    with pytest.raises(ExpressionError, match="exceeds 1e\\+100 at x="):
         solve_poisson(benchmark_volume(3), problem)
 
 
