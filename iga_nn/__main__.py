@@ -1,5 +1,19 @@
-"""`python -m iga_nn`: the command line."""
+"""The console script and `python -m iga_nn`; the command line is imported inside, where Ctrl-C is caught already."""
 
-from .cli import run_and_exit
+import sys
 
-run_and_exit()
+
+def run_and_exit() -> None:
+    """Run the command line on the program's arguments."""
+    try:
+        from .cli import main
+
+        code = main(sys.argv[1:])
+    except KeyboardInterrupt:
+        sys.stderr.write("iga-nn: interrupted; nothing was computed yet that could be resumed\n")
+        code = 130
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    run_and_exit()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,8 +17,8 @@ from solve.expressions import ExpressionError
 
 from . import __version__, console, pipeline
 from . import report as reports
-from .options import InputError, MapOptions, PoissonOptions, input_errors
-from .pipeline import Outcome
+from .folder import Outcome
+from .options import InputError, MapOptions, PoissonOptions, input_errors, one_line
 
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
 
@@ -47,7 +49,7 @@ class OutputOptions:
         as_json: the verdict as JSON on stdout.
     """
 
-    out: Path | None = None
+    out: str | None = None
     force: bool = False
     quiet: bool = False
     as_json: Json = False
@@ -113,9 +115,9 @@ def check(path: str, /, *, component: int | None = None, max_faces: int = MAX_FA
     is_volume = path.endswith(".npz")
     verdict = pipeline.check_volume(path) if is_volume else pipeline.check_surface(path, component, max_faces)
     if as_json:
-        print(json.dumps(reports.plain(verdict), indent=2))
+        _say(json.dumps(reports.plain(verdict), indent=2))
     else:
-        print("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
+        _say("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
     return NOT_CERTIFIED if is_volume and verdict["bijective"] != "certified" else DONE
 
 
@@ -127,13 +129,17 @@ def write_sample(name: str, /, *, out: Path | None = None) -> int:
         name: one of the samples.
         out: file to write; NAME.obj in the current folder by default.
     """
+    from .data import obj_path
     from .samples import sample, write_obj
 
     with input_errors():
         surface = sample(name)
-    target = out or Path(f"{name}.obj")
-    write_obj(surface, target)
-    print(target)
+    target = obj_path(name, out)
+    try:
+        write_obj(surface, target)
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
+    _say(str(target))
     return DONE
 
 
@@ -147,7 +153,7 @@ def fetch_model(name: str, /, *, out: Path | None = None) -> int:
     """
     from .data import fetch
 
-    print(fetch(name, out))
+    _say(str(fetch(name, out)))
     return DONE
 
 
@@ -155,24 +161,38 @@ def main(argv: list[str]) -> int:
     """Run one command and return its exit code; everything but a bug of ours ends in one line and a code."""
     try:
         code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
-    except KeyboardInterrupt:
-        print("iga-nn: interrupted; the same command with --resume goes on from the checkpoint", file=sys.stderr)
+    except KeyboardInterrupt as error:  # with the way on, where there is one
+        print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
-    except (CycloptsError, InputError, MeshError, ExpressionError, OSError) as error:
-        print(f"iga-nn: {' '.join(str(error).split())}", file=sys.stderr)
+    except CycloptsError as error:
+        print(f"iga-nn: {one_line(error)}{_minus_hint(argv)}", file=sys.stderr)
+        return BAD_INPUT
+    except (InputError, MeshError, ExpressionError, OSError) as error:
+        print(f"iga-nn: {one_line(error)}", file=sys.stderr)
         return BAD_INPUT
     return code if isinstance(code, int) else DONE  # --help and --version return nothing
 
 
-def run_and_exit() -> None:
-    """Run the console script."""
-    sys.exit(main(sys.argv[1:]))
+def _minus_hint(argv: list[str]) -> str:
+    """The remedy where a formula was taken for an option."""
+    for option, value in pairwise(argv):
+        if option in ("--exact", "--source", "--boundary") and value.startswith("-"):
+            return f" A formula that starts with a minus is written {option}={value}"
+    return ""
+
+
+def _say(text: str) -> None:
+    """Print to stdout; a reader that has gone, such as `head`, is no error."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush at exit
 
 
 def _tell(outcome: Outcome, output: OutputOptions) -> int:
     """Say the verdict and return the exit code: 3 wins over 4."""
     verdict = reports.verdict(outcome.report, outcome.folder)
-    print(json.dumps(reports.plain(verdict), indent=2) if output.as_json else "\n".join(_lines(verdict)))
+    _say(json.dumps(reports.plain(verdict), indent=2) if output.as_json else "\n".join(_lines(verdict)))
     if not reports.is_certified(outcome.report):
         return NOT_CERTIFIED
     return DONE if reports.is_converged(outcome.report) else NOT_CONVERGED
@@ -186,9 +206,8 @@ def _lines(verdict: dict[str, Any]) -> list[str]:
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
     for level in verdict.get("levels", []):
         error = f"L2 error {level['l2']:.3e}, " if "l2" in level else ""
-        end = "" if level["converged"] else ", NOT CONVERGED"
+        end = "" if level["converged"] else ", NOT CONVERGED" if level["iterations"] else ", NOT SOLVED"
         lines.append(f"{level['dofs']:>8} unknowns {error}{level['iterations']} iterations{end}")
-    lines += [f"warning: {notice}" for notice in verdict.get("notices", [])]
     lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")
     return lines
 

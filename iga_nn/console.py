@@ -39,24 +39,31 @@ class ProgressLine:
 
 
 def describe(progress: Progress) -> str:
-    """Stage, step, loss, folded samples and time left, as one line."""
+    """Stage, step, loss, folded samples and time left, as one line: of the training, the spline's own comes on top."""
     minutes, seconds = divmod(round(max(0.0, progress.seconds_left)), 60)
+    label = "at most" if progress.stage == "spline" else "training left"
     return (
         f"{progress.stage:8s} step {progress.step}/{progress.steps}  loss {progress.loss:.3e}  "
-        f"folded {progress.folded}  left {minutes}:{seconds:02d}"
+        f"folded {progress.folded}  {label} {minutes}:{seconds:02d}"
     )
 
 
 class _ConsoleHandler(logging.Handler):
-    """Log records as single lines above the progress line."""
+    """Log records as single lines above the progress line; the same warning once."""
 
     def __init__(self, console: Console) -> None:
         super().__init__()
         self._console = console
+        self._warned: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
-        prefix = f"{record.levelname.lower()}: " if record.levelno >= logging.WARNING else ""
-        self._console.print(Text(prefix + record.getMessage()), soft_wrap=True)
+        text = record.getMessage()
+        if record.levelno >= logging.WARNING:
+            if text in self._warned:
+                return
+            self._warned.add(text)
+            text = f"{record.levelname.lower()}: {text}"
+        self._console.print(Text(text), soft_wrap=True)
 
 
 @contextmanager

@@ -68,11 +68,16 @@ MODELS = {
 def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FACES) -> Surface:
     """The surface meant by MESH: a file, else a sample, else a model in the folder IGA_NN_DATA.
 
-    component, max_faces: as in load_surface, for files. Raises MeshError saying where to get what is missing.
+    component, max_faces: as in load_surface. Raises MeshError saying where to get what is missing.
     """
     is_file = Path(name).is_file()  # the results' folder has the sample's name, too
     if not is_file and name in SAMPLES:
-        return sample(name)
+        surface = sample(name)
+        if component not in (None, 0):
+            raise MeshError(f"{name}: no component {component}: a sample is one piece; leave --component out")
+        if len(surface.faces) > max_faces:
+            raise MeshError(f"{name}: {len(surface.faces)} faces, more than {max_faces}: raise --max-faces")
+        return surface
     found = None if is_file else _in_data_folder(name)
     if found is not None or Path(name).exists():
         return load_surface(found or name, component=component, max_faces=max_faces)
@@ -92,9 +97,7 @@ def fetch(name: str, out: str | Path | None = None) -> Path:
     """
     if name not in MODELS:
         raise MeshError(f"{name}: no such model; the models are {', '.join(sorted(MODELS))}")
-    target = Path(out) if out is not None else Path(f"{name}.obj")
-    if target.is_dir():
-        raise MeshError(f"{target}: is a directory: name the file to write")
+    target = obj_path(name, out)
     source = _in_data_folder(name) or _download(name)
     try:
         if source.suffix == ".obj":
@@ -104,6 +107,20 @@ def fetch(name: str, out: str | Path | None = None) -> Path:
             write_obj(load_surface(source), target)
     except OSError as error:
         raise MeshError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
+    return target
+
+
+def obj_path(name: str, out: str | Path | None) -> Path:
+    """The OBJ file to write. Raises MeshError where it cannot be one."""
+    target = Path(out) if out is not None else Path(f"{name}.obj")
+    if target.is_dir() or not target.name:
+        raise MeshError(f"{target}: is a directory: name the file to write")
+    if target.suffix != ".obj":
+        raise MeshError(f"{target}: surfaces are written as .obj: choose such a name with --out")
+    if not target.parent.is_dir():
+        raise MeshError(
+            f"{target}: cannot be written (there is no folder {target.parent}): make it, or choose another with --out"
+        )
     return target
 
 

@@ -13,9 +13,14 @@ import numpy as np
 
 if TYPE_CHECKING:
     from parameterize.config import Config
+    from parameterize.volume import BSplineVolume
     from solve import Poisson
 
 _CORNERS_BYTES = 65_536
+MAX_CONTROL_POINTS = 100  # per direction
+MAX_STEPS_FACTOR = 100.0
+MAX_REFINE = 6
+MAX_DOFS = 20_000_000  # some 15 GB at degree 3
 DEFAULT_EXACT = "exp(x+z)*sin(y)"  # the paper's problem, section 5.5
 
 
@@ -29,7 +34,14 @@ def input_errors() -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError) as error:
-        raise InputError(str(error)) from None
+        raise InputError(one_line(error)) from None
+
+
+def one_line(error: BaseException) -> str:
+    """What an exception says, as one line; "path: reason" where the operating system refused."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return " ".join(str(error).split())
 
 
 @dataclass(frozen=True)
@@ -65,6 +77,10 @@ class MapOptions:
 
         if self.seed < 0:
             raise InputError(f"seed {self.seed}: must not be negative")
+        if not 0.0 < self.steps_factor <= MAX_STEPS_FACTOR:
+            raise InputError(f"steps factor {self.steps_factor}: must be positive, at most {MAX_STEPS_FACTOR:g}")
+        if self.control_points > MAX_CONTROL_POINTS:
+            raise InputError(f"control points {self.control_points}: at most {MAX_CONTROL_POINTS} per direction")
         with input_errors():
             config = preset(self.preset).scaled(self.steps_factor).with_control_points(self.control_points)
         if self.control_points <= config.spline.degree:
@@ -80,7 +96,7 @@ class PoissonOptions:
 
     Attributes:
         exact: solution as a formula in x, y, z; gives f and g, and errors are reported. The paper's exp(x+z)*sin(y)
-            where neither f nor g is given.
+            where neither f nor g is given. A formula that starts with a minus is written --exact=-x.
         source: f, a formula in x, y, z.
         boundary: g, a formula in x, y, z.
         refine: each level halves every span of the map's knots that many times.
@@ -99,6 +115,8 @@ class PoissonOptions:
 
         if not self.refine or min(self.refine) < 0 or len(set(self.refine)) != len(self.refine):
             raise InputError(f"refine {self.refine}: give distinct levels, 0 or larger")
+        if max(self.refine) > MAX_REFINE:
+            raise InputError(f"refine {max(self.refine)}: at most {MAX_REFINE}; each level has 8 times the unknowns")
         if self.degree is not None and not 1 <= self.degree <= 8:
             raise InputError(f"degree {self.degree}: must lie between 1 and 8")
         exact = self.exact
@@ -106,6 +124,16 @@ class PoissonOptions:
             exact = DEFAULT_EXACT
         with input_errors():
             return Poisson(exact=exact, source=self.source, boundary=self.boundary)
+
+    def check_size(self, volume: BSplineVolume) -> None:
+        """Raise InputError where the finest mesh on a volume of these knots has too many unknowns."""
+        from solve.space import trial_space
+
+        dofs = trial_space(volume, max(self.refine), self.degree).dofs
+        if dofs > MAX_DOFS:
+            raise InputError(
+                f"refine {max(self.refine)} gives {dofs:,} unknowns, more than {MAX_DOFS:,}: lower refine or degree"
+            )
 
 
 def read_corners(path: Path) -> np.ndarray[Any, Any]:

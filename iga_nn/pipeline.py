@@ -8,18 +8,18 @@ from __future__ import annotations
 import hashlib
 import logging
 import shutil
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from parameterize.files import save_arrays
 from parameterize.volume import BSplineVolume
 
 from . import report as reports
+from .folder import CHECKPOINT, Outcome, RunFolder, has_checkpoint, open_folder
 from .options import InputError, MapOptions, PoissonOptions, input_errors, read_corners
 
 if TYPE_CHECKING:
@@ -30,44 +30,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-CHECKPOINT = "checkpoint"
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """A finished output folder and what its report.json says."""
-
-    folder: Path
-    report: reports.Report
-
-
-@dataclass
-class _Run:
-    """One output folder being filled: its report so far, and the clock."""
-
-    folder: Path
-    report: reports.Report = field(default_factory=lambda: {"schema": reports.SCHEMA})
-    seconds: dict[str, float] = field(default_factory=dict)
-    started: float = field(default_factory=time.perf_counter)
-
-    @contextmanager
-    def timed(self, step: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
-
-    def begin(self) -> None:
-        """The input is good: from here on nothing in the folder counts as finished."""
-        (self.folder / reports.FILE_NAME).unlink(missing_ok=True)
-
-    def write(self, **sections: Any) -> None:
-        self.report.update(sections)
-        reports.write(self.folder, self.report | {"seconds": self.seconds})
-
-    def finish(self) -> Outcome:
-        self.seconds["total"] = time.perf_counter() - self.started
-        self.write(seconds=self.seconds)
-        return Outcome(self.folder, reports.plain(self.report))
+MAP_FILES = ("volume.npz", "boundary.npz", "history.npz", "history.png", "faces.png", "distortion.png")
+SOLUTION_FILES = ("solution.npz", "error.png")
 
 
 def run(
@@ -89,16 +53,19 @@ def run(
     if problem != "poisson":
         raise InputError(f"problem {problem!r}: only 'poisson' can be solved")
     mapping, poisson = mapping or MapOptions(), poisson or PoissonOptions()
-    equation = poisson.problem()
-    state, finished = _open(mesh, out, force, mapping.resume)
-    if finished:
-        if "poisson" in finished.report:
+    equation, spline = poisson.problem(), mapping.config().spline
+    poisson.check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree))
+    with open_folder(mesh, out, force, mapping.resume) as (state, finished):
+        if finished and "poisson" not in finished.report:
+            volume = finished.folder / "volume.npz"
+            raise InputError(
+                f"{finished.folder}: holds a finished volume; `iga-nn solve poisson {volume}` solves on it"
+            )
+        if finished:
             return finished
-        volume = finished.folder / "volume.npz"
-        raise InputError(f"{finished.folder}: holds a finished volume; `iga-nn solve poisson {volume}` solves on it")
-    result = _parameterize(state, mesh, mapping, progress)
-    _solve(state, result.volume, equation, poisson)
-    return state.finish()
+        result = _parameterize(state, mesh, mapping, progress, equation)
+        _solve(state, result.volume, equation, poisson)
+        return state.finish()
 
 
 def parameterize_to(
@@ -111,33 +78,37 @@ def parameterize_to(
 ) -> Outcome:
     """From a surface to volume.npz, boundary.npz, history.npz, report.json and figures; raises as `run` does."""
     mapping = mapping or MapOptions()
-    state, finished = _open(mesh, out, force, mapping.resume)
-    if finished:
-        return finished
-    _parameterize(state, mesh, mapping, progress)
-    return state.finish()
+    with open_folder(mesh, out, force, mapping.resume) as (state, finished):
+        if finished:
+            return finished
+        _parameterize(state, mesh, mapping, progress)
+        return state.finish()
 
 
 def solve_to(
     volume: str | Path, out: str | Path | None = None, *, poisson: PoissonOptions | None = None, force: bool = False
 ) -> Outcome:
     """Solve on a saved volume: solution.npz, report.json, error.png; raises as `run` does. Needs no torch."""
+    from solve import check_data
+
     poisson = poisson or PoissonOptions()
     equation = poisson.problem()
     path = Path(volume)
     loaded = _load_volume(path)
-    state, _ = _open(path, out, force)
-    state.begin()
-    with state.timed("certify"):
-        certificate = _certify(loaded)
-    log.info("certificate: %s", certificate["bijective"])
-    state.write(
-        input={"file": str(volume), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
-        versions=reports.versions(),
-        parameterization=certificate,
-    )
-    _solve(state, loaded, equation, poisson)
-    return state.finish()
+    poisson.check_size(loaded)
+    check_data(loaded, equation)
+    with open_folder(path, out, force) as (state, _):
+        state.begin(*SOLUTION_FILES)
+        with state.timed("certify"):
+            certificate = _certify(loaded)
+        log.info("certificate: %s", certificate["bijective"])
+        state.write(
+            input={"file": str(volume), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
+            versions=reports.versions(),
+            parameterization=certificate,
+        )
+        _solve(state, loaded, equation, poisson)
+        return state.finish()
 
 
 def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str, Any]:
@@ -150,25 +121,12 @@ def check_volume(path: str | Path) -> dict[str, Any]:
     return _certify(_load_volume(path))
 
 
-def _open(source: str | Path, out: str | Path | None, force: bool, resume: bool = False) -> tuple[_Run, Outcome | None]:
-    """Make the output folder and try it before anything costly; on --resume a finished one is the answer."""
-    folder = Path(out) if out is not None else Path(Path(source).name.split(".")[0])
-    known = reports.read(folder)
-    if known is not None and reports.is_finished(known) and not force:
-        if resume:
-            return _Run(folder), Outcome(folder, known)
-        raise InputError(f"{folder}: holds a finished result; --force replaces it, --out names another folder")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror}); --out names another folder") from None
-    return _Run(folder), None
-
-
 def _parameterize(
-    state: _Run, mesh: str | Path, options: MapOptions, progress: ProgressCallback | None
+    state: RunFolder,
+    mesh: str | Path,
+    options: MapOptions,
+    progress: ProgressCallback | None,
+    equation: Poisson | None = None,
 ) -> Parameterization:
     config = options.config()
     with state.timed("load"):
@@ -185,7 +143,13 @@ def _parameterize(
         choose_device(options.device)
         if corners is not None:
             corner_vertices(surface, corners)
-    state.begin()
+    if equation is not None:  # what can be known of its data before there are points inside
+        x, y, z = surface.vertices.T
+        equation.boundary_at(x, y, z)
+        equation.source_at(x, y, z)
+    if options.resume and not has_checkpoint(state.folder):
+        log.info("no checkpoint, starting anew")
+    state.begin(*MAP_FILES, *SOLUTION_FILES)
     checkpoint = state.folder / CHECKPOINT
     try:
         result = parameterize(
@@ -220,7 +184,7 @@ def _parameterize(
     return result
 
 
-def _solve(state: _Run, volume: BSplineVolume, equation: Poisson, options: PoissonOptions) -> None:
+def _solve(state: RunFolder, volume: BSplineVolume, equation: Poisson, options: PoissonOptions) -> None:
     from solve import rates, solve_poisson
 
     verdict = state.report["parameterization"]["bijective"]
@@ -231,7 +195,8 @@ def _solve(state: _Run, volume: BSplineVolume, equation: Poisson, options: Poiss
                 solution = solve_poisson(volume, equation, refine=level, degree=options.degree, certified=verdict)
             solutions.append(solution)
             log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
-            solution.save(state.folder / "solution.npz")  # the finest so far
+            if not solution.report.folded:
+                solution.save(state.folder / "solution.npz")  # the finest so far
     found = [solution.report for solution in solutions]
     given = {"exact": equation.exact, "source": equation.source, "boundary": equation.boundary}
     state.write(
@@ -242,7 +207,7 @@ def _solve(state: _Run, volume: BSplineVolume, equation: Poisson, options: Poiss
             "notices": list(dict.fromkeys(notice for item in found for notice in item.notices)),  # each once
         }
     )
-    if equation.exact is not None:
+    if equation.exact is not None and not found[-1].folded:
         _draw(state, lambda plotting: plotting.draw_solution(state.folder, volume, solutions[-1], equation))
 
 
@@ -271,7 +236,7 @@ def _certify(volume: BSplineVolume) -> dict[str, Any]:
     }
 
 
-def _draw(state: _Run, draw: Callable[[Any], None]) -> None:
+def _draw(state: RunFolder, draw: Callable[[Any], None]) -> None:
     """Figures, timed; importing matplotlib and VTK takes part of it."""
     from . import plotting
 

@@ -14,6 +14,7 @@ import pytest
 import iga_nn
 import solve
 from iga_nn.cli import main
+from iga_nn.folder import open_folder
 from parameterize.checkpoint import CheckpointError
 from solve.study import benchmark_volume
 
@@ -25,6 +26,15 @@ def one_line(text: str) -> str:
     assert len(lines) == 1, text
     assert "Traceback" not in text
     return lines[0]
+
+
+def python(*arguments: str, path: str = "", stdout: int = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
+    """A fresh interpreter with the packages, and `path`, to import from."""
+    places = os.pathsep.join(filter(None, (path, str(Path(iga_nn.__file__).resolve().parents[1]))))
+    command = [sys.executable, *arguments]
+    return subprocess.run(
+        command, stdout=stdout, stderr=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": places}
+    )
 
 
 def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys):
@@ -71,14 +81,17 @@ def test_finished_output_is_left_alone_unless_forced(formula_training, in_folder
     assert Path("cube/volume.npz").stat().st_mtime_ns > before
 
 
-def test_folded_map_is_solved_with_a_warning_and_exit_code_3(formula_training, in_folder, capsys):
+def test_map_folded_at_quadrature_points_is_not_solved_and_exit_code_3(formula_training, in_folder, capsys):
     formula_training(amplitude=0.4)
     assert main(["run", "poisson", "cube", "--refine", "0"]) == 3
     report = json.loads(Path("cube/report.json").read_text())
     assert report["parameterization"]["bijective"] == "folded"
     assert "not certified" in report["poisson"]["notices"][0]
-    assert Path("cube/solution.npz").exists()
-    assert "not certified" in capsys.readouterr().err
+    assert "l2" not in report["poisson"]["levels"][0]
+    assert not Path("cube/solution.npz").exists() and not Path("cube/error.png").exists()
+    out, err = capsys.readouterr()
+    assert err.count("not certified") == err.count("no solution") == 1
+    assert "NOT SOLVED" in out and "warning" not in out
 
 
 def test_solve_that_does_not_converge_is_exit_code_4(monkeypatch, in_folder):
@@ -144,11 +157,26 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--exact", "__import__('os')"], "exact"),
         (["run", "poisson", "cube", "--boundary", "x"], "source"),
         (["run", "poisson", "cube", "--refine", "0", "0"], "refine"),
+        (["run", "poisson", "cube", "--refine", "9"], "at most 6"),
+        (["run", "poisson", "cube", "--refine", "999999999999"], "at most 6"),
+        (["run", "poisson", "cube", "--refine", "6"], "unknowns, more than 20,000,000"),
+        (["run", "poisson", "cube", "--exact", "log(x-0.5)"], "exact is not finite at x="),
+        (["run", "poisson", "cube", "--source", "1e300"], "source exceeds 1e+100"),
+        (["run", "poisson", "cube", "--exact", "-x"], "--exact=-x"),
+        (["run", "poisson", "cube", "--exact", "x^2"], "x**2"),
+        (["run", "poisson", "cube", "--exact", "2x"], "2*x"),
         (["run", "poisson", "cube", "--degree", "0"], "degree"),
         (["run", "poisson", "cube", "--preset", "slow"], "preset"),
         (["run", "poisson", "cube", "--seed", "-1"], "seed"),
         (["run", "poisson", "cube", "--control-points", "3"], "control points"),
+        (["run", "poisson", "cube", "--control-points", "100000"], "at most 100"),
         (["run", "poisson", "cube", "--steps-factor", "0"], "factor"),
+        (["run", "poisson", "cube", "--steps-factor", "inf"], "factor"),
+        (["run", "poisson", "cube", "--steps-factor", "nan"], "factor"),
+        (["run", "poisson", "cube", "--out", ""], "out is empty"),
+        (["check", "bean", "--component", "3"], "component 3"),
+        (["check", "bean", "--max-faces", "10"], "--max-faces"),
+        (["check", "x" * 300], "x: File name too long"),
         (["run", "poisson"], "requires an argument"),
         (["run", "heat", "cube"], "heat"),
         (["parameterize", "cube", "--corners", "missing.txt"], "missing.txt"),
@@ -164,6 +192,8 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["check", "missing.obj"], "missing.obj"),
         (["sample", "teapot"], "seashell"),
         (["sample", "bean", "--out", "no/such/folder/bean.obj"], "bean.obj"),
+        (["sample", "bean", "--out", "bean.stl"], "written as .obj"),
+        (["sample", "bean", "--out", ""], "name the file"),
         (["fetch", "teapot"], "conch"),
         (["nonsense"], "nonsense"),
         (["check", "bean", "--nonsense"], "nonsense"),
@@ -179,14 +209,61 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, says, in_folder, capsy
         main(["sample", "cube", "--out", "cube.obj"])
         arguments = ["cube.obj" if word == "cube" else word for word in arguments]
         capsys.readouterr()
+    before = set(Path().iterdir())
     assert main(arguments) == 2
-    assert says in one_line(capsys.readouterr().err)
+    line = one_line(capsys.readouterr().err)
+    assert says in line and "Errno" not in line
+    assert set(Path().iterdir()) == before
+
+
+def test_bad_data_leave_an_earlier_solution_alone(in_folder, capsys):
+    benchmark_volume(3).save("map.npz")
+    assert main(["solve", "poisson", "map.npz", "--refine", "0"]) == 0
+    before = {file.name: file.read_bytes() for file in Path("map").iterdir()}
+    assert main(["solve", "poisson", "map.npz", "--refine", "0", "--force", "--exact", "log(x)"]) == 2
+    assert {file.name: file.read_bytes() for file in Path("map").iterdir()} == before
+    assert main(["solve", "poisson", "map.npz", "--refine", "0", "--force", "--source", "1"]) == 0
+    assert not Path("map/error.png").exists()  # nothing of the older problem stays
+
+
+def test_second_run_in_the_same_folder_is_refused(in_folder, capsys):
+    with open_folder("cube", "out", force=False):
+        assert main(["parameterize", "cube", "--out", "out"]) == 2
+        assert "in use by another run" in one_line(capsys.readouterr().err)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals and pipes of POSIX")
+def test_ctrl_c_while_the_program_loads_is_one_line(in_folder):
+    Path("sitecustomize.py").write_text(
+        "import sys, signal\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'cyclopts': signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+    )
+    done = python("-m", "iga_nn", "sample", "bean", path=".")
+    assert done.returncode == 130 and "interrupted" in one_line(done.stderr)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals and pipes of POSIX")
+def test_reader_that_has_gone_is_no_error(in_folder):
+    read, write = os.pipe()
+    os.close(read)
+    done = python("-m", "iga_nn", "check", "bean", stdout=write)
+    os.close(write)
+    assert done.returncode == 0 and done.stderr == ""
 
 
 def test_interruption_is_130_and_names_the_way_on(formula_training, in_folder, capsys):
     formula_training(error=KeyboardInterrupt())
-    assert main(["parameterize", "cube"]) == 130
-    assert "--resume" in one_line(capsys.readouterr().err)
+    assert main(["parameterize", "cube", "--resume"]) == 130
+    err = capsys.readouterr().err
+    assert "no checkpoint, starting anew" in err and "nothing was computed yet" in one_line(err)
+    Path("cube/checkpoint").mkdir(parents=True)
+    Path("cube/checkpoint/training.safetensors").touch()
+    assert main(["parameterize", "cube", "--resume"]) == 130
+    err = capsys.readouterr().err
+    assert "no checkpoint" not in err and "--resume goes on" in one_line(err)
     assert not Path("cube/report.json").exists()  # not finished: the next run may use the folder
 
 

@@ -1,0 +1,130 @@
+"""One output folder: held by one run at a time, its report so far, and the clock."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any
+
+from . import report as reports
+from .options import InputError
+
+CHECKPOINT = "checkpoint"
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A finished output folder and what its report.json says."""
+
+    folder: Path
+    report: reports.Report
+
+
+@dataclass
+class RunFolder:
+    """One output folder being filled: its report so far, and the clock."""
+
+    folder: Path
+    report: reports.Report = field(default_factory=lambda: {"schema": reports.SCHEMA})
+    seconds: dict[str, float] = field(default_factory=dict)
+    started: float = field(default_factory=time.perf_counter)
+
+    @contextmanager
+    def timed(self, step: str) -> Iterator[None]:
+        """Count the block's seconds as those of `step`."""
+        start = time.perf_counter()
+        yield
+        self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
+
+    def begin(self, *replaced: str) -> None:
+        """The input is good: from here on nothing in the folder counts as finished; files of an older run go."""
+        for name in (reports.FILE_NAME, *replaced):
+            (self.folder / name).unlink(missing_ok=True)
+
+    def write(self, **sections: Any) -> None:
+        """Add sections to the report and write it."""
+        self.report.update(sections)
+        reports.write(self.folder, self.report | {"seconds": self.seconds})
+
+    def finish(self) -> Outcome:
+        """Write the total: the result is finished."""
+        self.seconds["total"] = time.perf_counter() - self.started
+        self.write(seconds=self.seconds)
+        return Outcome(self.folder, reports.plain(self.report))
+
+
+@contextmanager
+def open_folder(
+    source: str | Path, out: str | Path | None, force: bool, resume: bool = False
+) -> Iterator[tuple[RunFolder, Outcome | None]]:
+    """Make the output folder and hold it, tried before anything costly; on --resume a finished one is the answer."""
+    if out == "":
+        raise InputError("out is empty: name a folder")
+    folder = Path(out) if out is not None else Path(Path(source).name.split(".")[0])
+    with _writable(folder):
+        is_new = not folder.exists()
+        folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with _locked(folder):
+            known = reports.read(folder)
+            finished = Outcome(folder, known) if known and reports.is_finished(known) and not force else None
+            if finished and not resume:
+                raise InputError(f"{folder}: holds a finished result; --force replaces it, --out names another folder")
+            with _writable(folder):
+                if not finished:
+                    TemporaryFile(dir=folder).close()
+            yield RunFolder(folder), finished
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted; {_way_on(folder)}") from None
+    finally:
+        if is_new:
+            with suppress(OSError):
+                folder.rmdir()  # where nothing was written
+
+
+@contextmanager
+def _writable(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); --out names another folder") from None
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Keep other runs out of the folder; where there are no such locks, do without. Raises InputError."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    with _writable(folder):
+        handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system without locks
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(f"{folder}: in use by another run; wait, or name another folder with --out") from None
+        yield
+    finally:
+        os.close(handle)
+
+
+def has_checkpoint(folder: Path) -> bool:
+    """Whether an interrupted training left something to go on from."""
+    return any((folder / CHECKPOINT).glob("*.safetensors"))
+
+
+def _way_on(folder: Path) -> str:
+    """How to go on after an interruption."""
+    if has_checkpoint(folder):
+        return "the same command with --resume goes on from the checkpoint"
+    if (folder / "volume.npz").exists():
+        return f"the volume is written: `iga-nn solve poisson {folder / 'volume.npz'}` solves on it"
+    return "nothing was computed yet that could be resumed"
