@@ -53,7 +53,7 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
     assert set(report["versions"]) == {"python", "numpy", "scipy", "torch", "iga-nn"}
     out, err = capsys.readouterr()
     assert "certified" in out and "deep/result" in out
-    assert "S(2)" in err and "folded 0" in err
+    assert "S(2)" in err and "folded 0  training left 0:01" in err
 
 
 def test_json_is_the_verdict_alone(formula_training, in_folder, capsys):
