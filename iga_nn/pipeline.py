@@ -195,8 +195,7 @@ def _solve(state: RunFolder, volume: BSplineVolume, equation: Poisson, options: 
                 solution = solve_poisson(volume, equation, refine=level, degree=options.degree, certified=verdict)
             solutions.append(solution)
             log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
-            if not solution.report.folded:
-                solution.save(state.folder / "solution.npz")  # the finest so far
+            solution.save(state.folder / "solution.npz")  # the finest so far
     found = [solution.report for solution in solutions]
     given = {"exact": equation.exact, "source": equation.source, "boundary": equation.boundary}
     state.write(
@@ -207,7 +206,7 @@ def _solve(state: RunFolder, volume: BSplineVolume, equation: Poisson, options: 
             "notices": list(dict.fromkeys(notice for item in found for notice in item.notices)),  # each once
         }
     )
-    if equation.exact is not None and not found[-1].folded:
+    if equation.exact is not None:
         _draw(state, lambda plotting: plotting.draw_solution(state.folder, volume, solutions[-1], equation))
 
 

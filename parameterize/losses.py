@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from .rotation import closest_rotation, cofactor, determinant
-from .sample import OFFSETS
+from .sample import OFFSETS, gather
 
 _POSITION = {tuple(int(v) for v in offset): i for i, offset in enumerate(OFFSETS)}
 _UNITS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -93,7 +93,7 @@ def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float =
 
     following: (s, 2) pairs of consecutive path points.
     """
-    step = mapped[following[:, 1]] - mapped[following[:, 0]]
+    step = gather(mapped, following[:, 1]) - gather(mapped, following[:, 0])
     aim = target[following[:, 1]] - target[following[:, 0]]
     direction = step / step.norm(dim=1, keepdim=True).clamp_min(1e-12)
     aim = aim / aim.norm(dim=1, keepdim=True).clamp_min(1e-12)

@@ -41,6 +41,14 @@ class Stencils:
         return self.nodes + (self.cell * shift).to(self.nodes.device)
 
 
+def gather(rows: Tensor, index: Tensor) -> Tensor:
+    """rows[index] for rows (n, k) and any index shape, with a repeatable gradient.
+
+    Plain indexing adds the gradients of repeated rows in the order in which threads happen to come.
+    """
+    return rows.index_select(0, index.flatten()).view(*index.shape, rows.shape[1])
+
+
 def signed_distance(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
     """Distance to the surface, negative inside: (m, 3) -> (m,)."""
     kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER

@@ -20,7 +20,7 @@ from .corners import CORNERS, CubeSurface, PathError, choose_corners, cut_surfac
 from .cutting import IntArray
 from .network import InverseMap
 from .progress import Progress, ProgressCallback, ignore
-from .sample import Stencils, TriangleSampler, stencils
+from .sample import Stencils, TriangleSampler, gather, stencils
 from .targets import nearest, nearest_on_cube_face
 
 _log = logging.getLogger(__name__)
@@ -261,7 +261,7 @@ class Trainer:
         parts = [self.stencils.shifted(self.generator), boundary.vertices[used]]
         parts += [boundary.vertices[index] for index in (boundary.corners, boundary.path) if index is not None]
         mapped = list(self.network(torch.cat(parts)).split([len(p) for p in parts]))
-        nodes, surface = mapped[0][self.stencils.index], mapped[1][place]  # (r, 19, 3), (3 t, 3)
+        nodes, surface = gather(mapped[0], self.stencils.index), gather(mapped[1], place)  # (r, 19, 3), (3 t, 3)
 
         jacobian = losses.stencil_jacobian(nodes, self.stencils.cell)
         det = losses.determinant(jacobian)

@@ -13,7 +13,7 @@ from parameterize.volume import BSplineVolume
 
 from .boundary import boundary_coefficients
 from .field import SplineField
-from .linear import LinearResult, conjugate_gradients
+from .linear import conjugate_gradients
 from .norms import error_norms
 from .operators import System, assemble
 from .planes import map_planes
@@ -28,10 +28,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Solution(SplineField):
-    """The discrete solution: a scalar spline of the parameters, the map it lives on, and the report.
-
-    The coefficients inside are NaN where the map is folded at Gauss points (`report.folded`): nothing is solved there.
-    """
+    """The discrete solution: a scalar spline of the parameters, the map it lives on, and the report."""
 
     geometry: BSplineVolume
     report: SolveReport
@@ -119,14 +116,11 @@ def _solve(
     residual = (system.load - system.stiffness.apply(coefficients))[1:-1, 1:-1, 1:-1]
     preconditioner = fast_diagonalization(system.stiffness, rule)
     clock.append(time.process_time())
-    if system.folded:
-        result = LinearResult(np.full_like(residual, np.nan), (1.0,), False)
-    else:
-        result = conjugate_gradients(system.stiffness.apply_inside, residual, preconditioner, tolerance, max_iterations)
+    result = conjugate_gradients(system.stiffness.apply_inside, residual, preconditioner, tolerance, max_iterations)
     coefficients[1:-1, 1:-1, 1:-1] = result.x
     clock.append(time.process_time())
     errors = None
-    if problem.exact is not None and not system.folded:
+    if problem.exact is not None:
         errors = error_norms(volume, space, coefficients, problem.exact_at)
     clock.append(time.process_time())
     report = SolveReport(
@@ -137,7 +131,6 @@ def _solve(
         converged=result.converged,
         residual=result.residuals[-1],
         seconds=dict(zip(("setup", "solve", "errors"), np.diff(clock).tolist(), strict=True)),
-        folded=system.folded,
         errors=errors,
         notices=_notices(system, certified),
         residuals=result.residuals,
@@ -150,5 +143,5 @@ def _notices(system: System, certified: str | None) -> tuple[str, ...]:
     if certified not in (None, "certified"):
         notices.append(f"the map is {certified}, not certified: do not trust the solution")
     if system.folded:
-        notices.append(f"the map is folded (det J < 0 at {system.folded} of {system.points} Gauss points): no solution")
+        notices.append(f"det J < 0 at {system.folded} of {system.points} Gauss points: solved with |det J| instead")
     return tuple(notices)

@@ -14,8 +14,7 @@ class SolveReport:
 
     elements, dofs: totals; the unknowns fixed by boundary data count as dofs.
     h: longest straight edge of a mapped element, in the volume's units.
-    folded: number of Gauss points with det J < 0; unless it is zero nothing was solved.
-    errors: the norms, None without an exact solution or where nothing was solved; `l2`, `l2_relative` and
+    errors: the norms, None without an exact solution; `l2`, `l2_relative` and
         `h1_seminorm` read from it.
     residual: |r| / |b| at the end; residuals: the same before the first and after every iteration.
     seconds: process CPU seconds of setup, solve and errors.
@@ -29,7 +28,6 @@ class SolveReport:
     converged: bool
     residual: float
     seconds: dict[str, float]
-    folded: int = 0
     errors: Errors | None = None
     notices: tuple[str, ...] = ()
     residuals: tuple[float, ...] = field(default=(), repr=False)
@@ -60,5 +58,5 @@ class SolveReport:
         parts = [f"{self.elements} elements", f"{self.dofs} dofs", f"h {self.h:.4g}"]
         parts += [f"{name} {value:.4e}" for name, value in errors if value is not None]
         state = "" if self.converged else f", NOT CONVERGED (residual {self.residual:.1e})"
-        parts.append("NOT SOLVED" if self.folded else f"{self.iterations} iterations{state}")
+        parts.append(f"{self.iterations} iterations{state}")
         return "\n".join([", ".join(parts), *self.notices])

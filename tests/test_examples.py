@@ -24,7 +24,7 @@ def load(name: str) -> ModuleType:
 def test_first_run(capsys):
     load("first_run").main("ellipsoid", iga_nn.preset("fast").scaled(0.005).with_control_points(8), levels=2)
     out = capsys.readouterr().out
-    assert "ARAP" in out and ("L2 rate" in out or "no solution" in out)  # a short training may leave folds
+    assert "ARAP" in out and "L2 rate" in out
 
 
 def test_convergence_rates():

@@ -42,7 +42,7 @@ def test_python_runs(in_folder, monkeypatch, capsys):
     (block,) = blocks("python")
     exec(compile(block, "README.md", "exec"), {})  # noqa: S102 our own text
     out = capsys.readouterr().out
-    assert "rate" in out or "no solution" in out  # a short training may leave folds
+    assert "rate" in out
     assert Path("volume.npz").exists()
 
 
