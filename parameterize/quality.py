@@ -46,7 +46,7 @@ class QualityReport:
     certificate: whether det J > 0 on the whole cube, its lower bound, the witness of a fold.
     boundary_injective: whether the six boundary surfaces do not meet but at their common edges; None where untested.
     arap: sum of (sigma_i - 1)^2, the smallest sigma signed with det J, over `arap_points` Gauss points.
-    boundary: ||F(v_p) - v|| over the `boundary_vertices` vertices of the boundary map.
+    boundary: ||F(v_p) - v|| over the mesh's own `mesh_vertices` vertices; cuts and subdivisions do not count.
     mesh_to_spline: from each of `mesh_vertices` vertices to the spline's boundary (foot point refined on the spline).
     spline_to_mesh: from samples_per_face x samples_per_face points a cube face to the mesh's triangles.
     """
@@ -57,7 +57,6 @@ class QualityReport:
     arap: BothScales[Distortion]
     arap_points: int
     boundary: BothScales[Distances]
-    boundary_vertices: int
     mesh_to_spline: BothScales[Distances]
     mesh_vertices: int
     spline_to_mesh: BothScales[Distances]
@@ -82,7 +81,7 @@ class QualityReport:
             },
             "points": {
                 "arap": self.arap_points,
-                "boundary": self.boundary_vertices,
+                "boundary": self.mesh_vertices,
                 "mesh_to_spline": self.mesh_vertices,
                 "spline_to_mesh": 6 * self.samples_per_face**2,
             },
@@ -121,14 +120,18 @@ def measure(
 ) -> QualityReport:
     """Measure a volume against the mesh it came from.
 
-    volume, surface_vertices (n, 3), surface_faces (m, 3) and boundary: all in the user's units.
+    volume, surface_vertices (n, 3), surface_faces (m, 3) and boundary: all in the user's units. The boundary map starts
+    with the surface's vertices, in their order.
     scale: the factor that brings the model to volume 1 (Surface.scale).
-    Raises ValueError for a scale that is not positive.
+    Raises ValueError for a scale that is not positive or a boundary map of fewer vertices.
     """
     if not (isfinite(scale) and scale > 0.0):
         raise ValueError(f"scale must be positive, got {scale}; Surface.scale is the one meant")
     vertices = np.asarray(surface_vertices, dtype=np.float64)
     faces = np.asarray(surface_faces, dtype=np.int64)
+    n = len(vertices)
+    if len(boundary.vertices) < n:
+        raise ValueError(f"boundary must start with the surface's {n} vertices, it has {len(boundary.vertices)}")
     sampled = SampledBoundary.of(volume)
     _, sigma, weights = _singular_grid(volume, n_gauss=3)
     return QualityReport(
@@ -137,8 +140,7 @@ def measure(
         certificate=certificate,
         arap=BothScales(_distortion(scale * sigma, weights), _distortion(sigma, weights)),
         arap_points=weights.size,
-        boundary=_both(np.linalg.norm(volume(boundary.parameters) - boundary.vertices, axis=1), scale),
-        boundary_vertices=len(boundary.vertices),
+        boundary=_both(np.linalg.norm(volume(boundary.parameters[:n]) - boundary.vertices[:n], axis=1), scale),
         mesh_to_spline=_both(to_boundary(vertices, volume, sampled), scale),
         mesh_vertices=len(vertices),
         spline_to_mesh=_both(to_mesh(sampled.points, vertices, faces), scale),
