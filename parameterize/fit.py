@@ -9,7 +9,7 @@ from torch import Tensor
 
 from .bspline import Array, basis_derivatives
 from .conjugate import conjugate_gradients
-from .tensor_grid import FastDiagonalization, SmoothnessOperator, gram, to_torch
+from .tensor_grid import FastDiagonalization, SmoothnessOperator, grams, to_torch
 
 
 def fit_pairs(
@@ -27,11 +27,10 @@ def fit_pairs(
     parameters (m, 3) in the unit cube, points (m, 3), weights (m,) that sum to 1: the discrete form of the paper's
     least squares on G(F(x)) = x. Where no sample lies, the smoothing term alone decides.
     """
-    kind = {"device": device, "dtype": torch.float64}
     rows = _collocation_3d(parameters, knots, degree)
     scaled = csr_array(rows * weights[:, None])
     matrix, transposed = (to_torch(m, device) for m in (rows, csr_array(scaled.T)))
-    mass, slope, curve = (tuple(gram(k, degree, d, **kind) for k in knots) for d in range(3))  # type: ignore[arg-type]
+    mass, slope, curve = grams(knots, degree, device)
     smooth = SmoothnessOperator(mass, slope, curve, stiffness=0.0, bending=fairness)
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
     shape = (3, *(len(k) - degree - 1 for k in knots))
@@ -39,7 +38,7 @@ def fit_pairs(
     def operator(x: Tensor) -> Tensor:
         return (transposed @ (matrix @ x.reshape(3, -1).T)).T.reshape(shape) + smooth(x)
 
-    right = (transposed @ torch.as_tensor(points, **kind)).T.reshape(shape)  # type: ignore[arg-type]
+    right = (transposed @ torch.as_tensor(points, dtype=torch.float64, device=device)).T.reshape(shape)
     control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
     return control.contiguous()  # components first also in memory, as a checkpoint gives them back
 

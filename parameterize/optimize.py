@@ -27,7 +27,7 @@ from .progress import Progress, ProgressCallback, ignore
 from .rotation import closest_rotation, cofactor, determinant
 from .stages import History
 from .surface_fit import SurfaceFit
-from .tensor_grid import FastDiagonalization, SmoothnessOperator, gauss_grid, gram
+from .tensor_grid import FastDiagonalization, SmoothnessOperator, gauss_grid, grams
 from .volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
@@ -82,9 +82,8 @@ class SplineEnergy:
     def __init__(self, config: SplineConfig, knots: Knots, surface: SurfaceFit, *, device: torch.device) -> None:
         self.config, self.surface = config, surface
         self.penalty = config.penalties[0]
-        kind = {"device": device, "dtype": torch.float64}
         self._distortion = Distortion(knots, config, device=device)
-        mass, slope, curve = (tuple(gram(k, config.degree, d, **kind) for k in knots) for d in range(3))  # type: ignore[arg-type]
+        mass, slope, curve = grams(knots, config.degree, device)
         self._bending = SmoothnessOperator(mass, slope, curve, stiffness=0.0, bending=2.0 * config.fairness)
         self._smooth = SmoothnessOperator(mass, slope, curve, stiffness=2.0, bending=2.0 * config.fairness)
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient, device=device)

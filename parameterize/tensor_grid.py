@@ -84,6 +84,11 @@ def gram(knots: Array, degree: int, derivative: int, *, device: torch.device, dt
     return table.T @ (torch.as_tensor(weights.ravel(), dtype=dtype, device=device)[:, None] * table)
 
 
+def grams(knots: tuple[Array, ...], degree: int, device: torch.device) -> list[tuple[Tensor, ...]]:
+    """Mass, stiffness and bending matrices, each for the three directions; float64."""
+    return [tuple(gram(k, degree, d, device=device, dtype=torch.float64) for k in knots) for d in range(3)]
+
+
 @dataclass(frozen=True, eq=False)
 class SmoothnessOperator:
     """x -> stiffness * K x + bending * H x, with x^T K x = int |grad F|^2 and x^T H x = int |Hessian F|^2 (exact)."""
