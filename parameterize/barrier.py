@@ -7,15 +7,21 @@ within the first spans next to an edge F keeps a small crease, as large as the f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from torch import Tensor
 
+from .bezier import extraction
 from .bspline import Array, basis_derivatives, breakpoints
-from .rotation import determinant
+from .conjugate import Operator
+from .rotation import cofactor
 from .tensor_grid import to_torch
+
+_BLOCK = 32  # spans at a time: what they need fits into the cache
 
 
 class SpanBarrier:
@@ -27,77 +33,151 @@ class SpanBarrier:
     def __init__(self, knots: tuple[Array, Array, Array], degree: int, floor: float, *, device: torch.device) -> None:
         self.knots, self.degree, self.floor, self.device = knots, degree, floor, device
         self.sizes = tuple(len(k) - degree - 1 for k in knots)
-        order = 3 * degree
+        order = 3 * degree  # coefficients of det J a direction
         nodes: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(order) + 0.5) / order)  # Chebyshev points of [0, 1]
-        bernstein = _bernstein(order - 1, nodes)
-        self._to_coefficients = self._tensor(np.linalg.inv(bernstein).astype(np.float64))  # (3 p, 3 p)
-        self._tables = [_span_tables(k, degree, nodes) for k in knots]
-        self._n_spans = int(np.prod([len(breakpoints(k)) - 1 for k in knots]))
+        _, tables = basis_derivatives(np.repeat([0.0, 1.0], degree + 1), degree, nodes, 1)  # a single span: Bernstein
+        inverse = np.linalg.inv(_bernstein(order - 1, nodes))
+        self._double = _Tables(self._tensor(tables[0]), self._tensor(tables[1]), self._tensor(inverse))
+        self._single = self._double.single()
+        self._extractions = [extraction(k, degree) for k in knots]
+        self._widths = [np.diff(breakpoints(k)) for k in knots]
+        n_spans = int(np.prod([len(w) for w in self._widths]))
+        self._share = 1.0 / (n_spans * order**3)
         self.active = np.zeros((0, 3), dtype=np.int64)
 
     def activate(self, spans: NDArray[np.int64]) -> None:
         """Add spans (k, 3) to the active ones."""
         self.active = np.unique(np.concatenate([self.active, spans]), axis=0)
-        windows = [self._tables[d][0][self.active[:, d]][:, None] + np.arange(self.degree + 1) for d in range(3)]
-        i, j, k = windows
-        flat = (i[:, :, None, None] * self.sizes[1] + j[:, None, :, None]) * self.sizes[2] + k[:, None, None, :]
-        ones, starts = np.ones(flat.size), np.arange(flat.size + 1)
-        gather = csr_array((ones, flat.ravel(), starts), shape=(flat.size, int(np.prod(self.sizes))))
-        self._gather, self._scatter = to_torch(gather, self.device), to_torch(csr_array(gather.T), self.device)
-        pick = [[self._tensor(table[self.active[:, d]]) for table in self._tables[d][1:]] for d in range(3)]
-        self._values, self._slopes = zip(*pick, strict=True)
+        k, width = len(self.active), self.degree + 1
+        if k == 0:
+            return
+        windows, weights = [], []
+        for d, (first, weight) in enumerate(self._extractions):
+            windows.append(first[self.active[:, d]][:, None] + np.arange(width))
+            weights.append(weight[self.active[:, d]])
+        flat = (windows[0][:, :, None, None] * self.sizes[1] + windows[1][:, None, :, None]) * self.sizes[2]
+        columns = np.broadcast_to((flat + windows[2][:, None, None, :]).reshape(k, width**3), (width**3, k, width**3))
+        rows = np.einsum("kax,kby,kcz->abckxyz", *weights, optimize=True)
+        starts = np.arange(width**3 * k + 1) * width**3
+        shape = (width**3 * k, int(np.prod(self.sizes)))
+        bezier = csr_array((rows.ravel(), columns.ravel(), starts), shape=shape)
+        bezier.eliminate_zeros()
+        self._bezier, self._transposed = to_torch(bezier, self.device), to_torch(csr_array(bezier.T), self.device)
+        volumes = np.prod([w[self.active[:, d]] for d, w in enumerate(self._widths)], axis=0)
+        self._per_volume = self._tensor(1.0 / volumes)  # (k,)
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """The penalty at control points (3, n_u, n_v, n_w), and its gradient."""
         if len(self.active) == 0:
             return 0.0, torch.zeros_like(control)
-        width = self.degree + 1
-        local = (self._gather @ control.reshape(3, -1).T).reshape(-1, width, width, width, 3)
-        local = local.permute(0, 4, 1, 2, 3).contiguous().requires_grad_()
-        with torch.enable_grad():
-            energy = (self.floor - self._coefficients(local)).clamp_min(0.0).square().mean(
-                dim=(1, 2, 3)
-            ).sum() / self._n_spans
-            (gradient,) = torch.autograd.grad(energy, local)
-        rows = gradient.permute(0, 2, 3, 4, 1).reshape(-1, 3)
-        return float(energy.detach()), (self._scatter @ rows).T.reshape(control.shape)
+        bezier = self._bezier_points(control)
+        pushed, energy = torch.empty_like(bezier), 0.0
+        for block in self._blocks():
+            cofactors, shortfall = self._shortfall(self._double, bezier[..., block], self._per_volume[block])
+            energy += float(shortfall.square().sum())
+            dual = self._double.to_nodes(-2.0 * shortfall * self._per_volume[block])
+            pushed[..., block] = self._double.jacobian_adjoint(cofactors * dual.flatten())
+        return self._share * energy, self._share * self._from_bezier(pushed, self._transposed)
 
-    def _coefficients(self, local: Tensor) -> Tensor:
-        """Control points of the spans (k, 3, p + 1, p + 1, p + 1) -> Bernstein coefficients (k, 3 p, 3 p, 3 p)."""
-        columns = []
-        for d in range(3):
-            field = local
-            for axis in range(3):
-                table = self._slopes[axis] if axis == d else self._values[axis]
-                field = _batched_along(table, field, axis)
-            columns.append(field.transpose(0, 1).flatten(1))  # (3, k * (3 p)^3)
-        det = determinant(torch.stack(columns, dim=1)).reshape(len(local), *[3 * self.degree] * 3)
-        t = self._to_coefficients
-        det = det @ t.T
-        det = t @ det
-        return (t @ det.flatten(2)).reshape(det.shape)
+    def curvature(self, control: Tensor) -> Operator:
+        """The Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
+        if len(self.active) == 0:
+            return torch.zeros_like
+        bezier, tables = self._bezier_points(control).float(), self._single
+        per_volume = self._per_volume.float()
+        parts = []
+        for block in self._blocks():
+            cofactors, shortfall = self._shortfall(tables, bezier[..., block], per_volume[block])
+            busy = torch.nonzero((shortfall > 0.0).flatten(0, 2).any(0))[:, 0]
+            count = len(shortfall[0, 0, 0])
+            picked = cofactors.view(3, 3, -1, count)[..., busy].flatten(2)
+            mask = (2.0 * self._share) * ((shortfall > 0.0) * per_volume[block] ** 2)[..., busy]
+            parts.append((busy + block.start, picked, mask))
+        matrix, transposed = self._bezier.float(), self._transposed.float()
+
+        def product(x: Tensor) -> Tensor:
+            local = self._to_bezier(x, matrix)
+            pushed = torch.zeros_like(local)
+            for busy, cofactors, mask in parts:
+                if len(busy) == 0:
+                    continue
+                change = (cofactors * tables.jacobian(local[..., busy])).sum(dim=(0, 1))
+                dual = tables.to_nodes(mask * tables.to_coefficients(change.view(mask.shape)))
+                pushed[..., busy] = tables.jacobian_adjoint(cofactors * dual.flatten())
+            return self._from_bezier(pushed, transposed)
+
+        return product
+
+    def _blocks(self) -> list[slice]:
+        return [slice(start, start + _BLOCK) for start in range(0, len(self.active), _BLOCK)]
+
+    def _bezier_points(self, control: Tensor) -> Tensor:
+        return self._to_bezier(control, self._bezier)
+
+    def _to_bezier(self, control: Tensor, matrix: Tensor) -> Tensor:
+        """Bezier points of the active spans: (3, p + 1, p + 1, p + 1, k)."""
+        width = self.degree + 1
+        return (matrix @ control.reshape(3, -1).T).T.reshape(3, width, width, width, -1)
+
+    def _from_bezier(self, pushed: Tensor, transposed: Tensor) -> Tensor:
+        return (transposed @ pushed.reshape(3, -1).T).T.reshape(3, *self.sizes)
+
+    def _shortfall(self, tables: _Tables, bezier: Tensor, per_volume: Tensor) -> tuple[Tensor, Tensor]:
+        """Cofactors of J at the nodes (3, 3, (3 p)^3 k), and how far the coefficients are below the floor."""
+        jacobian = tables.jacobian(bezier.contiguous())
+        cofactors = cofactor(jacobian)
+        det = (jacobian[0] * cofactors[0]).sum(0).view(*[3 * self.degree] * 3, -1)
+        return cofactors, (self.floor - tables.to_coefficients(det) * per_volume).clamp_min(0.0)
 
     def _tensor(self, values: Array) -> Tensor:
         return torch.as_tensor(values, dtype=torch.float64, device=self.device)
 
 
-def _batched_along(table: Tensor, field: Tensor, axis: int) -> Tensor:
-    """Apply (k, m, n) along axis 0, 1 or 2 of (k, 3, n_0, n_1, n_2), span by span."""
-    if axis == 2:
-        return field @ table.transpose(1, 2)[:, None, None]
-    if axis == 1:
-        return table[:, None, None] @ field
-    k, c, a, b, w = field.shape
-    return (table[:, None] @ field.reshape(k, c, a, b * w)).reshape(k, c, -1, b, w)
+@dataclass(frozen=True, eq=False)
+class _Tables:
+    """Bernstein polynomials and slopes at the nodes (3 p, p + 1); from values there to coefficients (3 p, 3 p)."""
+
+    values: Tensor
+    slopes: Tensor
+    inverse: Tensor
+
+    def single(self) -> _Tables:
+        """The same in single precision."""
+        return _Tables(self.values.float(), self.slopes.float(), self.inverse.float())
+
+    def jacobian(self, bezier: Tensor) -> Tensor:
+        """Bezier points of the spans (3, p + 1, p + 1, p + 1, k) -> J on unit spans at all nodes (3, 3, (3 p)^3 k)."""
+        plain, slope = _along(self.values, bezier, 3), _along(self.slopes, bezier, 3)
+        by_w = _along(self.values, slope, 2)
+        by_v, plain = _along(self.slopes, plain, 2), _along(self.values, plain, 2)
+        columns = _along(self.slopes, plain, 1), _along(self.values, by_v, 1), _along(self.values, by_w, 1)
+        return torch.stack([c.flatten(1) for c in columns], dim=1)
+
+    def jacobian_adjoint(self, dual: Tensor) -> Tensor:
+        """The transpose of `jacobian`."""
+        values, slopes, nodes = self.values.T, self.slopes.T, len(self.values)
+        by_u, by_v, by_w = dual.view(3, 3, nodes, nodes, nodes, -1).unbind(1)
+        plain = _along(values, _along(slopes, by_u, 1), 2) + _along(slopes, _along(values, by_v, 1), 2)
+        slope = _along(values, _along(values, by_w, 1), 2)
+        return _along(values, plain, 3) + _along(slopes, slope, 3)
+
+    def to_coefficients(self, field: Tensor) -> Tensor:
+        """Values at the nodes -> Bernstein coefficients, (3 p, 3 p, 3 p, k)."""
+        for axis in range(3):
+            field = _along(self.inverse, field, axis)
+        return field
+
+    def to_nodes(self, field: Tensor) -> Tensor:
+        """The transpose of `to_coefficients`."""
+        for axis in range(3):
+            field = _along(self.inverse.T, field, axis)
+        return field
 
 
-def _span_tables(knots: Array, degree: int, nodes: Array) -> tuple[NDArray[np.int64], Array, Array]:
-    """Of every span: its first basis function, and values and slopes at its nodes (n_spans, n_nodes, p + 1)."""
-    breaks = breakpoints(knots)
-    points = breaks[:-1, None] + np.diff(breaks)[:, None] * nodes
-    first, values = basis_derivatives(knots, degree, points.ravel(), 1)
-    shape = (*points.shape, degree + 1)
-    return first.reshape(points.shape)[:, 0], values[0].reshape(shape), values[1].reshape(shape)
+def _along(table: Tensor, field: Tensor, axis: int) -> Tensor:
+    """Apply (m, n) along one axis, not the last, of a field: as few and as large products as the layout allows."""
+    before, after = field.shape[:axis], field.shape[axis + 1 :]
+    return (table @ field.reshape(-1, field.shape[axis], after.numel())).view(*before, len(table), *after)
 
 
 def _bernstein(degree: int, x: Array) -> Array:

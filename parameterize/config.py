@@ -18,6 +18,8 @@ class NetworkConfig:
     width: int = 128
     modules: int = 4
     frequencies: int = 10
+    scale: float = 3.14  # k of the encoding before training
+    whiten: bool = True
 
 
 @dataclass(frozen=True)
@@ -65,15 +67,21 @@ class SplineConfig:
     degree: int = 3
     fit_cell: float = 0.035  # lattice of inverse samples
     fit_fairness: float = 1e-7
-    gauss: int = 2  # Gauss points a span and direction in the distortion term
+    gauss: int = 3  # Gauss points a direction in the distortion term, on the first and last span
+    inner_gauss: int = 1  # likewise on the others
     fairness: float = 1e-3
     vertex: float = 5e4  # squared distance along the surface normal
-    tangential: float = 0.02  # share of `vertex` for the distance within the tangent plane
+    arap_limit: float = 6.0  # distortion above this costs `stiffening` times its squared excess, too
+    stiffening: float = 3.0
+    tangential: float = 2e-4  # share of `vertex` for the distance within the tangent plane
     min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
-    penalties: tuple[float, ...] = (20.0, 20.0, 100.0, 500.0, 2500.0, 2500.0, 2500.0, 2500.0)  # one a round
-    steps: int = 25  # a round
-    history: int = 12  # L-BFGS pairs
+    penalties: tuple[float, ...] = (20.0, 100.0, 500.0, 2500.0, 2500.0, 2500.0, 2500.0, 2500.0)  # one a round
+    steps: int = 60  # a round, at most
+    first_gain: float = 4e-3  # the first round ends once a step lowers the energy by less than this share of it
+    gain: float = 5e-4  # likewise the later ones
+    tolerance: float = 0.1  # of the inner solves, relative
+    iterations: int = 20  # of an inner solve, at most
 
 
 @dataclass(frozen=True)

@@ -27,11 +27,13 @@ class InverseMap(nn.Module):
     """
 
     multiples: Tensor
+    affine: Tensor
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
+        self.register_buffer("affine", torch.eye(3))
         self.register_buffer("multiples", torch.arange(1.0, config.frequencies + 1.0))
-        self.scale = nn.Parameter(torch.tensor(1.0))  # k of the encoding
+        self.scale = nn.Parameter(torch.tensor(config.scale))  # k of the encoding
         self.first = nn.Linear(6 * config.frequencies + 3, config.width)
         self.residual = nn.Sequential(*(ResidualModule(config.width) for _ in range(config.modules)))
         self.last = nn.Linear(config.width, 3)
@@ -49,4 +51,4 @@ class InverseMap(nn.Module):
         """(m, 3) -> (m, 3)."""
         hidden = torch.relu(self.first(self.encode(x)))
         shift: Tensor = self.last(self.residual(hidden))
-        return x + shift
+        return (x - 0.5) @ self.affine.T + 0.5 + shift

@@ -9,7 +9,10 @@ few products with 1-D matrices. Between steps the boundary parameters slide (sur
 from __future__ import annotations
 
 import logging
+import math
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,9 +25,9 @@ from .bspline import Array, breakpoints
 from .certificate import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import SplineConfig
-from .conjugate import conjugate_gradients
+from .conjugate import Operator, conjugate_gradients
 from .progress import Progress, ProgressCallback, ignore
-from .rotation import closest_rotation, cofactor, determinant
+from .rotation import closest_rotation, cofactor, cross, least_eigenvalue
 from .stages import History
 from .surface_fit import SurfaceFit
 from .tensor_grid import FastDiagonalization, SmoothnessOperator, gauss_grid, grams
@@ -32,6 +35,8 @@ from .volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
+_SLIDES = 2
+_ROUGH = torch.float32  # good enough for the directions; energies and gradients are float64
 _SHORTEST_STEP = 1e-6
 _PATIENT_ROUNDS = (
     2  # after so many, the surface gives way where the map is not proved: a cube edge in a valley cannot fit
@@ -48,32 +53,87 @@ class Optimized:
 
 
 class Distortion:
-    """int |J - R|^2 + w (alpha - det J)_+^2 over the cube, R the closest rotation, by Gauss quadrature.
+    """int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over the cube with a = |J - R|^2, R the closest rotation.
 
-    The first part is the ARAP energy of F; the second, like the paper's bijectivity term, holds against folds.
+    a is the ARAP energy of F; the second part keeps its maximum down; the third, like the paper's bijectivity term,
+    holds against folds. Gauss quadrature.
     """
 
     def __init__(self, knots: Knots, config: SplineConfig, *, device: torch.device) -> None:
+        degrees = (config.degree,) * 3
         self._grid, (u, v, w) = gauss_grid(
-            knots, (config.degree,) * 3, config.gauss, device=device, dtype=torch.float64
+            knots, degrees, config.gauss, inner=config.inner_gauss, device=device, dtype=torch.float64
         )
-        self._weights = u[:, None, None] * v[:, None] * w
-        self._alpha = config.min_det
+        self._rough_grid = self._grid.to(_ROUGH)
+        self._weights = (u[:, None, None] * v[:, None] * w).flatten()
+        self._config = config
+        self._limit = config.arap_limit
+
+    def set_limit(self, control: Tensor) -> None:
+        """Put the limit l above which distortion costs more in proportion to 1 + the mean distortion at `control`."""
+        flat = self._rough_grid.jacobian(control.to(_ROUGH)).flatten(2)
+        density = (flat - closest_rotation(flat)).square().sum(dim=(0, 1))
+        self._limit = self._config.arap_limit * (1.0 + float(self._weights.to(_ROUGH) @ density))
 
     def energy_and_gradient(self, control: Tensor, penalty: float) -> tuple[float, Tensor, int]:
         """Energy, gradient (3, n_u, n_v, n_w), and the number of quadrature points with det J <= 0."""
+        config, weights = self._config, self._weights
         jacobian = self._grid.jacobian(control)
-        flat, weights = jacobian.flatten(2), self._weights.flatten()  # (3, 3, m), (m,)
-        det = determinant(flat)
-        low = torch.nonzero(det < self._alpha)[:, 0]
-        shortfall = weights[low] * (self._alpha - det[low])
-        push = (-2.0 * penalty) * shortfall * cofactor(flat[:, :, low])
-        energy = penalty * float((shortfall * (self._alpha - det[low])).sum())
-        dual = flat - closest_rotation(flat)
-        energy += float((weights * dual.square().sum(dim=(0, 1))).sum())
-        dual *= 2.0 * weights
-        dual[:, :, low] += push
-        return energy, self._grid.adjoint(dual.reshape(jacobian.shape)), int((det <= 0.0).sum())
+        flat = jacobian.flatten(2)  # (3, 3, m)
+        cofactors = cofactor(flat)
+        det = (flat[0] * cofactors[0]).sum(0)
+        shortfall = weights * (config.min_det - det).clamp_min(0.0)
+        gap = flat - closest_rotation(flat)
+        density = gap.square().sum(dim=(0, 1))
+        excess = (density - self._limit).clamp_min(0.0)
+        energy = weights @ (density + config.stiffening * excess.square())
+        energy += penalty * (shortfall @ (config.min_det - det))
+        dual = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess) * gap - 2.0 * penalty * shortfall * cofactors
+        return float(energy), self._grid.adjoint(dual.view(jacobian.shape)), int((det <= 0.0).sum())
+
+    def curvature(self, control: Tensor, penalty: float) -> Operator:
+        """A positive semidefinite second derivative at `control`, as an operator in single precision.
+
+        With S = R^T J, R turns by R [omega] when J changes by d, where (tr(S) I - S) omega = -sum_k R_k x d_k over the
+        rows k, so the Hessian of a is 2 (d - R [omega]). It is positive where all sums of two singular values, the
+        eigenvalues of tr(S) I - S, are at least 2; elsewhere these are lifted. The penalty's part is Gauss-Newton.
+        """
+        config, weights = self._config, self._weights.to(_ROUGH)
+        jacobian = self._rough_grid.jacobian(control.to(_ROUGH))
+        flat = jacobian.flatten(2)
+        rotation = closest_rotation(flat)
+        cofactors = cofactor(flat)
+        low = (flat[0] * cofactors[0]).sum(0) < config.min_det
+        push = (2.0 * penalty * weights * low).sqrt() * cofactors
+        gap = flat - rotation
+        excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
+        pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
+        scale = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess)
+        softness = _turning(rotation, flat)
+
+        def product(x: Tensor) -> Tensor:
+            change = self._rough_grid.jacobian(x).flatten(2)
+            torque = cross(rotation, change).sum(0)  # (3, m)
+            omega = (softness * torque).sum(1)  # of the opposite sign
+            dual = scale * (change + cross(rotation, omega.expand_as(rotation)))
+            dual += (pull * change).sum(dim=(0, 1)) * pull
+            dual += (push * change).sum(dim=(0, 1)) * push
+            return self._rough_grid.adjoint(dual.view(jacobian.shape))
+
+        return product
+
+
+def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
+    """(tr(S) I - S)^-1 with S = R^T J, its eigenvalues lifted so that the least is 2: (3, 3, m)."""
+    stretch = sum(rotation[k][:, None] * jacobian[k] for k in range(3))  # S, symmetric up to rounding
+    sums = -stretch
+    for i in range(3):
+        sums[i, i] += stretch[0, 0] + stretch[1, 1] + stretch[2, 2]
+    lift = (2.0 - least_eigenvalue(sums)).clamp_min(0.0)
+    for i in range(3):
+        sums[i, i] += lift
+    inverse = cofactor(sums)
+    return inverse / (sums[0] * inverse[0]).sum(0)
 
 
 class SplineEnergy:
@@ -85,21 +145,27 @@ class SplineEnergy:
         self._distortion = Distortion(knots, config, device=device)
         mass, slope, curve = grams(knots, config.degree, device)
         self._bending = SmoothnessOperator(mass, slope, curve, stiffness=0.0, bending=2.0 * config.fairness)
-        self._smooth = SmoothnessOperator(mass, slope, curve, stiffness=2.0, bending=2.0 * config.fairness)
+        single = [tuple(m.to(_ROUGH) for m in part) for part in (mass, slope, curve)]
+        self._rough_bending = SmoothnessOperator(*single, stiffness=0.0, bending=2.0 * config.fairness)
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient, device=device)
         pull = (
-            0.1 * config.vertex / 6.0
+            3e-4 * config.vertex / 6.0
         )  # points spread over six faces; below the true weight, which acts along normals only
         ends = torch.zeros_like(mass[0])
         ends[0, 0] = ends[-1, -1] = pull
         rough = tuple(2.0 * k + 2.0 * config.fairness * h + ends for k, h in zip(slope, curve, strict=True))
-        self._precondition = FastDiagonalization(rough, mass)
+        self._precondition = FastDiagonalization(rough, mass).to(_ROUGH)
+
+    def start_round(self, control: Tensor, penalty: float) -> None:
+        """Take a penalty weight, and the limit of the distortion that suits the control points."""
+        self.penalty = penalty
+        self._distortion.set_limit(control)
 
     def volume_part(self, control: Tensor) -> tuple[float, Tensor, int]:
         """Distortion, fairness and barrier: energy, gradient, folded quadrature points."""
         arap, gradient, folded = self._distortion.energy_and_gradient(control, self.penalty)
-        bent = self._bending(control)
         shortfall, push = self.barrier.energy_and_gradient(control)
+        bent = self._bending(control)
         energy = arap + 0.5 * float((bent * control).sum()) + self.penalty * shortfall
         return energy, gradient + bent + self.penalty * push, folded
 
@@ -108,51 +174,21 @@ class SplineEnergy:
         energy, gradient = self.surface.energy_and_gradient(control)
         return self.config.vertex * energy, self.config.vertex * gradient
 
-    def newton_direction(self, right: Tensor) -> Tensor:
-        """Approximate inverse Hessian times a vector: distortion with rotations held, without barrier."""
+    def newton_direction(self, control: Tensor, right: Tensor) -> Tensor:
+        """Approximate solution of Hessian x = -gradient, the parameters of the surface held."""
+        surface = self.surface.hessian(_ROUGH)
+        distortion = self._distortion.curvature(control, self.penalty)
+        barrier = self.barrier.curvature(control)
         direction, _ = conjugate_gradients(
-            lambda x: self._smooth(x) + self.config.vertex * self.surface.hessian_product(x),
-            right,
+            lambda x: (
+                distortion(x) + self._rough_bending(x) + self.penalty * barrier(x) + self.config.vertex * surface(x)
+            ),
+            right.to(_ROUGH),
             self._precondition,
-            tolerance=1e-2,
-            max_iterations=60,
+            tolerance=self.config.tolerance,
+            max_iterations=self.config.iterations,
         )
-        return direction
-
-
-class LBFGS:
-    """Two-loop recursion around an initial inverse Hessian (Nocedal and Wright, algorithm 7.4)."""
-
-    def __init__(self, pairs: int) -> None:
-        self._pairs = pairs
-        self._steps: list[Tensor] = []
-        self._changes: list[Tensor] = []
-
-    def forget(self) -> None:
-        """Start afresh."""
-        self._steps.clear()
-        self._changes.clear()
-
-    def remember(self, step: Tensor, change: Tensor) -> None:
-        """Keep a pair of step and gradient change, unless its curvature is not safely positive."""
-        if float((step * change).sum()) <= 1e-10 * float(step.norm() * change.norm()):
-            return
-        self._steps.append(step)
-        self._changes.append(change)
-        del self._steps[: -self._pairs], self._changes[: -self._pairs]
-
-    def direction(self, gradient: Tensor, energy: SplineEnergy) -> Tensor:
-        """Descent direction at the given gradient."""
-        right, alphas = -gradient, []
-        for s, y in zip(reversed(self._steps), reversed(self._changes), strict=True):
-            alpha = float((s * right).sum()) / float((s * y).sum())
-            alphas.append(alpha)
-            right = right - alpha * y
-        result = energy.newton_direction(right)
-        for s, y, alpha in zip(self._steps, self._changes, reversed(alphas), strict=True):
-            beta = float((y * result).sum()) / float((s * y).sum())
-            result = result + (alpha - beta) * s
-        return result
+        return direction.to(right.dtype)
 
 
 def optimize(
@@ -173,7 +209,32 @@ def optimize(
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
-    energy = SplineEnergy(config, knots, surface, device=control.device)
+    with _one_thread_an_operation():
+        energy = SplineEnergy(config, knots, surface, device=control.device)
+        return _rounds(control, knots, energy, history, progress, checkpoints)
+
+
+@contextmanager
+def _one_thread_an_operation() -> Iterator[None]:
+    """Most tensors here are small: handing them to a second thread costs more than it saves (up to 4 times)."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+def _rounds(
+    control: Tensor,
+    knots: Knots,
+    energy: SplineEnergy,
+    history: History,
+    progress: ProgressCallback,
+    checkpoints: Checkpoints,
+) -> Optimized:
+    """Descend, certify, watch the spans not proved, until certified or at the end of the penalties."""
+    config, surface = energy.config, energy.surface
     energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
     best = Optimized(control, certify(_as_volume(control, knots, config.degree)))
     first = 0
@@ -183,7 +244,7 @@ def optimize(
     for number in range(first, len(config.penalties)):
         if best.certificate.verdict == "certified" and number > 0:
             break
-        energy.penalty = config.penalties[number]
+        energy.start_round(control, config.penalties[number])
         surface.reproject(control)
         control = _descend(control, energy, number, history, progress)
         certificate = certify(_as_volume(control, knots, config.degree))
@@ -248,14 +309,20 @@ def _evaluate(control: Tensor, energy: SplineEnergy) -> _Point:
 
 
 def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> _Point | None:
-    """Halve the step until the energy falls enough (Armijo); None where the direction does not lead down."""
+    """Shorten the step until the energy falls enough (Armijo); None where the direction does not lead down.
+
+    The next length is where the parabola through the values and the slope at 0 has its minimum, between a tenth and a
+    half of the last (Nocedal and Wright, section 3.5).
+    """
     slope = float((direction * point.gradient).sum())
     length = 1.0
     while slope < 0.0 and length > _SHORTEST_STEP:
         trial = _evaluate(point.control + length * direction, energy)
-        if trial.total <= point.total + 1e-4 * length * slope:
+        rise = trial.total - point.total
+        if rise <= 1e-4 * length * slope:
             return trial
-        length *= 0.5
+        parabola = -slope * length / (2.0 * (rise - slope * length)) if math.isfinite(rise) else 0.1
+        length *= min(max(parabola, 0.1), 0.5)
     return None
 
 
@@ -265,24 +332,23 @@ def _descend(
     """One round of L-BFGS steps with sliding boundary parameters."""
     steps = energy.config.steps
     total_steps = steps * len(energy.config.penalties)
-    lbfgs = LBFGS(energy.config.history)
     started = time.perf_counter()
     point = _evaluate(control, energy)
     for step in range(steps):
-        found = _line_search(point, lbfgs.direction(point.gradient, energy), energy)
-        if found is None:
-            lbfgs.forget()
-            found = _line_search(point, lbfgs.direction(point.gradient, energy), energy)
+        found = _line_search(point, energy.newton_direction(point.control, -point.gradient), energy)
         if found is None:
             _log.info("round %d: no descent after step %d", number, step)
             break
-        lbfgs.remember(found.control - point.control, found.gradient - point.gradient)
-        energy.surface.slide(found.control, 0.5 / control.shape[1])
+        gain = point.total - found.total
+        for _ in range(_SLIDES):
+            energy.surface.slide(found.control, 0.5 / control.shape[1])
         point = replace(found, outer=energy.surface_part(found.control))
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
         left = (time.perf_counter() - started) / (step + 1) * (total_steps - done)
         progress(Progress("spline", done, total_steps, point.total, point.folded, left))
+        if gain < (energy.config.gain if number else energy.config.first_gain) * point.total:
+            break
     return point.control
 
 

@@ -14,13 +14,29 @@ from torch import Tensor
 
 def determinant(j: Tensor) -> Tensor:
     """Determinants of (3, 3, m): (m,)."""
-    return (j[0] * torch.linalg.cross(j[1], j[2], dim=0)).sum(0)
+    return (j[:1] * cross(j[1:2], j[2:])).sum(dim=(0, 1))
 
 
 def cofactor(j: Tensor) -> Tensor:
     """Matrices of cofactors (3, 3, m): the inverse of J is their transpose over det J."""
-    cross = torch.linalg.cross
-    return torch.stack([cross(j[1], j[2], dim=0), cross(j[2], j[0], dim=0), cross(j[0], j[1], dim=0)])
+    cyclic = torch.cat([j, j[:2]])
+    return cross(cyclic[1:4], cyclic[2:5])
+
+
+def cross(a: Tensor, b: Tensor) -> Tensor:
+    """Cross products of rows (k, 3, m), row by row; slices along the samples are fast."""
+    a, b = torch.cat([a, a[:, :2]], dim=1), torch.cat([b, b[:, :2]], dim=1)  # (k, 5, m)
+    return torch.addcmul(a[:, 1:4] * b[:, 2:5], a[:, 2:5], b[:, 1:4], value=-1.0)
+
+
+def least_eigenvalue(s: Tensor) -> Tensor:
+    """Of symmetric matrices (3, 3, m), by the trigonometric formula: (m,)."""
+    mean = (s[0, 0] + s[1, 1] + s[2, 2]) / 3.0
+    shifted = s - mean * torch.eye(3, dtype=s.dtype, device=s.device)[:, :, None]
+    spread = (shifted.square().sum(dim=(0, 1)) / 6.0).sqrt()
+    cosine = determinant(shifted) / (2.0 * spread**3).clamp_min(torch.finfo(s.dtype).tiny)
+    angle = torch.acos(cosine.clamp(-1.0, 1.0)) / 3.0
+    return mean + 2.0 * spread * torch.cos(angle + 2.0 * torch.pi / 3.0)
 
 
 @torch.no_grad()
@@ -37,7 +53,7 @@ def closest_rotation(j: Tensor, iterations: int = 7) -> Tensor:
     r = torch.where(regular, j / size, identity).float()
     for _ in range(iterations - 2):
         inverse_t = cofactor(r)
-        inverse_t /= determinant(r)
+        inverse_t /= (r[0] * inverse_t[0]).sum(0)
         g = (inverse_t.square().sum(dim=(0, 1)) / r.square().sum(dim=(0, 1))).sqrt().sqrt()
         r = r.mul_(g).add_(inverse_t.div_(g)).mul_(0.5)
     for kind in (torch.float32, j.dtype):  # close to the rotation g is 1

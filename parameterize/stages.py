@@ -20,7 +20,7 @@ from .corners import CORNERS, CubeSurface, PathError, choose_corners, cut_surfac
 from .cutting import IntArray
 from .network import InverseMap
 from .progress import Progress, ProgressCallback, ignore
-from .sample import Stencils, TriangleSampler, gather, stencils
+from .sample import Stencils, TriangleSampler, gather, interior_points, stencils
 from .targets import nearest, nearest_on_cube_face
 
 _log = logging.getLogger(__name__)
@@ -104,6 +104,8 @@ class Trainer:
         self.vertices, self.faces = vertices, faces
         self.corners = given_corners
         self.network = InverseMap(config.network).to(device=device, dtype=dtype)
+        if config.network.whiten:
+            self.network.affine.copy_(self._tensor(whitening(interior_points(vertices, faces, config.train.cell))))
         self.stencils: Stencils = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
         self.history = history if history is not None else History()
         self.progress = progress
@@ -292,6 +294,12 @@ class Trainer:
         if boundary.labels is None:
             return nearest(stage.target, surface)
         return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
+
+
+def whitening(points: Array) -> Array:
+    """The symmetric (3, 3) of determinant 1 that makes a cloud of points (m, 3) as wide in all directions."""
+    values, vectors = np.linalg.eigh(np.cov(points.T))
+    return (vectors * np.sqrt(values.prod() ** (1.0 / 3.0) / values)) @ vectors.T
 
 
 def _part(tensors: State, prefix: str) -> State:

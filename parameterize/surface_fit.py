@@ -17,6 +17,7 @@ from scipy.sparse import csr_array
 from torch import Tensor
 
 from .bspline import Array, basis_derivatives, breakpoints
+from .conjugate import Operator
 from .cutting import IntArray
 from .distances import SampledBoundary, foot_points
 from .tensor_grid import to_torch
@@ -82,10 +83,16 @@ class SurfaceFit:
         pulled = (self._metric @ residual[:, :, None])[:, :, 0]
         return float((residual * pulled).sum()), 2.0 * self._apply_transposed(pulled, control)
 
-    def hessian_product(self, direction: Tensor) -> Tensor:
-        """Second derivative of the energy times a direction, parameters held."""
-        moved = self._apply(direction)
-        return 2.0 * self._apply_transposed((self._metric @ moved[:, :, None])[:, :, 0], direction)
+    def hessian(self, dtype: torch.dtype) -> Operator:
+        """Second derivative of the energy, parameters held, as an operator on (3, n_u, n_v, n_w)."""
+        matrix, transposed = self._matrix.to(dtype), self._transposed.to(dtype)
+        metric = 2.0 * self._metric.to(dtype)
+
+        def product(direction: Tensor) -> Tensor:
+            moved = matrix @ direction.reshape(3, -1).T
+            return (transposed @ (metric @ moved[:, :, None])[:, :, 0]).T.reshape(direction.shape)
+
+        return product
 
     def residuals(self, control: Tensor) -> Array:
         """F(p) - v: (N, 3)."""
@@ -94,7 +101,8 @@ class SurfaceFit:
     def slide(self, control: Tensor, max_step: float) -> None:
         """One Gauss-Newton step of every parameter towards the point of F's boundary closest to its surface point.
 
-        A step over an edge of the cube goes on upon the next face; `max_step` limits a step in the parameters.
+        A step over an edge of the cube goes on upon the next face; `max_step` limits a step in the parameters. Points
+        that would end up farther away stay where they are.
         """
         net = np.asarray(control.cpu()).reshape(3, -1).T  # (n, 3)
         indices, values, d_a, d_b = self._rows(derivatives=True)
@@ -108,7 +116,16 @@ class SurfaceFit:
         rows = np.arange(len(moved))
         moved[rows, a] += step[:, 0]
         moved[rows, b] += step[:, 1]
+        before = self.parameters, self.cube_faces
         self.place(*fold_over_edges(moved, self.cube_faces))
+        farther = (self.residuals(control) ** 2).sum(axis=1) > (residual**2).sum(axis=1)
+        self._take(*before, farther)
+
+    def _take(self, parameters: Array, cube_faces: IntArray, chosen: NDArray[np.bool_]) -> None:
+        """Take these parameters for the chosen points only."""
+        self.place(
+            np.where(chosen[:, None], parameters, self.parameters), np.where(chosen, cube_faces, self.cube_faces)
+        )
 
     def reproject(self, control: Tensor) -> None:
         """Look for every parameter anew over the whole boundary; take the find where it is clearly closer.
@@ -118,9 +135,7 @@ class SurfaceFit:
         volume = BSplineVolume((self.degree,) * 3, self.knots, control.permute(1, 2, 3, 0).cpu().numpy())
         parameters, cube_faces, distance = foot_points(self.points, volume, SampledBoundary.of(volume, _SAMPLES))
         better = distance < 0.9 * np.linalg.norm(self.residuals(control), axis=1)
-        self.place(
-            np.where(better[:, None], parameters, self.parameters), np.where(better, cube_faces, self.cube_faces)
-        )
+        self._take(parameters, cube_faces, better)
 
     def _apply(self, control: Tensor) -> Tensor:
         return self._matrix @ control.reshape(3, -1).T

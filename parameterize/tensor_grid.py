@@ -15,6 +15,8 @@ from torch import Tensor
 
 from .bspline import Array, collocation, gauss_points
 
+_END_SPANS = 1
+
 
 def along(matrix: Tensor, field: Tensor, axis: int) -> Tensor:
     """Apply a matrix (m, n) along axis 0, 1 or 2 of a field (3, n_0, n_1, n_2)."""
@@ -44,6 +46,11 @@ class TensorGrid:
     values: tuple[Tensor, Tensor, Tensor]
     slopes: tuple[Tensor, Tensor, Tensor]
 
+    def to(self, dtype: torch.dtype) -> TensorGrid:
+        """The same grid in another precision."""
+        values, slopes = (tuple(m.to(dtype) for m in part) for part in (self.values, self.slopes))
+        return TensorGrid(values, slopes)  # type: ignore[arg-type]
+
     def jacobian(self, control: Tensor) -> Tensor:
         """(3, n_u, n_v, n_w) -> (3, 3, m_u, m_v, m_w): component, direction, grid."""
         (b0, b1, b2), (d0, d1, d2) = self.values, self.slopes
@@ -61,16 +68,38 @@ class TensorGrid:
 
 
 def gauss_grid(
-    knots: tuple[Array, ...], degrees: tuple[int, ...], n_gauss: int, *, device: torch.device, dtype: torch.dtype
+    knots: tuple[Array, ...],
+    degrees: tuple[int, ...],
+    n_gauss: int,
+    *,
+    inner: int | None = None,
+    device: torch.device,
+    dtype: torch.dtype,
 ) -> tuple[TensorGrid, tuple[Tensor, ...]]:
-    """Grid of Gauss points, `n_gauss` a span and direction, and the three weight vectors."""
+    """Grid of Gauss points and the three weight vectors: `n_gauss` points a span and direction.
+
+    inner: points on all spans but the first and last. One is enough there for smooth splines, which have one basis
+    function a span (the half-point rule of Hughes, Reali, Sangalli, CMAME 199, 2010).
+    """
     values, slopes, weights = [], [], []
     for k, p in zip(knots, degrees, strict=True):
-        points, weight = gauss_points(k, n_gauss)
-        values.append(_dense(k, p, points.ravel(), 0, device, dtype))
-        slopes.append(_dense(k, p, points.ravel(), 1, device, dtype))
-        weights.append(torch.as_tensor(weight.ravel(), dtype=dtype, device=device))
+        points, weight = _graded_points(k, n_gauss, n_gauss if inner is None else inner)
+        values.append(_dense(k, p, points, 0, device, dtype))
+        slopes.append(_dense(k, p, points, 1, device, dtype))
+        weights.append(torch.as_tensor(weight, dtype=dtype, device=device))
     return TensorGrid(tuple(values), tuple(slopes)), tuple(weights)  # type: ignore[arg-type]
+
+
+def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
+    """Gauss points and weights (m,): `outer` on the first and last span, `inner` on the others."""
+    fine, coarse = gauss_points(knots, outer), gauss_points(knots, inner)
+    split = min(_END_SPANS, len(fine[0]) // 2)
+    middle = slice(split, len(fine[0]) - split)
+    points, weights = (
+        np.concatenate([f[:split].ravel(), c[middle].ravel(), f[len(f) - split :].ravel()])
+        for f, c in zip(fine, coarse, strict=True)
+    )
+    return points, weights
 
 
 def _dense(knots: Array, degree: int, x: Array, derivative: int, device: torch.device, dtype: torch.dtype) -> Tensor:
@@ -128,6 +157,11 @@ class FastDiagonalization:
         self._vectors = tuple(vectors)
         u, v, w = values
         self._inverse = 1.0 / (u[:, None, None] + v[:, None] + w + shift)
+
+    def to(self, dtype: torch.dtype) -> FastDiagonalization:
+        """Itself, applied in another precision from now on."""
+        self._vectors, self._inverse = tuple(v.to(dtype) for v in self._vectors), self._inverse.to(dtype)
+        return self
 
     def __call__(self, residual: Tensor) -> Tensor:
         """(3, n_u, n_v, n_w) -> the same shape."""

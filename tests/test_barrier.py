@@ -75,3 +75,20 @@ def test_edge_spans():
     assert [0, 2, 0] in spans.tolist() and [3, 4, 2] in spans.tolist()
     assert [0, 2, 2] not in spans.tolist() and [1, 1, 1] not in spans.tolist()
     assert len(edge_spans((2, 2, 2))) == 8 and len(edge_spans((1, 1, 1))) == 1
+
+
+def test_curvature_is_gauss_newton():
+    knots, control, volume = setting(3, 0.1)
+    barrier = SpanBarrier(knots, 3, 0.8, device=CPU)
+    spans = all_spans(volume)
+    barrier.activate(spans)
+    step = torch.randn(control.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+
+    def coefficients(x):
+        return bernstein_coefficients(BSplineVolume((3,) * 3, knots, np.moveaxis(x.numpy(), 0, -1)), spans)
+
+    change = (coefficients(control + 1e-6 * step) - coefficients(control - 1e-6 * step)) / 2e-6
+    change = np.where(coefficients(control) < 0.8, change, 0.0)
+    expected = 2.0 * (change**2).mean(axis=(1, 2, 3)).sum() / len(spans)
+    found = float((step * barrier.curvature(control)(step.float())).sum())
+    assert found == pytest.approx(expected, rel=3e-3)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize.rotation import closest_rotation, cofactor, determinant
+from parameterize.rotation import closest_rotation, cofactor, determinant, least_eigenvalue
 
 
 def batch(matrices, dtype=torch.float64):
@@ -92,3 +92,10 @@ def test_determinant_and_cofactors():
     assert determinant(batch(j)).numpy() == pytest.approx(np.linalg.det(j))
     expected = np.linalg.inv(j).transpose(0, 2, 1) * np.linalg.det(j)[:, None, None]
     assert np.moveaxis(cofactor(batch(j)).numpy(), -1, 0) == pytest.approx(expected)
+
+
+def test_least_eigenvalue_of_symmetric_matrices():
+    a = np.random.default_rng(5).normal(size=(50, 3, 3))
+    symmetric = np.concatenate([a + np.swapaxes(a, 1, 2), 2.0 * np.eye(3)[None], np.zeros((1, 3, 3))])
+    found = least_eigenvalue(batch(symmetric)).numpy()
+    assert found == pytest.approx(np.linalg.eigvalsh(symmetric)[:, 0], abs=1e-7)

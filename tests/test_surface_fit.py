@@ -64,7 +64,7 @@ def test_energy_is_quadratic_with_the_given_gradient_and_hessian():
     direction = torch.randn(control.shape, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
     energy, gradient = fit.energy_and_gradient(control)
     slope = float((gradient * direction).sum())
-    curvature = float((direction * fit.hessian_product(direction)).sum())
+    curvature = float((direction * fit.hessian(torch.float64)(direction)).sum())
     for h in (0.5, -0.3):
         moved, _ = fit.energy_and_gradient(control + h * direction)
         assert moved == pytest.approx(energy + h * slope + 0.5 * h**2 * curvature, rel=1e-10)

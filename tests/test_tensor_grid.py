@@ -149,3 +149,11 @@ def test_conjugate_gradients_stop_where_told():
     assert count == 0 and float(zero.abs().max()) == 0.0
     loose, _ = conjugate_gradients(lambda v: matrix @ v, right, lambda r: r, tolerance=1e-2, max_iterations=99)
     assert float((matrix @ loose - right).norm()) <= 1e-2 * float(right.norm())
+
+
+def test_one_point_on_inner_spans():
+    grid, weights = gauss_grid(KNOTS, DEGREES, 3, inner=1, **KIND)
+    for k, w, values in zip(KNOTS, weights, grid.values, strict=True):
+        spans = len(np.unique(k)) - 1
+        assert len(w) == len(values) == (spans - 2 + 2 * 3 if spans > 1 else spans)
+        assert float(w.sum()) == pytest.approx(k[-1] - k[0])
