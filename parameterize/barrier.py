@@ -36,7 +36,7 @@ class SpanBarrier:
         order = 3 * degree  # coefficients of det J a direction
         nodes: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(order) + 0.5) / order)  # Chebyshev points of [0, 1]
         _, tables = basis_derivatives(np.repeat([0.0, 1.0], degree + 1), degree, nodes, 1)  # a single span: Bernstein
-        inverse = np.linalg.inv(_bernstein(order - 1, nodes))
+        inverse: Array = np.linalg.inv(_bernstein(order - 1, nodes)).astype(np.float64)
         self._double = _Tables(self._tensor(tables[0]), self._tensor(tables[1]), self._tensor(inverse))
         self._single = self._double.single()
         self._extractions = [extraction(k, degree) for k in knots]

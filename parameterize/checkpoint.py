@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +31,17 @@ class Checkpoints:
     """
 
     def __init__(self, folder: Path | None, identity: Mapping[str, Any], *, resume: bool) -> None:
-        self._folder, self._resume = folder, resume
+        self._folder, self._resume, self._suffix = folder, resume, ""
         self._identity = json.dumps({"format": FORMAT, **identity}, sort_keys=True)
         if folder is not None and not resume:
-            for name in NAMES:
-                (folder / f"{name}.safetensors").unlink(missing_ok=True)
+            for path in [path for name in NAMES for path in folder.glob(f"{name}*.safetensors")]:
+                path.unlink()
+
+    def of_start(self, start: int) -> Checkpoints:
+        """The same, with files of their own for another start of the run than the first, number 0."""
+        other = copy(self)
+        other._suffix = f"-{start}" if start else ""
+        return other
 
     def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:
         """Write checkpoint `name`, replacing an older one. Raises OSError naming the file, say on a full disk."""
@@ -44,7 +51,7 @@ class Checkpoints:
         header = {"identity": self._identity, "state": json.dumps(state)}
         copies = {k: v.detach().cpu().clone(memory_format=torch.contiguous_format) for k, v in tensors.items()}
         content = to_bytes(copies, metadata=header)  # copies: the file format refuses tensors that share memory
-        save_bytes(self._folder / f"{name}.safetensors", content)
+        save_bytes(self._folder / f"{name}{self._suffix}.safetensors", content)
 
     def load(self, name: str) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
         """Tensors and state of checkpoint `name`; None where there is none or the run starts afresh.
@@ -53,7 +60,7 @@ class Checkpoints:
         """
         if self._folder is None or not self._resume:
             return None
-        path = self._folder / f"{name}.safetensors"
+        path = self._folder / f"{name}{self._suffix}.safetensors"
         if not path.exists():
             return None
         try:

@@ -5,20 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from .boundary import BoundaryMap
 from .bspline import Array
 from .cutting import CutMesh, IntArray, cut_along_rays
+from .layout import snap, untangle
 from .volume import BSplineVolume
 
-_NEAR_EDGE = 1e-5  # parameters closer than this to an edge of the cube are put on it: no slivers from the cut
-_SAME = (
-    1e-7  # share of a mesh edge: cuts this close to a vertex take the vertex, which _NEAR_EDGE then puts on the edge
-)
-_FLAT = 1e-13  # orientation of a triangle that counts as flipped
-_SWEEPS = 600
-_PATIENCE = 60
+_SAME = 1e-7  # share of a mesh edge: cuts this close to a vertex take the vertex, which NEAR_EDGE then puts on the edge
 _SETTLE_STEPS = 8
 _UNDO_ROUNDS = 10
 _MARGIN = 1e-2  # share of a mesh edge that a cut keeps from its ends
@@ -30,9 +24,9 @@ def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parame
     Parameters come from closest points of the volume's boundary, which may turn a few triangles over where the spline
     smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
     """
-    placed = _snap(_untangle(_snap(parameters), faces))
+    placed = untangle(parameters, faces)
     cut = cut_along_rays(placed, faces, _SAME)
-    spread = _snap(cut.carry(placed))
+    spread = snap(cut.carry(placed))
     spread[: len(placed)] = placed
     plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
     closer = _settle_cuts(volume, vertices, cut, spread)
@@ -78,42 +72,3 @@ def _fit_two(first: Array, second: Array, right: Array) -> tuple[Array, Array]:
     aa, bb = aa + damping, bb + damping
     determinant = aa * bb - ab * ab
     return (bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant
-
-
-def _snap(parameters: Array) -> Array:
-    """Radially onto the cube's boundary, and onto an edge or corner where within _NEAR_EDGE of it."""
-    centred = parameters - 0.5
-    scaled = centred / (2.0 * np.abs(centred).max(axis=1, keepdims=True))
-    at_side = np.abs(scaled) >= 0.5 - _NEAR_EDGE
-    return np.where(at_side, 0.5 + 0.5 * np.sign(scaled), 0.5 + scaled)
-
-
-def _orientation(centred: Array, faces: IntArray) -> Array:
-    """Six times the signed volume of each triangle of places (n, 3) with the origin (m,)."""
-    a, b, c = np.moveaxis(centred[faces], 1, 0)
-    return np.asarray(np.einsum("mi,mi->m", a, np.cross(b, c)))
-
-
-def _untangle(parameters: Array, faces: IntArray) -> Array:
-    """Relax the vertices around flipped triangles until none is left, moving as few and as little as possible.
-
-    A relaxed vertex goes half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
-    are flipped at the time move; where they stay so, rings of neighbours join, one after every _PATIENCE sweeps.
-    """
-    n = len(parameters)
-    i, j = faces.ravel(), faces[:, [1, 2, 0]].ravel()  # closed surface: both directions appear
-    adjacency = csr_array((np.ones(len(i)), (i, j)), shape=(n, n))
-    direction = parameters - 0.5
-    direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    for sweep in range(_SWEEPS):
-        bad = _orientation(direction, faces) <= _FLAT
-        if not bad.any():
-            break
-        free = np.zeros(n, dtype=bool)
-        free[faces[bad].ravel()] = True
-        for _ in range(sweep // _PATIENCE):
-            free |= (adjacency @ free.astype(float)) > 0.0
-        mean = adjacency[free] @ direction
-        moved = direction[free] + mean / np.linalg.norm(mean, axis=1, keepdims=True)
-        direction[free] = moved / np.linalg.norm(moved, axis=1, keepdims=True)
-    return _snap(0.5 + direction)

@@ -1,4 +1,4 @@
-"""The network G: positional encoding and a residual MLP, the identity map before training (section 4.2)."""
+"""The network G: an affine map plus a residual MLP on a positional encoding (section 4.2)."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ class ResidualModule(nn.Module):
 
 
 class InverseMap(nn.Module):
-    """G(x) = x + MLP(encoding(x)), from the domain (volume 1, around (1/2, 1/2, 1/2)) to the cube.
+    """G(x) = c + A (x - c) + MLP(encoding(x)), c = (1/2, 1/2, 1/2), from the domain (volume 1, around c) to the cube.
 
-    The last layer starts at zero, so G *is* the identity before the first step; the paper trains towards it.
+    The last layer starts at zero, so G *is* the affine map before the first step: with A = I, the default, the identity
+    that the paper trains towards. A is not trained.
     """
 
     multiples: Tensor

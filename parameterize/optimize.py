@@ -36,6 +36,7 @@ from .volume import BSplineVolume
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
 _SLIDES = 2
+_RELAXATIONS = 1
 _ROUGH = torch.float32  # good enough for the directions; energies and gradients are float64
 _SHORTEST_STEP = 1e-6
 _PATIENT_ROUNDS = (
@@ -125,7 +126,7 @@ class Distortion:
 
 def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
     """(tr(S) I - S)^-1 with S = R^T J, its eigenvalues lifted so that the least is 2: (3, 3, m)."""
-    stretch = sum(rotation[k][:, None] * jacobian[k] for k in range(3))  # S, symmetric up to rounding
+    stretch = torch.stack([rotation[k][:, None] * jacobian[k] for k in range(3)]).sum(0)  # S, symmetric
     sums = -stretch
     for i in range(3):
         sums[i, i] += stretch[0, 0] + stretch[1, 1] + stretch[2, 2]
@@ -145,8 +146,7 @@ class SplineEnergy:
         self._distortion = Distortion(knots, config, device=device)
         mass, slope, curve = grams(knots, config.degree, device)
         self._bending = SmoothnessOperator(mass, slope, curve, stiffness=0.0, bending=2.0 * config.fairness)
-        single = [tuple(m.to(_ROUGH) for m in part) for part in (mass, slope, curve)]
-        self._rough_bending = SmoothnessOperator(*single, stiffness=0.0, bending=2.0 * config.fairness)
+        self._rough_bending = self._bending.to(_ROUGH)
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient, device=device)
         pull = (
             3e-4 * config.vertex / 6.0
@@ -245,7 +245,6 @@ def _rounds(
         if best.certificate.verdict == "certified" and number > 0:
             break
         energy.start_round(control, config.penalties[number])
-        surface.reproject(control)
         control = _descend(control, energy, number, history, progress)
         certificate = certify(_as_volume(control, knots, config.degree))
         _log.info("round %d: %s, %d spans unproved", number, certificate.verdict, len(certificate.unproved))
@@ -342,6 +341,7 @@ def _descend(
         gain = point.total - found.total
         for _ in range(_SLIDES):
             energy.surface.slide(found.control, 0.5 / control.shape[1])
+        energy.surface.relax(_RELAXATIONS)
         point = replace(found, outer=energy.surface_part(found.control))
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})

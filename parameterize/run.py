@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import operator
 import time
 from collections.abc import Iterator
@@ -18,10 +19,11 @@ from .boundary import BoundaryMap
 from .bspline import Array, open_uniform_knots
 from .certificate import Certificate
 from .checkpoint import Checkpoints
-from .config import Config, SplineConfig, preset
+from .config import Config, preset
 from .correspondence import boundary_map
 from .cutting import IntArray, subdivide_long_edges
 from .fit import fit_pairs
+from .layout import sides, untangle
 from .mesh import Surface
 from .network import InverseMap
 from .optimize import Optimized, optimize
@@ -33,6 +35,7 @@ from .surface_fit import SurfaceFit, vertex_quadrics, vertex_weights
 from .targets import nearest_on_cube
 from .volume import BSplineVolume
 
+_log = logging.getLogger(__name__)
 _BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit
 _LAST_SLIDES = 10
 
@@ -90,22 +93,26 @@ def parameterize(
         "corners": None if given is None else given.tolist(),
     }
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), _plain(identity), resume=resume)
-    progress = progress or ignore
     history, seconds = History(), dict[str, float]()
     spline = config.spline
     knots = (open_uniform_knots(spline.control_points, spline.degree),) * 3
     longest = 1.0 / (spline.control_points - spline.degree)  # a span's length: no triangle larger than that
     vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
-    options: dict[str, Any] = {"history": history, "progress": progress, "checkpoints": checkpoints}
-    with _timed(seconds, "train"):
-        trainer = Trainer(vertices, faces, config, seed=seed, device=place, dtype=dtype, given_corners=given, **options)
-        network = trainer.run()
-    with _timed(seconds, "fit"):
-        fit = _surface_fit(network, vertices, faces, spline, knots, place, dtype)
-        control = _first_spline(network, fit, vertices, faces, spline, place, dtype)
+    task = _Task(vertices, len(surface.vertices), faces, config, knots, seed, place, dtype, given)
+
+    def attempt(start: int) -> tuple[Optimized, SurfaceFit]:
+        return _attempt(task, start, seconds, history, progress or ignore, checkpoints.of_start(start))
+
+    found, fit = attempt(0)
+    for start in range(1, config.starts if given is None else 1):
+        if found.certificate.verdict == "certified":
+            break
+        _log.warning("not certified: once more with the cube turned")
+        other = attempt(start)
+        if len(other[0].certificate.unproved) < len(found.certificate.unproved):
+            found, fit = other
     with _timed(seconds, "optimize"):
-        found = optimize(control, knots, fit, spline, **options)
-        volume, boundary = _in_users_units(found, surface, vertices, faces, fit, spline, knots)
+        volume, boundary = _in_users_units(found, surface, task, fit)
     with _timed(seconds, "certify"):
         quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, found.certificate)
     return Parameterization(
@@ -155,44 +162,74 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     return np.asarray(numbers, dtype=np.int64)
 
 
-def _surface_fit(
-    network: InverseMap,
-    vertices: Array,
-    faces: IntArray,
-    spline: SplineConfig,
-    knots: tuple[Array, Array, Array],
-    device: torch.device,
-    dtype: torch.dtype,
-) -> SurfaceFit:
-    """Boundary parameters by nearest points of G(v) on the cube (section 4.3.2, step 1)."""
-    parameters = nearest_on_cube(torch.as_tensor(map_points(network, vertices, device, dtype))).numpy()
-    centred = parameters - 0.5
-    axis = np.abs(centred).argmax(axis=1)
-    cube_faces = 2 * axis + (centred[np.arange(len(axis)), axis] > 0.0)
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What all starts share: the surface at volume 1 with its long edges cut, options, knots, and where to compute."""
+
+    vertices: Array
+    own: int  # vertices of the surface itself, the first ones
+    faces: IntArray
+    config: Config
+    knots: tuple[Array, Array, Array]
+    seed: int
+    device: torch.device
+    dtype: torch.dtype
+    given_corners: IntArray | None
+
+
+def _attempt(
+    task: _Task,
+    start: int,
+    seconds: dict[str, float],
+    history: History,
+    progress: ProgressCallback,
+    checkpoints: Checkpoints,
+) -> tuple[Optimized, SurfaceFit]:
+    """Train, fit and optimise from one start; the control points found and where the surface lies on their boundary."""
+    shared: dict[str, Any] = {"history": history, "progress": progress, "checkpoints": checkpoints}
+    with _timed(seconds, "train"):
+        trainer = Trainer(
+            task.vertices,
+            task.faces,
+            task.config,
+            seed=task.seed,
+            start=start,
+            device=task.device,
+            dtype=task.dtype,
+            given_corners=task.given_corners,
+            **shared,
+        )
+        network = trainer.run()
+    with _timed(seconds, "fit"):
+        fit = _surface_fit(network, task)
+        control = _first_spline(network, fit, task)
+    with _timed(seconds, "optimize"):
+        return optimize(control, task.knots, fit, task.config.spline, **shared), fit
+
+
+def _surface_fit(network: InverseMap, task: _Task) -> SurfaceFit:
+    """Boundary parameters by nearest points of G(v) on the cube (section 4.3.2, step 1), made one-to-one."""
+    spline, vertices, faces = task.config.spline, task.vertices, task.faces
+    nearest = nearest_on_cube(torch.as_tensor(map_points(network, vertices, task.device, task.dtype))).numpy()
+    parameters = untangle(nearest, faces)
     return SurfaceFit(
-        knots,
+        task.knots,
         spline.degree,
         vertices,
         vertex_quadrics(vertices, faces, spline.tangential),
-        vertex_weights(vertices, faces),
+        vertex_weights(vertices, faces, task.own),
         parameters,
-        cube_faces,
-        device=device,
+        sides(parameters),
+        faces,
+        device=task.device,
     )
 
 
-def _first_spline(
-    network: InverseMap,
-    fit: SurfaceFit,
-    vertices: Array,
-    faces: IntArray,
-    spline: SplineConfig,
-    device: torch.device,
-    dtype: torch.dtype,
-) -> torch.Tensor:
+def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Tensor:
     """Least squares on interior pairs (G(x), x) and the boundary's (section 4.3.2, step 2)."""
-    inside = interior_points(vertices, faces, spline.fit_cell)
-    mapped = map_points(network, inside, device, dtype).clip(0.0, 1.0)
+    spline, vertices = task.config.spline, task.vertices
+    inside = interior_points(vertices, task.faces, spline.fit_cell)
+    mapped = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
     weights = np.concatenate(
         [
             np.full(len(inside), (1.0 - _BOUNDARY_SHARE) / max(len(inside), 1)),
@@ -203,37 +240,31 @@ def _first_spline(
         np.concatenate([mapped, fit.parameters]),
         np.concatenate([inside, vertices]),
         weights,
-        fit.knots,
+        task.knots,
         spline.degree,
         fairness=spline.fit_fairness,
-        device=device,
+        device=task.device,
     )
 
 
 def _in_users_units(
-    found: Optimized,
-    surface: Surface,
-    vertices: Array,
-    faces: IntArray,
-    fit: SurfaceFit,
-    spline: SplineConfig,
-    knots: tuple[Array, Array, Array],
+    found: Optimized, surface: Surface, task: _Task, fit: SurfaceFit
 ) -> tuple[BSplineVolume, BoundaryMap]:
     """The volume and its boundary map; the parameters are first brought to the closest points of this volume."""
-    fit.reproject(found.control)
+    spline = task.config.spline
     for _ in range(_LAST_SLIDES):
         fit.slide(found.control, 0.5 / spline.control_points)
     points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
-    volume = BSplineVolume((spline.degree,) * 3, knots, points)
-    own = np.concatenate([surface.vertices, surface.from_unit(vertices[len(surface.vertices) :])])
-    return volume, boundary_map(volume, own, faces, fit.parameters)
+    volume = BSplineVolume((spline.degree,) * 3, task.knots, points)
+    own = np.concatenate([surface.vertices, surface.from_unit(task.vertices[len(surface.vertices) :])])
+    return volume, boundary_map(volume, own, task.faces, fit.parameters)
 
 
 @contextmanager
 def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
     start = time.perf_counter()
     yield
-    seconds[name] = time.perf_counter() - start
+    seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
 
 
 def _plain(value: Any) -> Any:

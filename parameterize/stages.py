@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from . import losses
@@ -81,7 +82,7 @@ class _Run:
 class Trainer:
     """Trains G on one surface.
 
-    vertices (n, 3) at volume 1, faces (m, 3); given_corners (8,) vertex numbers or None.
+    vertices (n, 3) at volume 1, faces (m, 3); given_corners (8,) vertex numbers or None; start: see start_map.
     The random numbers of a step depend on the seed, the stage and the step alone.
     """
 
@@ -92,6 +93,7 @@ class Trainer:
         config: Config,
         *,
         seed: int,
+        start: int = 0,
         device: torch.device,
         dtype: torch.dtype = torch.float32,
         given_corners: IntArray | None = None,
@@ -104,8 +106,9 @@ class Trainer:
         self.vertices, self.faces = vertices, faces
         self.corners = given_corners
         self.network = InverseMap(config.network).to(device=device, dtype=dtype)
-        if config.network.whiten:
-            self.network.affine.copy_(self._tensor(whitening(interior_points(vertices, faces, config.train.cell))))
+        if config.train.whiten:
+            first = start_map(interior_points(vertices, faces, config.train.cell), start)
+            self.network.affine.copy_(self._tensor(first))
         self.stencils: Stencils = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
         self.history = history if history is not None else History()
         self.progress = progress
@@ -296,10 +299,16 @@ class Trainer:
         return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
 
 
-def whitening(points: Array) -> Array:
-    """The symmetric (3, 3) of determinant 1 that makes a cloud of points (m, 3) as wide in all directions."""
+def start_map(points: Array, start: int) -> Array:
+    """Linear map (3, 3) of determinant 1 that makes a cloud of points (m, 3) as wide in all directions.
+
+    Symmetric for start 0; for the others the cloud is then turned by 45 degrees about the axes y, z and x in turn,
+    which leads the cube's edges over other parts of the surface.
+    """
     values, vectors = np.linalg.eigh(np.cov(points.T))
-    return (vectors * np.sqrt(values.prod() ** (1.0 / 3.0) / values)) @ vectors.T
+    whitening = (vectors * np.sqrt(values.prod() ** (1.0 / 3.0) / values)) @ vectors.T
+    turn = Rotation.from_rotvec(np.pi / 4.0 * np.eye(3)[start % 3] * (start > 0))
+    return np.asarray(turn.as_matrix() @ whitening)
 
 
 def _part(tensors: State, prefix: str) -> State:

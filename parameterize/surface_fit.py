@@ -19,15 +19,15 @@ from torch import Tensor
 from .bspline import Array, basis_derivatives, breakpoints
 from .conjugate import Operator
 from .cutting import IntArray
-from .distances import SampledBoundary, foot_points
+from .layout import sides, untangle
 from .tensor_grid import to_torch
-from .volume import BSplineVolume
-
-_SAMPLES = 61  # a direction and cube face, two a span of the default spline
 
 
 class SurfaceFit:
-    """points (N, 3) at volume 1, quadrics (N, 3, 3), weights (N,) that sum to 1, parameters (N, 3), faces (N,)."""
+    """points (N, 3) at volume 1, quadrics (N, 3, 3), weights (N,) that sum to 1, parameters (N, 3), faces (N,).
+
+    triangles (m, 3) between the points; between them `relax` keeps the layout on the cube one-to-one.
+    """
 
     def __init__(
         self,
@@ -38,11 +38,13 @@ class SurfaceFit:
         weights: Array,
         parameters: Array,
         cube_faces: IntArray,
+        triangles: IntArray,
         *,
         device: torch.device,
     ) -> None:
         self.knots, self.degree, self.device = knots, degree, device
         self.points = points
+        self._triangles = triangles
         self._quadrics, self._weights = quadrics, weights
         self._points = torch.as_tensor(points, device=device)
         self.yielding = np.ones(len(points))
@@ -118,24 +120,20 @@ class SurfaceFit:
         moved[rows, b] += step[:, 1]
         before = self.parameters, self.cube_faces
         self.place(*fold_over_edges(moved, self.cube_faces))
-        farther = (self.residuals(control) ** 2).sum(axis=1) > (residual**2).sum(axis=1)
-        self._take(*before, farther)
+        stay = (self.residuals(control) ** 2).sum(axis=1) > (residual**2).sum(axis=1)
+        self._keep(*before, stay)
 
-    def _take(self, parameters: Array, cube_faces: IntArray, chosen: NDArray[np.bool_]) -> None:
-        """Take these parameters for the chosen points only."""
+    def relax(self, sweeps: int) -> None:
+        """Lay flipped triangles out anew, within a few sweeps: what sliding tangles must not pile up."""
+        places = untangle(self.parameters, self._triangles, sweeps)
+        moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
+        self._keep(places, sides(places), moved)
+
+    def _keep(self, parameters: Array, cube_faces: IntArray, chosen: NDArray[np.bool_]) -> None:
+        """Take these parameters for the chosen points."""
         self.place(
             np.where(chosen[:, None], parameters, self.parameters), np.where(chosen, cube_faces, self.cube_faces)
         )
-
-    def reproject(self, control: Tensor) -> None:
-        """Look for every parameter anew over the whole boundary; take the find where it is clearly closer.
-
-        Sliding alone leaves a few points behind in valleys of the distance, far from the closest point.
-        """
-        volume = BSplineVolume((self.degree,) * 3, self.knots, control.permute(1, 2, 3, 0).cpu().numpy())
-        parameters, cube_faces, distance = foot_points(self.points, volume, SampledBoundary.of(volume, _SAMPLES))
-        better = distance < 0.9 * np.linalg.norm(self.residuals(control), axis=1)
-        self._take(parameters, cube_faces, better)
 
     def _apply(self, control: Tensor) -> Tensor:
         return self._matrix @ control.reshape(3, -1).T
@@ -214,9 +212,13 @@ def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float) -> Arra
     return sums / np.maximum(total, 1e-300)[:, None, None] + tangential * np.eye(3)
 
 
-def vertex_weights(vertices: Array, faces: IntArray) -> Array:
-    """Half by count, half by area: the report counts vertices, the surface is made of area; sums to 1 (n,)."""
+def vertex_weights(vertices: Array, faces: IntArray, own: int) -> Array:
+    """Half by count, half by area: the report counts vertices, the surface is made of area; sums to 1 (n,).
+
+    own: how many vertices count, the first ones; those that a subdivision added do not.
+    """
     corners = vertices[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     share = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
-    return np.asarray(0.5 / len(vertices) + 0.5 * share / share.sum())
+    counted = np.arange(len(vertices)) < own
+    return np.asarray(0.5 * counted / own + 0.5 * share / share.sum())

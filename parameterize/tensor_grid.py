@@ -128,6 +128,11 @@ class SmoothnessOperator:
     stiffness: float
     bending: float
 
+    def to(self, dtype: torch.dtype) -> SmoothnessOperator:
+        """The same in another precision."""
+        mass, slope, curve = (tuple(m.to(dtype) for m in part) for part in (self.mass, self.slope, self.curve))
+        return SmoothnessOperator(mass, slope, curve, self.stiffness, self.bending)
+
     def __call__(self, x: Tensor) -> Tensor:
         """(3, n_u, n_v, n_w) -> the same shape."""
         (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = self.mass, self.slope, self.curve

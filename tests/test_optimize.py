@@ -38,9 +38,20 @@ def surface_fit():
     size = np.abs(centred).max(axis=1, keepdims=True)
     cube_faces = 2 * axis + (centred[np.arange(len(points)), axis] > 0.0)
     vertices = turned(points)
-    quadrics, weights = vertex_quadrics(vertices, faces, CONFIG.tangential), vertex_weights(vertices, faces)
+    quadrics, weights = (
+        vertex_quadrics(vertices, faces, CONFIG.tangential),
+        vertex_weights(vertices, faces, len(vertices)),
+    )
     return SurfaceFit(
-        KNOTS, 3, vertices, quadrics, weights, 0.5 + centred / (2.0 * size), cube_faces.astype(np.int64), device=CPU
+        KNOTS,
+        3,
+        vertices,
+        quadrics,
+        weights,
+        0.5 + centred / (2.0 * size),
+        cube_faces.astype(np.int64),
+        faces,
+        device=CPU,
     )
 
 

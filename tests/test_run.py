@@ -7,6 +7,7 @@ import pytest
 import torch
 from shapes import rounded_cube, turned
 
+from parameterize import run
 from parameterize.boundary import BoundaryMap
 from parameterize.certificate import certify
 from parameterize.checkpoint import CheckpointError
@@ -14,6 +15,7 @@ from parameterize.config import NetworkConfig, preset
 from parameterize.corners import CORNERS
 from parameterize.mesh import surface_from_arrays
 from parameterize.run import choose_device, corner_vertices, parameterize
+from parameterize.stages import start_map
 
 STEPS = (6, 4, 8, 4, 8)
 
@@ -22,6 +24,7 @@ def tiny_config():
     config = preset("fast")
     return replace(
         config,
+        starts=1,
         network=NetworkConfig(width=16, modules=1, frequencies=3),
         train=replace(config.train, cell=0.2, triangles=200),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
@@ -223,3 +226,32 @@ def test_a_seed_of_any_size_is_taken(surface):
     for seed in (0, 2**62):
         with pytest.raises(KeyboardInterrupt):
             parameterize(surface, tiny_config(), seed=seed, device="cpu", progress=interrupt)
+
+
+def test_a_map_not_certified_is_tried_anew_with_the_cube_turned(surface, monkeypatch):
+    """Of two starts the one with fewer unproved spans is kept."""
+    optimize, seen = run.optimize, []
+
+    def spoiled(control, *args, **options):
+        found = optimize(control, *args, **options)
+        unproved = np.zeros((5 if len(seen) == 0 else 2, 3), dtype=np.int64)
+        seen.append(replace(found, certificate=replace(found.certificate, verdict="undecided", unproved=unproved)))
+        return seen[-1]
+
+    monkeypatch.setattr(run, "optimize", spoiled)
+    result = parameterize(surface, replace(tiny_config(), starts=2), seed=3, device="cpu")
+    assert len(seen) == 2 and not torch.equal(seen[0].control, seen[1].control)
+    assert len(result.certificate.unproved) == 2
+    assert (result.history["stage"] == "cube").sum() == 2 * STEPS[2]
+    parameterize(surface, tiny_config(), seed=3, device="cpu")
+    assert len(seen) == 3
+
+
+@pytest.mark.parametrize("start", [0, 1, 2])
+def test_the_start_map_makes_a_cloud_round(start):
+    cloud = np.random.default_rng(0).normal(size=(500, 3)) * [4.0, 1.0, 0.5]
+    matrix = start_map(cloud, start)
+    assert np.linalg.det(matrix) == pytest.approx(1.0)
+    spread = np.cov((cloud @ matrix.T).T)
+    assert spread == pytest.approx(np.trace(spread) / 3.0 * np.eye(3), abs=1e-9)
+    assert np.allclose(matrix, matrix.T) == (start == 0)

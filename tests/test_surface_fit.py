@@ -5,6 +5,7 @@ from shapes import ball, rounded_cube
 
 from iga_nn.samples import sample
 from parameterize.bspline import greville, open_uniform_knots
+from parameterize.layout import flipped, snap
 from parameterize.surface_fit import SurfaceFit, fold_over_edges, vertex_quadrics, vertex_weights
 from parameterize.targets import nearest_on_cube
 from parameterize.volume import BSplineVolume
@@ -35,14 +36,22 @@ def on_the_cube(count, seed=0):
     return parameters, faces_of(parameters)
 
 
-def make_fit(points, parameters, cube_faces, tangential=0.02):
+def make_fit(points, parameters, cube_faces, tangential=0.02, triangles=((0, 1, 2),)):
     rng = np.random.default_rng(1)
     normals = rng.normal(size=points.shape)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     quadrics = normals[:, :, None] * normals[:, None, :] + tangential * np.eye(3)
     weights = rng.uniform(0.5, 1.5, len(points))
     return SurfaceFit(
-        KNOTS, DEGREE, points, quadrics, weights / weights.sum(), parameters, cube_faces, device=CPU
+        KNOTS,
+        DEGREE,
+        points,
+        quadrics,
+        weights / weights.sum(),
+        parameters,
+        cube_faces,
+        np.array(triangles),
+        device=CPU,
     ), quadrics * (weights / weights.sum())[:, None, None]
 
 
@@ -99,14 +108,31 @@ def test_a_slide_is_no_longer_than_told():
     assert_on_the_cube(fit)
 
 
-def test_reprojection_finds_points_on_another_face():
+def test_no_slide_leads_away():
     control = wavy_control()
-    volume = as_volume(control)
-    truth, _ = on_the_cube(100)
-    wrong, wrong_faces = on_the_cube(100, seed=9)
-    fit, _ = make_fit(volume(truth), wrong, wrong_faces)
-    fit.reproject(control)
-    assert np.linalg.norm(fit.residuals(control), axis=1).max() < 1e-3
+    start, cube_faces = on_the_cube(200)
+    fit, _ = make_fit(start[::-1].copy(), start, cube_faces)
+    before = np.linalg.norm(fit.residuals(control), axis=1)
+    for _ in range(3):
+        fit.slide(control, 0.3)
+        after = np.linalg.norm(fit.residuals(control), axis=1)
+        assert (after <= before + 1e-12).all()
+        before = after
+    assert_on_the_cube(fit)
+
+
+def test_relaxing_turns_flipped_triangles_back():
+    places, triangles = rounded_cube(300, power=40.0)
+    places = snap(places)
+    assert not flipped(places, triangles).any()
+    tangled = places.copy()
+    a, b, c = triangles[0]
+    tangled[a] = snap(places[[a]] + 1.5 * (places[[b]] + places[[c]] - 2.0 * places[[a]]) / 2.0)[0]  # past the edge bc
+    assert flipped(tangled, triangles).any()
+    fit, _ = make_fit(places, tangled, faces_of(tangled), triangles=triangles)
+    fit.relax(100)
+    assert not flipped(fit.parameters, triangles).any()
+    assert np.abs(fit.parameters - tangled).max(axis=1).astype(bool).mean() < 0.2  # the others stay
     assert_on_the_cube(fit)
 
 
@@ -158,9 +184,11 @@ def test_quadrics_at_the_corner_of_a_cube_hold_in_all_directions():
 
 def test_weights_sum_to_one_and_follow_the_area():
     vertices, faces = rounded_cube(400)
-    weights = vertex_weights(vertices, faces)
+    weights = vertex_weights(vertices, faces, 400)
     assert weights.sum() == pytest.approx(1.0) and weights.min() >= 0.5 / 400
     needle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1e-9, 1e-9, 1e-9]])
-    weights = vertex_weights(needle, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    weights = vertex_weights(needle, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), 4)
     area = np.array([0.5, 1.0, 1.0, 0.5])  # two large triangles, 1-2-0 and 1-2-3, share an edge
     assert weights == pytest.approx(0.125 + 0.5 * area / area.sum(), abs=1e-6)
+    weights = vertex_weights(needle, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), own=3)
+    assert weights == pytest.approx([1 / 6, 1 / 6, 1 / 6, 0] + 0.5 * area / area.sum(), abs=1e-6)
