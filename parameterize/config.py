@@ -70,7 +70,7 @@ class SplineConfig:
     gauss: int = 3  # Gauss points a direction in the distortion term, on the first and last span
     inner_gauss: int = 1  # likewise on the others
     fairness: float = 1e-3
-    vertex: float = 1.5e5  # squared distance along the surface normal
+    vertex: float = 1e5  # squared distance along the surface normal
     arap_limit: float = 6.0  # distortion above this costs `stiffening` times its squared excess, too
     stiffening: float = 3.0
     tangential: float = 2e-4  # share of `vertex` for the distance within the tangent plane

@@ -13,6 +13,7 @@ from .layout import snap, untangle
 from .volume import BSplineVolume
 
 _SAME = 1e-7  # share of a mesh edge: cuts this close to a vertex take the vertex, which NEAR_EDGE then puts on the edge
+_NUDGE, _NUDGES = 1e-4, 10
 _SETTLE_STEPS = 8
 _UNDO_ROUNDS = 10
 _MARGIN = 1e-2  # share of a mesh edge that a cut keeps from its ends
@@ -25,12 +26,27 @@ def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parame
     smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
     """
     placed = untangle(parameters, faces)
-    cut = cut_along_rays(placed, faces, _SAME)
-    spread = snap(cut.carry(placed))
-    spread[: len(placed)] = placed
-    plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
-    closer = _settle_cuts(volume, vertices, cut, spread)
+    for number in range(_NUDGES):
+        cut = cut_along_rays(placed, faces, _SAME)
+        spread = snap(cut.carry(placed))
+        spread[: len(placed)] = placed
+        plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
+        turned = plain.flipped()
+        if not len(turned):
+            break
+        placed = _nudged(placed, cut, turned, number)
+    closer = _settle_cuts(volume, vertices, cut, plain.parameters)
     return plain if len(closer.flipped()) > len(plain.flipped()) else closer
+
+
+def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int) -> Array:
+    """Shift the vertices (n, 3) around degenerate pieces a little: a mesh edge ran through a corner of the cube."""
+    corners = np.unique(cut.faces[turned])
+    around = np.unique(np.concatenate([corners[corners < len(placed)], cut.parents[corners].ravel()]))
+    around = around[around < len(placed)]
+    moved = placed.copy()
+    moved[around] += _NUDGE * np.random.default_rng(number).uniform(-1.0, 1.0, (len(around), 3))
+    return snap(moved)
 
 
 def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameters: Array) -> BoundaryMap:

@@ -13,6 +13,7 @@ NEAR_EDGE = 1e-5  # places closer than this to an edge of the cube are put on it
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
 _SWEEPS = 600
 _PATIENCE = 60
+_UNDO_ROUNDS = 20
 
 
 def snap(parameters: Array) -> Array:
@@ -34,6 +35,17 @@ def flipped(places: Array, faces: IntArray) -> NDArray[np.bool_]:
     """Which triangles (m, 3) do not face outwards, seen from the cube's centre: (m,)."""
     a, b, c = np.moveaxis((places - 0.5)[faces], 1, 0)
     return np.asarray(np.einsum("mi,mi->m", a, np.cross(b, c)) <= _FLAT)
+
+
+def new_flips(before: Array, after: Array, faces: IntArray) -> NDArray[np.bool_]:
+    """Which points (n,) must stay so that no further triangle flips when the others go from `before` to `after`."""
+    stay, allowed = np.zeros(len(before), dtype=bool), flipped(before, faces)
+    for _ in range(_UNDO_ROUNDS):
+        bad = flipped(np.where(stay[:, None], before, after), faces) & ~allowed
+        if not bad.any():
+            return stay
+        stay[faces[bad].ravel()] = True
+    return np.ones(len(before), dtype=bool)
 
 
 def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:

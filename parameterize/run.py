@@ -38,6 +38,7 @@ from .volume import BSplineVolume
 _log = logging.getLogger(__name__)
 _BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit
 _LAST_SLIDES = 10
+_LAST_SWEEPS = 600
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,10 +251,13 @@ def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Te
 def _in_users_units(
     found: Optimized, surface: Surface, task: _Task, fit: SurfaceFit
 ) -> tuple[BSplineVolume, BoundaryMap]:
-    """The volume and its boundary map; the parameters are first brought to the closest points of this volume."""
+    """The volume and its boundary map; the parameters are first brought close to this volume's closest points."""
     spline = task.config.spline
     for _ in range(_LAST_SLIDES):
         fit.slide(found.control, 0.5 / spline.control_points)
+    fit.relax(_LAST_SWEEPS)
+    for _ in range(_LAST_SLIDES):
+        fit.slide(found.control, 0.5 / spline.control_points, keep_layout=True)
     points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
     volume = BSplineVolume((spline.degree,) * 3, task.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(task.vertices[len(surface.vertices) :])])

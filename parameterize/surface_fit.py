@@ -19,7 +19,7 @@ from torch import Tensor
 from .bspline import Array, basis_derivatives, breakpoints
 from .conjugate import Operator
 from .cutting import IntArray
-from .layout import sides, untangle
+from .layout import new_flips, sides, untangle
 from .tensor_grid import to_torch
 
 
@@ -100,11 +100,11 @@ class SurfaceFit:
         """F(p) - v: (N, 3)."""
         return np.asarray((self._apply(control) - self._points).cpu())
 
-    def slide(self, control: Tensor, max_step: float) -> None:
+    def slide(self, control: Tensor, max_step: float, *, keep_layout: bool = False) -> None:
         """One Gauss-Newton step of every parameter towards the point of F's boundary closest to its surface point.
 
         A step over an edge of the cube goes on upon the next face; `max_step` limits a step in the parameters. Points
-        that would end up farther away stay where they are.
+        that would end up farther away stay where they are, with `keep_layout` also those that would turn a triangle.
         """
         net = np.asarray(control.cpu()).reshape(3, -1).T  # (n, 3)
         indices, values, d_a, d_b = self._rows(derivatives=True)
@@ -122,6 +122,8 @@ class SurfaceFit:
         self.place(*fold_over_edges(moved, self.cube_faces))
         stay = (self.residuals(control) ** 2).sum(axis=1) > (residual**2).sum(axis=1)
         self._keep(*before, stay)
+        if keep_layout:
+            self._keep(*before, new_flips(before[0], self.parameters, self._triangles))
 
     def relax(self, sweeps: int) -> None:
         """Lay flipped triangles out anew, within a few sweeps: what sliding tangles must not pile up."""

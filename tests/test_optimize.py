@@ -9,7 +9,8 @@ from parameterize.bspline import gauss_points, greville, open_uniform_knots
 from parameterize.certificate import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
-from parameterize.optimize import Distortion, SplineEnergy, optimize
+from parameterize.energy import Distortion, SplineEnergy
+from parameterize.optimize import optimize
 from parameterize.quality import arap
 from parameterize.stages import History
 from parameterize.surface_fit import SurfaceFit, vertex_quadrics, vertex_weights

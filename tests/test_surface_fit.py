@@ -121,6 +121,21 @@ def test_no_slide_leads_away():
     assert_on_the_cube(fit)
 
 
+def test_a_slide_that_keeps_the_layout_turns_no_triangle():
+    places, triangles = rounded_cube(300, power=40.0)
+    places = snap(places)
+    control = wavy_control()
+    targets = as_volume(control)(snap(places + 0.1 * np.random.default_rng(0).uniform(-1.0, 1.0, places.shape)))
+    for keep_layout in (False, True):
+        fit, _ = make_fit(targets, places, faces_of(places), triangles=triangles)
+        before = np.linalg.norm(fit.residuals(control), axis=1)
+        for _ in range(5):
+            fit.slide(control, 0.1, keep_layout=keep_layout)
+        assert flipped(fit.parameters, triangles).any() != keep_layout
+        assert np.linalg.norm(fit.residuals(control), axis=1).mean() < 0.9 * before.mean()
+        assert_on_the_cube(fit)
+
+
 def test_relaxing_turns_flipped_triangles_back():
     places, triangles = rounded_cube(300, power=40.0)
     places = snap(places)
