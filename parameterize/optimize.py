@@ -33,8 +33,10 @@ _CHECKPOINT = "spline"
 _SLIDES = 2  # of the boundary parameters after each step
 _RELAXATIONS = 1  # sweeps over triangles that they turned over
 _SHORTEST_STEP = 1e-6
+_LEAST_STEPS = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
 # After so many rounds the surface gives way where the map is not proved: a cube edge in a valley cannot lie on it.
 _PATIENT_ROUNDS = 2
+_GIVING_WAY = 0.25  # of the weights there, each round
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +109,7 @@ def _rounds(
         energy.barrier.activate(certificate.unproved)
         if number >= _PATIENT_ROUNDS and len(certificate.unproved):
             near = surface.near_spans(certificate.unproved)
-            surface.give_way(np.where(near, 0.5, 1.0) * surface.yielding)
+            surface.give_way(np.where(near, _GIVING_WAY, 1.0) * surface.yielding)
         _save(checkpoints, number + 1, control, best, energy, history)
     return best
 
@@ -201,7 +203,8 @@ def _descend(
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
         left = (time.perf_counter() - started) / (step + 1) * (total_steps - done)
         progress(Progress("spline", done, total_steps, point.total, point.folded, left))
-        if gain < (energy.config.gain if number else energy.config.first_gain) * point.total:
+        enough = energy.config.gain if number else energy.config.first_gain
+        if step + 1 >= _LEAST_STEPS and gain < enough * point.total:
             break
     return point.control
 
