@@ -142,7 +142,7 @@ class SplineEnergy:
         return self.config.vertex * energy, self.config.vertex * gradient
 
     def newton_direction(self, control: Tensor, right: Tensor) -> Tensor:
-        """Approximate solution of Hessian x = -gradient, the parameters of the surface held."""
+        """Approximate solution of Hessian x = right at `control`, the parameters of the surface held."""
         surface = self.surface.hessian(_ROUGH)
         distortion = self._distortion.curvature(control, self.penalty)
         barrier = self.barrier.curvature(control)

@@ -184,7 +184,7 @@ def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> _Poi
 def _descend(
     control: Tensor, energy: SplineEnergy, number: int, history: History, progress: ProgressCallback
 ) -> Tensor:
-    """One round of L-BFGS steps with sliding boundary parameters."""
+    """One round of Newton steps with sliding boundary parameters."""
     steps = energy.config.steps
     total_steps = steps * len(energy.config.penalties)
     started = time.perf_counter()

@@ -6,6 +6,7 @@ Control points are held as (3, n_u, n_v, n_w), component first, so that every co
 from __future__ import annotations
 
 import warnings
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -164,9 +165,10 @@ class FastDiagonalization:
         self._inverse = 1.0 / (u[:, None, None] + v[:, None] + w + shift)
 
     def to(self, dtype: torch.dtype) -> FastDiagonalization:
-        """Itself, applied in another precision from now on."""
-        self._vectors, self._inverse = tuple(v.to(dtype) for v in self._vectors), self._inverse.to(dtype)
-        return self
+        """The same in another precision."""
+        other = copy(self)
+        other._vectors, other._inverse = tuple(v.to(dtype) for v in self._vectors), self._inverse.to(dtype)
+        return other
 
     def __call__(self, residual: Tensor) -> Tensor:
         """(3, n_u, n_v, n_w) -> the same shape."""
