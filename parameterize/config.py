@@ -76,7 +76,10 @@ class SplineConfig:
     tangential: float = 2e-4  # share of `vertex` for the distance within the tangent plane
     min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
-    penalties: tuple[float, ...] = (20.0, 100.0, 500.0, 2500.0, 2500.0, 2500.0, 2500.0, 2500.0)  # one a round
+    min_facing: float = 0.1  # likewise (t_a x t_b) . n of the boundary's tangents and the mesh's normals
+    penalties: tuple[float, ...] = (20.0, 100.0, 500.0, 2500.0)  # one a round, then the last one again
+    rounds: int = 16  # at most
+    polish: int = 2  # of them, after the map is certified for the first time
     steps: int = 60  # a round, at most
     first_gain: float = 4e-3  # the first round ends once a step lowers the energy by less than this share of it
     gain: float = 5e-4  # likewise the later ones

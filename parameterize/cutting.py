@@ -75,7 +75,14 @@ def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tu
 
 def mesh_edges(faces: IntArray) -> IntArray:
     """Every edge of the triangles once, smaller vertex first: (k, 2)."""
-    return np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    return edge_uses(faces)[0]
+
+
+def edge_uses(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Every edge once, smaller vertex first (k, 2), and how many triangles have it (k,)."""
+    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    keys, count = np.unique(sides[:, 0] * (int(faces.max()) + 1) + sides[:, 1], return_counts=True)  # quicker than rows
+    return np.stack(np.divmod(keys, int(faces.max()) + 1), axis=1), count
 
 
 def _crossings(

@@ -139,17 +139,25 @@ class SplineEnergy:
     def surface_part(self, control: Tensor) -> tuple[float, Tensor]:
         """The boundary term at the present parameters: energy and gradient."""
         energy, gradient = self.surface.energy_and_gradient(control)
-        return self.config.vertex * energy, self.config.vertex * gradient
+        turned, push = self.surface.facing_energy_and_gradient(control)
+        return (
+            self.config.vertex * energy + self.penalty * turned,
+            self.config.vertex * gradient + self.penalty * push,
+        )
 
     def newton_direction(self, control: Tensor, right: Tensor) -> Tensor:
         """Approximate solution of Hessian x = right at `control`, the parameters of the surface held."""
         surface = self.surface.hessian(_ROUGH)
         distortion = self._distortion.curvature(control, self.penalty)
         barrier = self.barrier.curvature(control)
+        facing = self.surface.facing_curvature(control, _ROUGH)
+
+        def hessian(x: Tensor) -> Tensor:
+            inner = distortion(x) + self._rough_bending(x) + self.penalty * (barrier(x) + facing(x))
+            return inner + self.config.vertex * surface(x)
+
         direction, _ = conjugate_gradients(
-            lambda x: (
-                distortion(x) + self._rough_bending(x) + self.penalty * barrier(x) + self.config.vertex * surface(x)
-            ),
+            hessian,
             right.to(_ROUGH),
             self._precondition,
             tolerance=self.config.tolerance,

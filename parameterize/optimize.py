@@ -32,6 +32,7 @@ _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
 _SLIDES = 2  # of the boundary parameters after each step
 _RELAXATIONS = 1  # sweeps over triangles that they turned over
+_SETTLING_SWEEPS = 600
 _SHORTEST_STEP = 1e-6
 _LEAST_STEPS = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
 # After so many rounds the surface gives way where the map is not proved: a cube edge in a valley cannot lie on it.
@@ -60,8 +61,8 @@ def optimize(
     """Minimise from `control` (3, n_u, n_v, n_w), volume 1, in rounds: descend, certify, watch the spans not proved.
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
-    unfold what is left. Where spans stay unproved, the surface data near them loses weight. The result is the first
-    certified map, else the one with the fewest unproved spans.
+    unfold what is left. Where spans stay unproved, the surface data near them loses weight. Once the map is certified,
+    a few more rounds polish it. The result is the last certified map, else the one with the fewest unproved spans.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
@@ -93,15 +94,21 @@ def _rounds(
     config, surface = energy.config, energy.surface
     energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
     best = Optimized(control, certify(_as_volume(control, knots, config.degree)))
-    first = 0
+    first, polished = 0, 0
     if (saved := checkpoints.load(_CHECKPOINT)) is not None:
         first, control, best = _restore(*saved, energy, best, knots)
         history.rows[:] = [tuple(row) for row in saved[1]["history"]]
-    for number in range(first, len(config.penalties)):
-        if best.certificate.verdict == "certified" and number > 0:
-            break
-        energy.start_round(control, config.penalties[number])
-        control = _descend(control, energy, number, history, progress)
+        polished = int(saved[1]["polished"])
+    for number in range(first, config.rounds):
+        settled = best.certificate.verdict == "certified" and number > 0
+        if settled:
+            if polished == config.polish:
+                break
+            polished += 1
+            surface.relax(_SETTLING_SWEEPS)
+            surface.emphasise(control)
+        energy.start_round(control, config.penalties[min(number, len(config.penalties) - 1)])
+        control = _descend(control, energy, number, history, progress, settled=settled)
         certificate = certify(_as_volume(control, knots, config.degree))
         _log.info("round %d: %s, %d spans unproved", number, certificate.verdict, len(certificate.unproved))
         if number == 0 or len(certificate.unproved) <= len(best.certificate.unproved):
@@ -110,12 +117,17 @@ def _rounds(
         if number >= _PATIENT_ROUNDS and len(certificate.unproved):
             near = surface.near_spans(certificate.unproved)
             surface.give_way(np.where(near, _GIVING_WAY, 1.0) * surface.yielding)
-        _save(checkpoints, number + 1, control, best, energy, history)
+        _save(checkpoints, {"number": number + 1, "polished": polished}, control, best, energy, history)
     return best
 
 
 def _save(
-    checkpoints: Checkpoints, number: int, control: Tensor, best: Optimized, energy: SplineEnergy, history: History
+    checkpoints: Checkpoints,
+    state: dict[str, Any],
+    control: Tensor,
+    best: Optimized,
+    energy: SplineEnergy,
+    history: History,
 ) -> None:
     tensors = {
         "control": control,
@@ -125,7 +137,7 @@ def _save(
         "yielding": torch.as_tensor(energy.surface.yielding),
         "active": torch.as_tensor(energy.barrier.active),
     }
-    checkpoints.save(_CHECKPOINT, tensors, {"number": number, "history": history.rows})
+    checkpoints.save(_CHECKPOINT, tensors, state | {"history": history.rows})
 
 
 def _restore(
@@ -182,13 +194,21 @@ def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> _Poi
 
 
 def _descend(
-    control: Tensor, energy: SplineEnergy, number: int, history: History, progress: ProgressCallback
+    control: Tensor,
+    energy: SplineEnergy,
+    number: int,
+    history: History,
+    progress: ProgressCallback,
+    *,
+    settled: bool,
 ) -> Tensor:
-    """One round of Newton steps with sliding boundary parameters."""
+    """One round of Newton steps with sliding boundary parameters; once settled these keep the layout one-to-one."""
     steps = energy.config.steps
-    total_steps = steps * len(energy.config.penalties)
+    total_steps = steps * energy.config.rounds
     started = time.perf_counter()
+    energy.surface.watch_facing(control, energy.config.min_facing)
     point = _evaluate(control, energy)
+    lowest, waited = point.total, 0
     for step in range(steps):
         found = _line_search(point, energy.newton_direction(point.control, -point.gradient), energy)
         if found is None:
@@ -196,15 +216,18 @@ def _descend(
             break
         gain = point.total - found.total
         for _ in range(_SLIDES):
-            energy.surface.slide(found.control, 0.5 / control.shape[1])
+            energy.surface.slide(found.control, 0.5 / control.shape[1], keep_layout=settled)
         energy.surface.relax(_RELAXATIONS)
+        energy.surface.watch_facing(found.control, energy.config.min_facing)
         point = replace(found, outer=energy.surface_part(found.control))
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
         left = (time.perf_counter() - started) / (step + 1) * (total_steps - done)
         progress(Progress("spline", done, total_steps, point.total, point.folded, left))
         enough = energy.config.gain if number else energy.config.first_gain
-        if step + 1 >= _LEAST_STEPS and gain < enough * point.total:
+        waited = 0 if point.total < (1.0 - enough) * lowest else waited + 1
+        lowest = min(lowest, point.total)
+        if step + 1 >= _LEAST_STEPS and (gain < enough * point.total or waited >= _LEAST_STEPS):
             break
     return point.control
 

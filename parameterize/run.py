@@ -20,13 +20,15 @@ from .bspline import Array, open_uniform_knots
 from .certificate import Certificate
 from .checkpoint import Checkpoints
 from .config import Config, preset
+from .corners import PathError, choose_corners
 from .correspondence import boundary_map
 from .cutting import IntArray, subdivide_long_edges
 from .fit import fit_pairs
-from .layout import sides, untangle
+from .layout import flipped, sides, untangle
 from .mesh import Surface
 from .network import InverseMap
 from .optimize import Optimized, optimize
+from .patches import Layout, lay_out
 from .progress import ProgressCallback, ignore
 from .quality import QualityReport, measure
 from .sample import interior_points
@@ -37,6 +39,7 @@ from .volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
 _BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit
+_FEW_FLIPS = 1e-3  # share of the triangles that sliding may sort out
 _LAST_SLIDES = 10
 _LAST_SWEEPS = 600
 
@@ -202,34 +205,49 @@ def _attempt(
         )
         network = trainer.run()
     with _timed(seconds, "fit"):
-        fit = _surface_fit(network, task)
+        fit = _surface_fit(network, trainer.corners, task)
         control = _first_spline(network, fit, task)
     with _timed(seconds, "optimize"):
         return optimize(control, task.knots, fit, task.config.spline, **shared), fit
 
 
-def _surface_fit(network: InverseMap, task: _Task) -> SurfaceFit:
-    """Boundary parameters by nearest points of G(v) on the cube (section 4.3.2, step 1), made one-to-one."""
-    spline, vertices, faces = task.config.spline, task.vertices, task.faces
-    nearest = nearest_on_cube(torch.as_tensor(map_points(network, vertices, task.device, task.dtype))).numpy()
-    parameters = untangle(nearest, faces)
+def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> SurfaceFit:
+    """Boundary parameters by the layout of the six patches, the counterpart of section 4.3.2, step 1."""
+    spline = task.config.spline
+    mapped = map_points(network, task.vertices, task.device, task.dtype)
+    layout = _layout(mapped, corners, task)
     return SurfaceFit(
         task.knots,
         spline.degree,
-        vertices,
-        vertex_quadrics(vertices, faces, spline.tangential),
-        vertex_weights(vertices, faces, task.own),
-        parameters,
-        sides(parameters),
-        faces,
+        layout.vertices,
+        vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
+        vertex_weights(layout.vertices, layout.faces, task.own),
+        layout.places,
+        sides(layout.places),
+        layout.faces,
         device=task.device,
     )
 
 
+def _layout(mapped: Array, corners: IntArray | None, task: _Task) -> Layout:
+    """Nearest points on the cube, untangled; where that leaves flipped triangles, patches between traced edges.
+
+    The first stays closer to the network's map, the second always succeeds where the edges can be traced.
+    """
+    nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
+    untangled = untangle(nearest, task.faces)
+    if flipped(untangled, task.faces).mean() > _FEW_FLIPS:
+        try:
+            return lay_out(mapped, task.vertices, task.faces, choose_corners(mapped) if corners is None else corners)
+        except PathError as error:
+            _log.warning("the first layout has flipped triangles: %s", error)
+    return Layout(task.vertices, task.faces, untangled)
+
+
 def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Tensor:
     """Least squares on interior pairs (G(x), x) and the boundary's (section 4.3.2, step 2)."""
-    spline, vertices = task.config.spline, task.vertices
-    inside = interior_points(vertices, task.faces, spline.fit_cell)
+    spline, vertices = task.config.spline, fit.points
+    inside = interior_points(task.vertices, task.faces, spline.fit_cell)
     mapped = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
     weights = np.concatenate(
         [
@@ -260,8 +278,8 @@ def _in_users_units(
         fit.slide(found.control, 0.5 / spline.control_points, keep_layout=True)
     points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
     volume = BSplineVolume((spline.degree,) * 3, task.knots, points)
-    own = np.concatenate([surface.vertices, surface.from_unit(task.vertices[len(surface.vertices) :])])
-    return volume, boundary_map(volume, own, task.faces, fit.parameters)
+    own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
+    return volume, boundary_map(volume, own, fit.triangles, fit.parameters)
 
 
 @contextmanager

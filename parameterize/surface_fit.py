@@ -19,8 +19,14 @@ from torch import Tensor
 from .bspline import Array, basis_derivatives, breakpoints
 from .conjugate import Operator
 from .cutting import IntArray
+from .facing import FacingPenalty, facing_penalty
 from .layout import new_flips, sides, untangle
 from .tensor_grid import to_torch
+
+_HELD = 0.02  # share of the weight for the tangential distance of points that cannot slide
+_FAR, _EMPHASIS = 1.0, 10.0  # distance over its root mean square; factor on the weight
+_HALVINGS = 3
+_WATCHED = 3.0  # times the floor: points below may fall under it in the next step
 
 
 class SurfaceFit:
@@ -44,12 +50,15 @@ class SurfaceFit:
     ) -> None:
         self.knots, self.degree, self.device = knots, degree, device
         self.points = points
-        self._triangles = triangles
+        self.triangles = triangles
         self._quadrics, self._weights = quadrics, weights
         self._points = torch.as_tensor(points, device=device)
+        self._normals = vertex_normals(points, triangles)
+        self._facing: FacingPenalty | None = None
         self.yielding = np.ones(len(points))
+        self._held = np.zeros(len(points), dtype=bool)
         self.place(parameters, cube_faces)
-        self.give_way(self.yielding)
+        self._weigh()
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
         """Take these parameters (N, 3) on these cube faces (N,)."""
@@ -64,7 +73,17 @@ class SurfaceFit:
     def give_way(self, yielding: Array) -> None:
         """Multiply the points' weights by `yielding` (N,), in place of earlier such factors."""
         self.yielding = yielding
-        self._metric = torch.as_tensor((yielding * self._weights)[:, None, None] * self._quadrics, device=self.device)
+        self._weigh()
+
+    def emphasise(self, control: Tensor) -> None:
+        """Weigh points more, up to _EMPHASIS times, that lie far off; not those that have given way."""
+        distance = (self.residuals(control) ** 2).sum(axis=1)
+        factor = np.clip(distance / (_FAR**2 * distance.mean()), 1.0, _EMPHASIS)
+        self.give_way(np.where(self.yielding < 1.0, self.yielding, factor))
+
+    def _weigh(self) -> None:
+        quadrics = np.where(self._held[:, None, None], self._quadrics + _HELD * np.eye(3), self._quadrics)
+        self._metric = torch.as_tensor((self.yielding * self._weights)[:, None, None] * quadrics, device=self.device)
 
     def near_spans(self, spans: IntArray) -> NDArray[np.bool_]:
         """Which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
@@ -96,6 +115,34 @@ class SurfaceFit:
 
         return product
 
+    def watch_facing(self, control: Tensor, floor: float) -> None:
+        """Penalise from now on where F's boundary, at the present parameters, hardly faces the way the mesh does."""
+        net = np.asarray(control.cpu()).reshape(3, -1).T
+        indices, _, d_a, d_b = self._rows(derivatives=True)
+        local = net[indices]
+        ta, tb = np.einsum("nk,nkc->nc", d_a, local), np.einsum("nk,nkc->nc", d_b, local)
+        normals = np.where(self.cube_faces % 2 == 1, 1.0, -1.0)[:, None] * self._normals
+        low = np.einsum("nc,nc->n", np.cross(ta, tb), normals) < _WATCHED * floor
+        self._facing = facing_penalty(
+            indices[low],
+            (d_a[low], d_b[low]),
+            len(net),
+            normals[low],
+            (self.yielding * self._weights)[low],
+            floor,
+            self.device,
+        )
+
+    def facing_energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
+        """The penalty of the points watched, and its gradient."""
+        if self._facing is None:
+            return 0.0, torch.zeros_like(control)
+        return self._facing.energy_and_gradient(control)
+
+    def facing_curvature(self, control: Tensor, dtype: torch.dtype) -> Operator:
+        """The Gauss-Newton part of its second derivative."""
+        return torch.zeros_like if self._facing is None else self._facing.curvature(control, dtype)
+
     def residuals(self, control: Tensor) -> Array:
         """F(p) - v: (N, 3)."""
         return np.asarray((self._apply(control) - self._points).cpu())
@@ -104,7 +151,8 @@ class SurfaceFit:
         """One Gauss-Newton step of every parameter towards the point of F's boundary closest to its surface point.
 
         A step over an edge of the cube goes on upon the next face; `max_step` limits a step in the parameters. Points
-        that would end up farther away stay where they are, with `keep_layout` also those that would turn a triangle.
+        that would end up farther away stay where they are. With `keep_layout` steps are shortened, too, that would turn
+        a triangle; as such points cannot come to F, F is to come to them: their distance counts in all directions.
         """
         net = np.asarray(control.cpu()).reshape(3, -1).T  # (n, 3)
         indices, values, d_a, d_b = self._rows(derivatives=True)
@@ -123,11 +171,25 @@ class SurfaceFit:
         stay = (self.residuals(control) ** 2).sum(axis=1) > (residual**2).sum(axis=1)
         self._keep(*before, stay)
         if keep_layout:
-            self._keep(*before, new_flips(before[0], self.parameters, self._triangles))
+            self._hold_back(*before, moved)
+
+    def _hold_back(self, parameters: Array, cube_faces: IntArray, goal: Array) -> None:
+        """Shorten steps from `parameters` towards `goal` until no further triangle is turned."""
+        share = np.where((self.parameters == parameters).all(axis=1), 0.0, 1.0)
+        self._held = np.zeros(len(share), dtype=bool)
+        for _ in range(_HALVINGS):
+            blocked = new_flips(parameters, self.parameters, self.triangles)
+            if not blocked.any():
+                break
+            self._held |= blocked
+            share[blocked] *= 0.5
+            self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
+        self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
+        self._weigh()
 
     def relax(self, sweeps: int) -> None:
         """Lay flipped triangles out anew, within a few sweeps: what sliding tangles must not pile up."""
-        places = untangle(self.parameters, self._triangles, sweeps)
+        places = untangle(self.parameters, self.triangles, sweeps)
         moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
         self._keep(places, sides(places), moved)
 
@@ -198,6 +260,16 @@ def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, Int
     parameters[crossed, old_axis] = inwards
     cube_faces[crossed] = 2 * axis[crossed] + (parameters[crossed, axis[crossed]] > 0.5)
     return np.clip(parameters, 0.0, 1.0), cube_faces
+
+
+def vertex_normals(vertices: Array, faces: IntArray) -> Array:
+    """Area-weighted mean of the normals of the triangles at each vertex, of length 1 (n, 3)."""
+    corners = vertices[faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.zeros((len(vertices), 3))
+    for k in range(3):
+        np.add.at(sums, faces[:, k], cross)
+    return sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
 
 
 def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float) -> Array:

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+import torch
+
+from parameterize.bspline import greville, open_uniform_knots
+from parameterize.facing import facing_penalty
+from parameterize.surface_fit import SurfaceFit, vertex_normals
+
+CPU = torch.device("cpu")
+FLOOR = 0.3
+KNOTS = (open_uniform_knots(6, 3),) * 3
+
+
+def random_penalty(points=40, controls=50):
+    rng = np.random.default_rng(0)
+    indices = np.stack([rng.choice(controls, 16, replace=False) for _ in range(points)])
+    slopes = rng.normal(size=(2, points, 16))
+    normals = rng.normal(size=(points, 3))
+    weights = rng.uniform(0.5, 1.5, points)
+    penalty = facing_penalty(indices, (slopes[0], slopes[1]), controls, normals, weights, FLOOR, CPU)
+    control = torch.as_tensor(rng.normal(size=(3, 5, 10, 1)))
+
+    def shortfall(x):
+        local = x.reshape(3, -1)[:, torch.as_tensor(indices)]  # (3, k, 16)
+        a, b = ((torch.as_tensor(s) * local).sum(-1) for s in slopes)
+        size = (torch.linalg.cross(a, b, dim=0) * torch.as_tensor(normals.T)).sum(0)
+        return torch.as_tensor(weights).sqrt() * (FLOOR - size).clamp_min(0.0)
+
+    return penalty, control, shortfall
+
+
+def test_energy_gradient_and_gauss_newton_curvature_are_those_of_the_formula():
+    penalty, control, shortfall = random_penalty()
+    energy, gradient = penalty.energy_and_gradient(control)
+    variable = control.clone().requires_grad_()
+    expected = shortfall(variable).square().sum()
+    expected.backward()
+    assert energy == pytest.approx(float(expected.detach()))
+    assert gradient.numpy() == pytest.approx(variable.grad.numpy())
+    jacobian = torch.autograd.functional.jacobian(shortfall, control).flatten(1)
+    direction = torch.randn(control.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+    gauss_newton = 2.0 * jacobian.T @ (jacobian @ direction.flatten())
+    assert penalty.curvature(control, torch.float64)(direction).flatten().numpy() == pytest.approx(gauss_newton.numpy())
+
+
+def box_fit(triangle_at):
+    """A tetrahedron's worth of triangles on each face of the unit cube, and the identity's control points."""
+    row = greville(KNOTS[0], 3)
+    control = torch.as_tensor(np.stack(np.meshgrid(row, row, row, indexing="ij")))
+    corners, faces = [], []
+    for side in range(6):
+        axis = side // 2
+        plane = [(axis + 1) % 3, (axis + 2) % 3][:: 1 if side % 2 else -1]
+        piece = np.full((3, 3), float(side % 2))
+        piece[:, plane] = triangle_at
+        faces.append(len(corners) + np.arange(3))
+        corners.extend(piece)
+    points, faces = np.array(corners), np.array(faces)
+    quadrics, weights = np.tile(np.eye(3), (18, 1, 1)), np.full(18, 1.0 / 18.0)
+    sides = np.repeat(np.arange(6), 3)
+    return SurfaceFit(KNOTS, 3, points, quadrics, weights, points, sides, faces, device=CPU), control
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_only_a_boundary_that_faces_the_other_way_is_penalised(mirrored):
+    fit, control = box_fit(np.array([[0.2, 0.2], [0.7, 0.3], [0.4, 0.8]]))
+    if mirrored:  # all faces now look into the solid, seen with the mesh's normals
+        control[2] = 1.0 - control[2]
+    fit.watch_facing(control, FLOOR)
+    energy, _ = fit.facing_energy_and_gradient(control)
+    # a unit face has (t_a x t_b) . n = 1, mirrored -1 on the faces across the mirror's plane; n turns with the faces
+    expected = (FLOOR + 1.0) ** 2 if mirrored else 0.0
+    assert energy == pytest.approx(expected * (2.0 / 3.0 if mirrored else 1.0))
+
+
+def test_vertex_normals_weigh_triangles_by_area():
+    vertices = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 1]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])  # normals +z (area 2) and +x (area 1)
+    assert vertex_normals(vertices, faces)[0] == pytest.approx(np.array([1.0, 0.0, 2.0]) / np.sqrt(5.0))
