@@ -12,19 +12,84 @@ double. All three count the control points with u fastest (volume.npz: w fastest
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
+from parameterize.bspline import Array
 from parameterize.volume import BSplineVolume
 
-from .options import InputError
+from .options import InputError, one_line
+from .spline_gate import checked_text
 
 INSTALL = "pip install 'iga-nn[interop]'"
+WEIGHTS_ALIKE = 1e-12  # relative
+
+
+def write_gismo(path: Path, volume: BSplineVolume) -> None:
+    """Write G+Smo XML."""
+    splinepy = _splinepy()
+    splinepy.io.gismo.export(str(path), splinepy.Multipatch([_to_splinepy(volume)]))
 
 
 def write_mfem(path: Path, volume: BSplineVolume) -> None:
     """Write an MFEM NURBS mesh."""
     _splinepy().io.mfem.export(str(path), _to_splinepy(volume).nurbs)
+
+
+def write_json(path: Path, volume: BSplineVolume) -> None:
+    """Write splinepy's JSON."""
+    _splinepy().io.json.export(str(path), [_to_splinepy(volume)])
+
+
+def read(path: Path, kind: str) -> BSplineVolume:
+    """The one trivariate spline of a file; its knots are brought to run from 0 to 1, the map stays.
+
+    kind: "gismo", "mfem" or "json". Raises InputError where splinepy is missing, OSError, and ValueError where the
+    file does not hold one trivariate B-spline: several patches, weights that differ, damaged content.
+    """
+    splinepy = _splinepy()
+    try:
+        text = checked_text(path, kind)
+        spline = _load(splinepy, text, kind)
+        return _from_splinepy(spline)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _load(splinepy: Any, text: str, kind: str) -> Any:
+    with TemporaryDirectory() as folder:
+        checked = Path(folder, "spline")
+        checked.write_text(text, encoding="utf-8")
+        try:
+            found = getattr(splinepy.io, kind).load(str(checked))
+            return {"gismo": lambda: found[0].patches[0], "mfem": lambda: found, "json": lambda: found[0]}[kind]()
+        except Exception as error:  # splinepy and what it calls raise a dozen kinds on damaged content
+            raise ValueError(f"splinepy finds no spline in it ({one_line(error) or type(error).__name__})") from None
+
+
+def _from_splinepy(spline: Any) -> BSplineVolume:
+    if spline.para_dim != 3 or spline.dim != 3:
+        raise ValueError(f"maps {spline.para_dim} parameters to {spline.dim} coordinates; a volume maps 3 to 3")
+    full = spline.nurbs  # of every kind of spline
+    weights = np.asarray(full.weights)
+    if np.ptp(weights) > WEIGHTS_ALIKE * np.abs(weights).max():
+        raise ValueError("is rational: its weights differ; only polynomial splines (all weights equal) are taken")
+    rows = np.array(full.control_points, dtype=np.float64)
+    net = rows.reshape(*reversed(full.control_mesh_resolutions), 3).transpose(2, 1, 0, 3)
+    knots = [np.array(row, dtype=np.float64) for row in full.knot_vectors]
+    k_u, k_v, k_w = ((row - row[0]) / (row[-1] - row[0]) for row in map(_spanning, knots))
+    p_u, p_v, p_w = (int(p) for p in full.degrees)
+    return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), np.ascontiguousarray(net))
+
+
+def _spanning(knots: Array) -> Array:
+    if not (np.all(np.isfinite(knots)) and knots[-1] > knots[0]):
+        raise ValueError("knots must be finite and span an interval")
+    return knots
 
 
 def _splinepy() -> Any:
@@ -33,6 +98,7 @@ def _splinepy() -> Any:
         import splinepy
     except ImportError:
         raise InputError(f"this format is read and written through splinepy, which is missing: {INSTALL}") from None
+    logging.getLogger("splinepy").setLevel("ERROR")  # it warns that one patch has no neighbours
     return splinepy
 
 
