@@ -146,15 +146,16 @@ def write_sample(name: str, /, *, out: Path | None = None) -> int:
 
 @app.command(name="fetch")
 def fetch_model(name: str, /, *, out: Path | None = None) -> int:
-    """Write one of the published models as an OBJ file, downloading it where it is not at hand.
+    """Write a published model as an OBJ file, downloading it where it is not at hand.
 
     Args:
-        name: one of the models.
+        name: one of the models, or g1 for all those of the set G1.
         out: file to write; NAME.obj in the current folder by default.
     """
-    from .data import fetch
+    from .data import fetch_all
 
-    _say(str(fetch(name, out)))
+    for path in fetch_all(name, out):
+        _say(str(path))
     return DONE
 
 
