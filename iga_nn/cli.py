@@ -18,7 +18,7 @@ from solve.expressions import ExpressionError
 from . import __version__, console, pipeline
 from . import report as reports
 from .folder import Outcome
-from .formats import Format, export, is_volume
+from .formats import export, is_volume
 from .options import InputError, MapOptions, PoissonOptions, input_errors, one_line
 
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
@@ -164,7 +164,7 @@ def export_volume(
     volume: Path,
     /,
     *,
-    to: Format,
+    to: str,
     out: Path | None = None,
     solution: Path | None = None,
     force: bool = False,
@@ -173,9 +173,10 @@ def export_volume(
 
     Args:
         volume: volume.npz, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
-        to: G+Smo XML, an MFEM NURBS mesh, exact Bezier cells for VTK, samples for slices in VTK, splinepy's JSON.
+        to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
+            json (splinepy's).
         out: file to write; the volume's stem with the format's ending in the current folder by default.
-        solution: solution.npz to show with it (vtk, view).
+        solution: solution.npz to go with it (vtk, view, mfem).
         force: replace that file where it exists.
     """
     _say(str(export(volume, to, out, solution=solution, force=force)))

@@ -7,7 +7,7 @@ IGES and STEP know no trivariate splines, so they are not among them.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,16 +23,14 @@ if TYPE_CHECKING:
     from solve import Poisson
     from solve.field import SplineField
 
-Format = Literal["gismo", "mfem", "vtk", "view", "json"]
-
-ENDINGS: dict[Format, str] = {
+ENDINGS = {
     "gismo": ".xml",
     "mfem": ".mesh",
     "vtk": "_bezier.vtu",
     "view": "_view.vtu",
     "json": ".json",
 }
-CARRY_FIELDS = ("vtk", "view")
+CARRY_FIELDS = ("vtk", "view", "mfem")  # mfem: a second file beside the mesh
 
 
 def is_volume(path: str | Path) -> bool:
@@ -57,7 +55,7 @@ def load_volume(path: str | Path) -> BSplineVolume:
 
 def export(
     volume: str | Path,
-    to: Format,
+    to: str,
     out: str | Path | None = None,
     *,
     solution: str | Path | None = None,
@@ -66,18 +64,27 @@ def export(
     """Write a volume's file in another format and return the path written; atomic.
 
     out: default is the volume's stem with the format's ending, in the current folder.
-    solution: solution.npz of a solve on this volume; the view shows its error where the report.json beside it knows
-    the exact solution.
+    solution: solution.npz of a solve on this volume. The view shows its error where the report.json beside it knows
+    the exact solution; of an MFEM mesh it becomes the grid function NAME.gf.
     Raises InputError where a file cannot be read or written, exists (unless `force`), or a package is missing.
     """
     if to not in ENDINGS:
         raise InputError(f"format {to!r}: choose one of {', '.join(ENDINGS)}; IGES and STEP know no trivariate splines")
     if solution is not None and to not in CARRY_FIELDS:
-        raise InputError(f"{to} files carry no solution here: export it --to {' or '.join(CARRY_FIELDS)}")
-    target = _target(volume, to, out, force)
+        raise InputError(f"{to} files carry no solution here: export it --to {', '.join(CARRY_FIELDS)}")
+    target = _target(volume, to, out)
+    grid_function = target.with_suffix(".gf") if to == "mfem" and solution is not None else None
+    for file in filter(None, (target, grid_function)):
+        if file.exists() and not force:
+            raise InputError(f"{file}: exists; --force replaces it, --out names another file")
     loaded = load_volume(volume)
     field = None if solution is None else _load_solution(Path(solution), loaded)
     try:
+        if field is not None and grid_function is not None:
+            with input_errors():
+                loaded = spline_files.on_knots_of(field, loaded)
+            with replacing(grid_function) as temporary:
+                spline_files.write_mfem_field(temporary, field)
         with replacing(target) as temporary:
             _write(temporary, to, loaded, field, _problem_beside(solution))
     except OSError as error:
@@ -85,7 +92,7 @@ def export(
     return target
 
 
-def _write(path: Path, to: Format, volume: BSplineVolume, field: SplineField | None, problem: Poisson | None) -> None:
+def _write(path: Path, to: str, volume: BSplineVolume, field: SplineField | None, problem: Poisson | None) -> None:
     from . import vtk_files
 
     match to:
@@ -101,7 +108,7 @@ def _write(path: Path, to: Format, volume: BSplineVolume, field: SplineField | N
             vtk_files.write_view(path, volume, field, problem)
 
 
-def _target(volume: str | Path, to: Format, out: str | Path | None, force: bool) -> Path:
+def _target(volume: str | Path, to: str, out: str | Path | None) -> Path:
     target = Path(Path(volume).stem + ENDINGS[to] if out is None else out)
     ending = "." + ENDINGS[to].rpartition(".")[2]
     if target.is_dir() or not target.name:
@@ -110,8 +117,6 @@ def _target(volume: str | Path, to: Format, out: str | Path | None, force: bool)
         raise InputError(f"{target}: {to} files end in {ending}: choose such a name with --out")
     if not target.parent.is_dir():
         raise InputError(f"{target}: there is no folder {target.parent}: make it, or choose another with --out")
-    if target.exists() and not force:
-        raise InputError(f"{target}: exists; --force replaces it, --out names another file")
     return target
 
 
@@ -129,8 +134,9 @@ def _load_solution(path: Path, volume: BSplineVolume) -> SplineField:
 def _problem_beside(solution: str | Path | None) -> Poisson | None:
     """The problem whose exact solution the report beside solution.npz names."""
     report = None if solution is None else reports.read(Path(solution).parent)
-    exact = (report or {}).get("poisson", {}).get("exact")
-    if exact is None:
+    section = (report or {}).get("poisson")
+    exact = section.get("exact") if isinstance(section, dict) else None
+    if not isinstance(exact, str):
         return None
     from solve import Poisson
 

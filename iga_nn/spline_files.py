@@ -6,24 +6,29 @@ double. All three count the control points with u fastest (volume.npz: w fastest
 - G+Smo: a `MultiPatch` of one `TensorBSpline3` geometry with id 100. The sides 1 to 6 are u0, u1, v0, v1, w0, w1.
 - MFEM: "MFEM NURBS mesh v1.0", one patch, weights 1. The control points stand in MFEM's order of a patch: 8 vertices,
   12 edges, 6 faces, then the inside. Elements are the non-empty knot spans, u fastest, each with the reference
-  coordinates (0, 1)^3 of its span. Boundary attributes 1 to 6 are w0, w1, v0, u1, v1, u0.
+  coordinates (0, 1)^3 of its span. Boundary attributes 1 to 6 are w0, w1, v0, u1, v1, u0. With a solution the map is
+  written on the solution's knots, and the solution's coefficients in the same order in a grid function beside it.
 - JSON: splinepy's own list of splines, here one `BSpline`.
 """
 
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.bspline import Array, apply_along, insert_knots
 from parameterize.volume import BSplineVolume
 
 from .options import InputError, one_line
 from .spline_gate import checked_text
+
+if TYPE_CHECKING:
+    from solve.field import SplineField
 
 INSTALL = "pip install 'iga-nn[interop]'"
 WEIGHTS_ALIKE = 1e-12  # relative
@@ -32,17 +37,42 @@ WEIGHTS_ALIKE = 1e-12  # relative
 def write_gismo(path: Path, volume: BSplineVolume) -> None:
     """Write G+Smo XML."""
     splinepy = _splinepy()
-    splinepy.io.gismo.export(str(path), splinepy.Multipatch([_to_splinepy(volume)]))
+    splinepy.io.gismo.export(str(path), splinepy.Multipatch([_to_splinepy(volume, volume.control_points)]))
 
 
 def write_mfem(path: Path, volume: BSplineVolume) -> None:
     """Write an MFEM NURBS mesh."""
-    _splinepy().io.mfem.export(str(path), _to_splinepy(volume).nurbs)
+    _splinepy().io.mfem.export(str(path), _to_splinepy(volume, volume.control_points).nurbs)
+
+
+def write_mfem_field(path: Path, field: SplineField) -> None:
+    """Write a solution as an MFEM grid function on the mesh of a volume with the same degrees and knots."""
+    spline = _to_splinepy(field, field.coefficients[..., None])
+    order, _ = _splinepy().io.mfem.dof_mapping(spline)
+    values = np.asarray(spline.control_points)[order, 0]
+    head = ["FiniteElementSpace", "FiniteElementCollection: NURBS", "VDim: 1", "Ordering: 0", ""]
+    path.write_text("\n".join([*head, *map(repr, values.tolist())]) + "\n", encoding="utf-8")
+
+
+def on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
+    """The same map with the knots of a solution on it inserted. Raises ValueError where the degrees differ."""
+    if field.degrees != volume.degrees:
+        raise ValueError(
+            f"an MFEM mesh carries a solution of its own degrees {volume.degrees}, this one has {field.degrees}: "
+            "export it --to vtk"
+        )
+    points, knots = volume.control_points, []
+    for axis, (own, finer) in enumerate(zip(volume.knots, field.knots, strict=True)):
+        new = Counter(finer.tolist()) - Counter(own.tolist())
+        inserted, matrix = insert_knots(own, volume.degrees[axis], list(new.elements()))
+        points = apply_along(matrix, points, axis)
+        knots.append(inserted)
+    return BSplineVolume(volume.degrees, (knots[0], knots[1], knots[2]), points)
 
 
 def write_json(path: Path, volume: BSplineVolume) -> None:
     """Write splinepy's JSON."""
-    _splinepy().io.json.export(str(path), [_to_splinepy(volume)])
+    _splinepy().io.json.export(str(path), [_to_splinepy(volume, volume.control_points)])
 
 
 def read(path: Path, kind: str) -> BSplineVolume:
@@ -102,6 +132,7 @@ def _splinepy() -> Any:
     return splinepy
 
 
-def _to_splinepy(volume: BSplineVolume) -> Any:
-    rows = volume.control_points.transpose(2, 1, 0, 3).reshape(-1, 3)  # u fastest
-    return _splinepy().BSpline(list(volume.degrees), [knots.tolist() for knots in volume.knots], rows)
+def _to_splinepy(spline: BSplineVolume | SplineField, net: Array) -> Any:
+    """net: control points or coefficients (n_u, n_v, n_w, c)."""
+    rows = net.transpose(2, 1, 0, 3).reshape(-1, net.shape[3])  # u fastest
+    return _splinepy().BSpline(list(spline.degrees), [knots.tolist() for knots in spline.knots], rows)

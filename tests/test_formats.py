@@ -132,6 +132,21 @@ def test_mfem_knows_the_faces_by_their_attributes(volume):
             assert np.linalg.norm(np.array(corners[number]) - place, axis=1).min() < 1e-12
 
 
+def test_mfem_reads_a_solution_on_its_mesh(volume):
+    mfem = pytest.importorskip("mfem.ser")
+    pytest.importorskip("splinepy")
+    solution = solve_poisson(volume, Poisson(exact="x*y+z"), refine=1)
+    solution.save("solution.npz")
+    mesh = mfem.Mesh(str(export("volume.npz", "mfem", solution="solution.npz")), 1, 0)
+    field = mfem.GridFunction(mesh, "volume.gf")
+    read = []
+    for element, local in zip(*spans_at(volume.refined(), POINTS), strict=True):
+        read.append([*mesh.GetElementTransformation(int(element)).Transform(mfem_point(*local))])
+        read[-1].append(field.GetValue(int(element), mfem_point(*local)))
+    assert largest(np.array(read)[:, :3] - volume(POINTS)) < 1e-12
+    assert largest(np.array(read)[:, 3] - solution(POINTS)) < 1e-12
+
+
 def test_vtk_reads_its_bezier_cells(volume):
     grid = read_vtu(export("volume.npz", "vtk"))
     assert {grid.GetCellType(i) for i in range(grid.GetNumberOfCells())} == {79}
@@ -320,14 +335,15 @@ def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, 
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["map.npz", "--to", "step"], "step"),
+        (["map.npz", "--to", "step"], "'step': choose one of gismo, mfem, vtk, view, json; IGES and STEP"),
         (["missing.npz", "--to", "vtk"], "missing.npz: no such file"),
         (["words.txt", "--to", "vtk"], "words.txt"),
         (["map.npz", "--to", "vtk", "--out", "."], "is a directory"),
         (["map.npz", "--to", "vtk", "--out", "map.vtk"], "vtk files end in .vtu"),
         (["map.npz", "--to", "vtk", "--out", "no/such/map.vtu"], "no folder"),
         (["map.npz", "--to", "vtk", "--out", "here.vtu"], "--force"),
-        (["map.npz", "--to", "json", "--solution", "solution.npz"], "--to vtk or view"),
+        (["map.npz", "--to", "json", "--solution", "solution.npz"], "--to vtk, view, mfem"),
+        (["map.npz", "--to", "mfem", "--solution", "raised.npz"], "this one has (4, 4, 4)"),
         (["map.npz", "--to", "vtk", "--solution", "map.npz"], "coefficients"),
         (["map.npz", "--to", "view", "--solution", "other.npz"], "another volume"),
     ],
@@ -337,6 +353,7 @@ def test_bad_requests_are_one_line(arguments, says, in_folder, capsys):
     Path("words.txt").write_text("once upon a time\n")
     Path("here.vtu").write_text("mine\n")
     solve_poisson(benchmark_volume(3), Poisson(exact="x")).save("other.npz")
+    solve_poisson(benchmark_volume(2), Poisson(exact="x"), degree=4).save("raised.npz")
     before = set(Path().iterdir())
     assert main(["export", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
