@@ -127,10 +127,12 @@ def _cells(spans: Sequence[int], degrees: Sequence[int]) -> NDArray[np.int64]:
 
 
 def _write(path: Path, grid: Any) -> None:
+    """Write through a string: on a full disk VTK's own writing fails with a page of its log and no reason."""
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
     writer = vtkXMLUnstructuredGridWriter()
-    writer.SetFileName(str(path))
     writer.SetInputData(grid)
-    if not writer.Write():
-        raise OSError(0, "VTK could not write it", str(path))
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    path.write_text(writer.GetOutputString(), encoding="ascii")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -366,3 +367,24 @@ def test_force_replaces(in_folder):
     Path("map_bezier.vtu").write_text("old")
     assert main(["export", "map.npz", "--to", "vtk", "--force"]) == 0
     assert read_vtu("map_bezier.vtu").GetNumberOfCells() == 8
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+@pytest.mark.parametrize("to", ["gismo", "mfem", "vtk", "view", "json"])
+def test_a_full_disk_is_one_line_and_leaves_the_old_file(to, in_folder, capsys):
+    import resource
+
+    if to in ("gismo", "mfem", "json"):
+        pytest.importorskip("splinepy")
+    benchmark_volume(6).save("map.npz")
+    target = export("map.npz", to)
+    before = {path: path.read_bytes() for path in Path().iterdir()}
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        assert main(["export", "map.npz", "--to", to, "--force"]) == 2
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"iga-nn: {target}: cannot be written (File too large)")
+    assert {path: path.read_bytes() for path in Path().iterdir()} == before
