@@ -106,8 +106,8 @@ def _from_splinepy(spline: Any) -> BSplineVolume:
         raise ValueError(f"maps {spline.para_dim} parameters to {spline.dim} coordinates; a volume maps 3 to 3")
     full = spline.nurbs  # of every kind of spline
     weights = np.asarray(full.weights)
-    if np.ptp(weights) > WEIGHTS_ALIKE * np.abs(weights).max():
-        raise ValueError("is rational: its weights differ; only polynomial splines (all weights equal) are taken")
+    if not 0.0 < weights.max() <= (1.0 + WEIGHTS_ALIKE) * weights.min():  # refuses NaN, too
+        raise ValueError("is rational: its weights are not all equal and positive; only polynomial splines are taken")
     rows = np.array(full.control_points, dtype=np.float64)
     net = rows.reshape(*reversed(full.control_mesh_resolutions), 3).transpose(2, 1, 0, 3)
     knots = [np.array(row, dtype=np.float64) for row in full.knot_vectors]

@@ -218,6 +218,17 @@ def test_a_mesh_that_mfem_wrote_is_read(volume):
     assert largest(load_volume("printed.mesh")(POINTS) - volume(POINTS)) < 1e-12
 
 
+def test_xml_that_gismo_wrote_is_read(volume):
+    pygismo = pytest.importorskip("pygismo")
+    pytest.importorskip("splinepy")
+    patches, written = pygismo.core.gsMultiPatch(), pygismo.io.gsFileData()
+    pygismo.io.gsFileData(str(export("volume.npz", "gismo"))).getId(0, patches)
+    written.setFloatPrecision(17)
+    written.add(patches)
+    written.save("written.xml")
+    assert largest(load_volume("written.xml")(POINTS) - volume(POINTS)) < 1e-12
+
+
 def test_knots_on_another_interval_are_brought_to_the_unit_cube(volume):
     splinepy = pytest.importorskip("splinepy")
     text = export("volume.npz", "json").read_text()
@@ -275,6 +286,8 @@ BOMB = '<!DOCTYPE xml [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><xml>'
         ("gismo", "0.0 0.0 1.0 1.0", "2.0 2.0 2.0 2.0", "span an interval"),
         ("gismo", "0.0 0.0 0.0", "0.0 nan 0.0", "finite"),
         ("mfem", "weights\n1.0", "weights\n2.0", "rational"),
+        ("mfem", "weights\n1.0", "weights\n1e999", "rational"),
+        ("mfem", "weights" + 8 * "\n1.0", "weights" + 8 * "\n-1.0", "rational"),
         ("mfem", "elements\n1\n", "elements\n2\n1 5 8 9 10 11 12 13 14 15\n", "2 patches"),
         ("mfem", "1 5 0 1 2 3", "1 5 1 2 3 0", "numbers the vertices or edges"),
         ("mfem", "0 3 2", "0 2 3", "numbers the vertices or edges"),
