@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from solve import Poisson, convergence
     from solve import solve_poisson as solve
 
+    from .formats import export, load_volume
     from .options import InputError, MapOptions, PoissonOptions
     from .pipeline import run
     from .samples import sample
@@ -56,7 +57,9 @@ _HOME = {
     "Surface": "parameterize.mesh",
     "certify": "parameterize.certificate",
     "convergence": "solve",
+    "export": "iga_nn.formats",
     "load_surface": "parameterize.mesh",
+    "load_volume": "iga_nn.formats",
     "parameterize": "parameterize.run",
     "preset": "parameterize.config",
     "run": "iga_nn.pipeline",
@@ -76,7 +79,9 @@ __all__ = [
     "__version__",
     "certify",
     "convergence",
+    "export",
     "load_surface",
+    "load_volume",
     "parameterize",
     "preset",
     "run",

@@ -18,6 +18,7 @@ from solve.expressions import ExpressionError
 from . import __version__, console, pipeline
 from . import report as reports
 from .folder import Outcome
+from .formats import export, is_volume
 from .options import InputError, MapOptions, PoissonOptions, input_errors, one_line
 
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
@@ -30,7 +31,7 @@ app = App(
     default_parameter=Parameter(negative=(), consume_multiple=True),
 )
 run_app = App(name="run", help="A surface, all the way to a solved problem.")
-solve_app = App(name="solve", help="A problem on a volume.npz.")
+solve_app = App(name="solve", help="A problem on a volume.")
 app.command(run_app)
 app.command(solve_app)
 
@@ -92,10 +93,10 @@ def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapp
 
 @solve_app.command(name="poisson")
 def solve_poisson(volume: Path, /, *, output: Output = NO_OUTPUT, poisson: Equation = NO_POISSON) -> int:
-    """Solve Poisson's equation on a volume.npz.
+    """Solve Poisson's equation on a volume.
 
     Args:
-        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
     with console.progress_line(output.quiet):
         outcome = pipeline.solve_to(volume, output.out, poisson=poisson, force=output.force)
@@ -104,21 +105,21 @@ def solve_poisson(volume: Path, /, *, output: Output = NO_OUTPUT, poisson: Equat
 
 @app.command(name="check")
 def check(path: str, /, *, component: int | None = None, max_faces: int = MAX_FACES, as_json: Json = False) -> int:
-    """Say whether a surface is accepted, or whether a volume.npz is certified; writes nothing.
+    """Say whether a surface is accepted, or whether a volume is certified; writes nothing.
 
     Args:
-        path: surface, sample's or model's name, or a volume (.npz).
+        path: surface, sample's or model's name, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
         component: which connected piece of the file to take, counted from 0.
         max_faces: refuse larger surfaces.
         as_json: the verdict as JSON on stdout.
     """
-    is_volume = path.endswith(".npz")
-    verdict = pipeline.check_volume(path) if is_volume else pipeline.check_surface(path, component, max_faces)
+    as_volume = is_volume(path)
+    verdict = pipeline.check_volume(path) if as_volume else pipeline.check_surface(path, component, max_faces)
     if as_json:
         _say(json.dumps(reports.plain(verdict), indent=2))
     else:
         _say("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
-    return NOT_CERTIFIED if is_volume and verdict["bijective"] != "certified" else DONE
+    return NOT_CERTIFIED if as_volume and verdict["bijective"] != "certified" else DONE
 
 
 @app.command(name="sample")
@@ -145,15 +146,40 @@ def write_sample(name: str, /, *, out: Path | None = None) -> int:
 
 @app.command(name="fetch")
 def fetch_model(name: str, /, *, out: Path | None = None) -> int:
-    """Write one of the published models as an OBJ file, downloading it where it is not at hand.
+    """Write a published model as an OBJ file, downloading it where it is not at hand.
 
     Args:
-        name: one of the models.
+        name: one of the models, or g1 for all those of the set G1.
         out: file to write; NAME.obj in the current folder by default.
     """
-    from .data import fetch
+    from .data import fetch_all
 
-    _say(str(fetch(name, out)))
+    for path in fetch_all(name, out):
+        _say(str(path))
+    return DONE
+
+
+@app.command(name="export")
+def export_volume(
+    volume: Path,
+    /,
+    *,
+    to: str,
+    out: Path | None = None,
+    solution: Path | None = None,
+    force: bool = False,
+) -> int:
+    """Write a volume in a format that other programs read.
+
+    Args:
+        volume: volume.npz, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
+        to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
+            json (splinepy's).
+        out: file to write; the volume's stem with the format's ending in the current folder by default.
+        solution: solution.npz to go with it (vtk, view, mfem).
+        force: replace that file where it exists.
+    """
+    _say(str(export(volume, to, out, solution=solution, force=force)))
     return DONE
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from parameterize.files import save_bytes
 from parameterize.mesh import MAX_FACES, MeshError, Surface, load_surface
 
 from .samples import SAMPLES, sample, write_obj
@@ -79,14 +80,28 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
             raise MeshError(f"{name}: {len(surface.faces)} faces, more than {max_faces}: raise --max-faces")
         return surface
     found = None if is_file else _in_data_folder(name)
+    known = Path(name).name.split(".")[0]
+    if not is_file and found is None and known in MODELS:  # a folder of that name holds its results
+        raise MeshError(f"{name}: not found; get it with `iga-nn fetch {known}`, or set {DATA_FOLDER} to its folder")
     if found is not None or Path(name).exists():
         return load_surface(found or name, component=component, max_faces=max_faces)
-    known = Path(name).name.split(".")[0]
-    if known in MODELS:
-        raise MeshError(f"{name}: not found; get it with `iga-nn fetch {known}`, or set {DATA_FOLDER} to its folder")
     if Path(name).suffix:
         raise MeshError(f"{name}: no such file: check the name and the folder")
     raise MeshError(f"{name}: no such file and no sample; the samples are {', '.join(SAMPLES)}")
+
+
+def fetch_all(name: str, out: str | Path | None = None) -> Iterator[Path]:
+    """Write the model of that name, or, for "g1", one after the other those of the set G1; yield the paths.
+
+    Raises as `fetch` does, and where `out` is given for the whole set.
+    """
+    if name != "g1":
+        yield fetch(name, out)
+        return
+    if out is not None:
+        raise MeshError("g1: is a set of models, each written to NAME.obj: leave --out out")
+    for model in sorted(name for name in MODELS if "/G1/" in MODELS[name].path):
+        yield fetch(model)
 
 
 def fetch(name: str, out: str | Path | None = None) -> Path:
@@ -96,13 +111,13 @@ def fetch(name: str, out: str | Path | None = None) -> Path:
     Raises MeshError for an unknown name, and, without a network, saying where to put the file.
     """
     if name not in MODELS:
-        raise MeshError(f"{name}: no such model; the models are {', '.join(sorted(MODELS))}")
+        raise MeshError(f"{name}: no such model; the models are {', '.join(sorted(MODELS))}; g1 is all but conch")
     target = obj_path(name, out)
     source = _in_data_folder(name) or _download(name)
     try:
         if source.suffix == ".obj":
             if not (target.exists() and target.samefile(source)):
-                shutil.copyfile(source, target)
+                save_bytes(target, source.read_bytes())
         else:
             write_obj(load_surface(source), target)
     except OSError as error:
@@ -148,9 +163,9 @@ def _download(name: str) -> Path:
             downloader=pooch.HTTPDownloader(timeout=TIMEOUT),
         )
     except (OSError, ValueError) as error:  # no network, or not the file with this checksum
-        reason = str(error).splitlines()[0][:120]
+        reason = "no connection" if "Connect" in type(error).__name__ else str(error).splitlines()[0][:120]
         raise MeshError(
             f"{name}: cannot be downloaded from {model.url} ({reason}): "
-            f"put the file into a folder of your choice and set {DATA_FOLDER} to it"
+            f"put {Path(model.path).name} into a folder and set {DATA_FOLDER} to that folder"
         ) from None
     return Path(path)

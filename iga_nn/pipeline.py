@@ -20,6 +20,7 @@ from parameterize.volume import BSplineVolume
 
 from . import report as reports
 from .folder import CHECKPOINT, Outcome, RunFolder, has_checkpoint, open_folder
+from .formats import load_volume
 from .options import InputError, MapOptions, PoissonOptions, input_errors, read_corners
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def solve_to(
     poisson = poisson or PoissonOptions()
     equation = poisson.problem()
     path = Path(volume)
-    loaded = _load_volume(path)
+    loaded = load_volume(path)
     poisson.check_size(loaded)
     check_data(loaded, equation)
     with open_folder(path, out, force) as (state, _):
@@ -118,7 +119,7 @@ def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str,
 
 def check_volume(path: str | Path) -> dict[str, Any]:
     """The certificate of a saved volume. Raises InputError for a file that is none."""
-    return _certify(_load_volume(path))
+    return _certify(load_volume(path))
 
 
 def _parameterize(
@@ -214,11 +215,6 @@ def _load(mesh: str | Path, component: int | None, max_faces: int) -> Surface:
     from .data import resolve
 
     return resolve(str(mesh), component=component, max_faces=max_faces)
-
-
-def _load_volume(path: str | Path) -> BSplineVolume:
-    with input_errors():
-        return BSplineVolume.load(path)
 
 
 def _certify(volume: BSplineVolume) -> dict[str, Any]:

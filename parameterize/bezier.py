@@ -75,6 +75,17 @@ def halving(degree: int) -> Array:
     return np.stack([left, left[::-1, ::-1]])
 
 
+def elevation(degree: int, raised: int) -> Array:
+    """The same polynomial in degree `raised`, (raised + 1, degree + 1): rows sum to 1 (Farouki 2012, section 3.3)."""
+    rows, columns = range(raised + 1), range(degree + 1)
+    return np.array(
+        [
+            [comb(degree, j) * comb(raised - degree, i - j) / comb(raised, i) if i >= j else 0.0 for j in columns]
+            for i in rows
+        ]
+    )
+
+
 def split(coefficients: Array) -> Array:
     """The eight halves of trivariate polynomials: (k, d_0, d_1, d_2) -> (k, 2, 2, 2, d_0, d_1, d_2)."""
     pieces = coefficients

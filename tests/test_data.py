@@ -8,7 +8,7 @@ import pooch
 import pytest
 
 from iga_nn import data
-from iga_nn.data import MODELS, fetch, resolve
+from iga_nn.data import MODELS, fetch, fetch_all, resolve
 from iga_nn.samples import sample, write_obj
 from parameterize.mesh import MeshError
 
@@ -65,6 +65,22 @@ def test_missing_models_say_where_to_get_them():
             resolve(name)
 
 
+def test_a_results_folder_of_a_models_name_is_no_surface(an_empty_folder):
+    (an_empty_folder / "conch").mkdir()
+    with pytest.raises(MeshError, match="conch: not found; get it with `iga-nn fetch conch`"):
+        resolve("conch")
+
+
+def test_the_set_g1_is_fetched_model_by_model(data_folder):
+    for name in MODELS:
+        write_obj(sample("cube"), data_folder / f"{name}.obj")
+    paths = [str(path) for path in fetch_all("g1")]
+    assert paths == sorted(f"{name}.obj" for name in MODELS if name != "conch")
+    assert all(Path(path).is_file() for path in paths) and not Path("conch.obj").exists()
+    with pytest.raises(MeshError, match="leave --out out"):
+        list(fetch_all("g1", "all.obj"))
+
+
 def test_other_names_are_told_what_is_wrong():
     with pytest.raises(MeshError, match=r"santa4\.obj: no such file"):
         resolve("santa4.obj")
@@ -108,7 +124,8 @@ def test_fetch_without_a_network_says_where_to_put_the_file(monkeypatch):
 
     monkeypatch.setattr(pooch, "retrieve", retrieve)
     with pytest.raises(
-        MeshError, match=r"bunny: cannot be downloaded from https://\S+/G1/bunny.mesh \(no route to host\)"
+        MeshError,
+        match=r"bunny: cannot be downloaded from https://\S+/G1/bunny.mesh \(no connection\): put bunny.mesh into",
     ):
         fetch("bunny")
     assert not Path("bunny.obj").exists()

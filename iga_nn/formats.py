@@ -1,0 +1,144 @@
+"""Volumes in the files of other programs: which formats there are, what they are called, what they can carry.
+
+`spline_files` explains G+Smo XML, MFEM meshes and splinepy's JSON, which are read, too; `vtk_files` those for ParaView.
+IGES and STEP know no trivariate splines, so they are not among them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from parameterize.files import replacing
+from parameterize.volume import BSplineVolume
+
+from . import report as reports
+from . import spline_files
+from .options import InputError, input_errors
+from .spline_gate import kind_of
+
+if TYPE_CHECKING:
+    from solve import Poisson
+    from solve.field import SplineField
+
+ENDINGS = {
+    "gismo": ".xml",
+    "mfem": ".mesh",
+    "vtk": "_bezier.vtu",
+    "view": "_view.vtu",
+    "json": ".json",
+}
+CARRY_FIELDS = ("vtk", "view", "mfem")  # mfem: a second file beside the mesh
+
+
+def is_volume(path: str | Path) -> bool:
+    """Whether a file is a volume (rather than a surface) by its beginning, or by the ending .npz."""
+    source = Path(path)
+    return source.suffix == ".npz" or (source.is_file() and kind_of(source) is not None)
+
+
+def load_volume(path: str | Path) -> BSplineVolume:
+    """Read volume.npz, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON: told apart by how the file begins.
+
+    Raises InputError in one line where the file is none of them, damaged, rational or of several patches, and where
+    splinepy is needed and missing.
+    """
+    source = Path(path)
+    with input_errors():
+        kind = kind_of(source) if source.is_file() else None
+        if kind in ("gismo", "mfem", "json"):
+            return spline_files.read(source, kind)
+        return BSplineVolume.load(source)
+
+
+def export(
+    volume: str | Path,
+    to: str,
+    out: str | Path | None = None,
+    *,
+    solution: str | Path | None = None,
+    force: bool = False,
+) -> Path:
+    """Write a volume's file in another format and return the path written; atomic.
+
+    out: default is the volume's stem with the format's ending, in the current folder.
+    solution: solution.npz of a solve on this volume. The view shows its error where the report.json beside it knows
+    the exact solution; of an MFEM mesh it becomes the grid function NAME.gf.
+    Raises InputError where a file cannot be read or written, exists (unless `force`), or a package is missing.
+    """
+    if to not in ENDINGS:
+        raise InputError(f"format {to!r}: choose one of {', '.join(ENDINGS)}; IGES and STEP know no trivariate splines")
+    if solution is not None and to not in CARRY_FIELDS:
+        raise InputError(f"{to} files carry no solution here: export it --to {', '.join(CARRY_FIELDS)}")
+    target = _target(volume, to, out)
+    grid_function = target.with_suffix(".gf") if to == "mfem" and solution is not None else None
+    for file in filter(None, (target, grid_function)):
+        if file.exists() and not force:
+            raise InputError(f"{file}: exists; --force replaces it, --out names another file")
+    loaded = load_volume(volume)
+    field = None if solution is None else _load_solution(Path(solution), loaded)
+    try:
+        if field is not None and grid_function is not None:
+            with input_errors():
+                loaded = spline_files.on_knots_of(field, loaded)
+            with replacing(grid_function) as temporary:
+                spline_files.write_mfem_field(temporary, field)
+        with replacing(target) as temporary:
+            _write(temporary, to, loaded, field, _problem_beside(solution))
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
+    return target
+
+
+def _write(path: Path, to: str, volume: BSplineVolume, field: SplineField | None, problem: Poisson | None) -> None:
+    from . import vtk_files
+
+    match to:
+        case "gismo":
+            spline_files.write_gismo(path, volume)
+        case "mfem":
+            spline_files.write_mfem(path, volume)
+        case "json":
+            spline_files.write_json(path, volume)
+        case "vtk":
+            vtk_files.write_bezier(path, volume, field)
+        case "view":
+            vtk_files.write_view(path, volume, field, problem)
+
+
+def _target(volume: str | Path, to: str, out: str | Path | None) -> Path:
+    target = Path(Path(volume).stem + ENDINGS[to] if out is None else out)
+    ending = "." + ENDINGS[to].rpartition(".")[2]
+    if target.is_dir() or not target.name:
+        raise InputError(f"{target}: is a directory: name a file with --out")
+    if target.suffix != ending:
+        raise InputError(f"{target}: {to} files end in {ending}: choose such a name with --out")
+    if not target.parent.is_dir():
+        raise InputError(f"{target}: there is no folder {target.parent}: make it, or choose another with --out")
+    return target
+
+
+def _load_solution(path: Path, volume: BSplineVolume) -> SplineField:
+    """A solution on that volume: every knot of the map is one of the solution's."""
+    from solve.field import SplineField
+
+    with input_errors():
+        field = SplineField.load(path)
+    if not all(np.isin(own, finer).all() for own, finer in zip(volume.knots, field.knots, strict=True)):
+        raise InputError(f"{path}: belongs to another volume: its knots are not those of the map, refined")
+    return field
+
+
+def _problem_beside(solution: str | Path | None) -> Poisson | None:
+    """The problem whose exact solution the report beside solution.npz names."""
+    report = None if solution is None else reports.read(Path(solution).parent)
+    section = (report or {}).get("poisson")
+    exact = section.get("exact") if isinstance(section, dict) else None
+    if not isinstance(exact, str):
+        return None
+    from solve import Poisson
+
+    with input_errors():
+        return Poisson(exact=exact)

@@ -1,0 +1,138 @@
+"""Spline files of other programs, read and written through splinepy: G+Smo XML, MFEM NURBS meshes, splinepy JSON.
+
+Each holds F(u, v, w) = sum P_ijk N_i(u) N_j(v) N_k(w) exactly: degrees, knot vectors, control points, every digit of a
+double. All three count the control points with u fastest (volume.npz: w fastest), and knots run from 0 to 1.
+
+- G+Smo: a `MultiPatch` of one `TensorBSpline3` geometry with id 100. The sides 1 to 6 are u0, u1, v0, v1, w0, w1.
+- MFEM: "MFEM NURBS mesh v1.0", one patch, weights 1. The control points stand in MFEM's order of a patch: 8 vertices,
+  12 edges, 6 faces, then the inside. Elements are the non-empty knot spans, u fastest, each with the reference
+  coordinates (0, 1)^3 of its span. Boundary attributes 1 to 6 are w0, w1, v0, u1, v1, u0. With a solution the map is
+  written on the solution's knots, and the solution's coefficients in the same order in a grid function beside it.
+- JSON: splinepy's own list of splines, here one `BSpline`.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from parameterize.bspline import Array, apply_along, insert_knots
+from parameterize.volume import BSplineVolume
+
+from .options import InputError, one_line
+from .spline_gate import checked_text
+
+if TYPE_CHECKING:
+    from solve.field import SplineField
+
+INSTALL = "pip install 'iga-nn[interop]'"
+WEIGHTS_ALIKE = 1e-12  # relative
+
+
+def write_gismo(path: Path, volume: BSplineVolume) -> None:
+    """Write G+Smo XML."""
+    splinepy = _splinepy()
+    splinepy.io.gismo.export(str(path), splinepy.Multipatch([_to_splinepy(volume, volume.control_points)]))
+
+
+def write_mfem(path: Path, volume: BSplineVolume) -> None:
+    """Write an MFEM NURBS mesh."""
+    _splinepy().io.mfem.export(str(path), _to_splinepy(volume, volume.control_points).nurbs)
+
+
+def write_mfem_field(path: Path, field: SplineField) -> None:
+    """Write a solution as an MFEM grid function on the mesh of a volume with the same degrees and knots."""
+    spline = _to_splinepy(field, field.coefficients[..., None])
+    order, _ = _splinepy().io.mfem.dof_mapping(spline)
+    values = np.asarray(spline.control_points)[order, 0]
+    head = ["FiniteElementSpace", "FiniteElementCollection: NURBS", "VDim: 1", "Ordering: 0", ""]
+    path.write_text("\n".join([*head, *map(repr, values.tolist())]) + "\n", encoding="utf-8")
+
+
+def on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
+    """The same map with the knots of a solution on it inserted. Raises ValueError where the degrees differ."""
+    if field.degrees != volume.degrees:
+        raise ValueError(
+            f"an MFEM mesh carries a solution of its own degrees {volume.degrees}, this one has {field.degrees}: "
+            "export it --to vtk"
+        )
+    points, knots = volume.control_points, []
+    for axis, (own, finer) in enumerate(zip(volume.knots, field.knots, strict=True)):
+        new = Counter(finer.tolist()) - Counter(own.tolist())
+        inserted, matrix = insert_knots(own, volume.degrees[axis], list(new.elements()))
+        points = apply_along(matrix, points, axis)
+        knots.append(inserted)
+    return BSplineVolume(volume.degrees, (knots[0], knots[1], knots[2]), points)
+
+
+def write_json(path: Path, volume: BSplineVolume) -> None:
+    """Write splinepy's JSON."""
+    _splinepy().io.json.export(str(path), [_to_splinepy(volume, volume.control_points)])
+
+
+def read(path: Path, kind: str) -> BSplineVolume:
+    """The one trivariate spline of a file; its knots are brought to run from 0 to 1, the map stays.
+
+    kind: "gismo", "mfem" or "json". Raises InputError where splinepy is missing, OSError, and ValueError where the
+    file does not hold one trivariate B-spline: several patches, weights that differ, damaged content.
+    """
+    splinepy = _splinepy()
+    try:
+        text = checked_text(path, kind)
+        spline = _load(splinepy, text, kind)
+        return _from_splinepy(spline)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _load(splinepy: Any, text: str, kind: str) -> Any:
+    with TemporaryDirectory() as folder:
+        checked = Path(folder, "spline")
+        checked.write_text(text, encoding="utf-8")
+        try:
+            found = getattr(splinepy.io, kind).load(str(checked))
+            return {"gismo": lambda: found[0].patches[0], "mfem": lambda: found, "json": lambda: found[0]}[kind]()
+        except Exception as error:  # splinepy and what it calls raise a dozen kinds on damaged content
+            raise ValueError(f"splinepy finds no spline in it ({one_line(error) or type(error).__name__})") from None
+
+
+def _from_splinepy(spline: Any) -> BSplineVolume:
+    if spline.para_dim != 3 or spline.dim != 3:
+        raise ValueError(f"maps {spline.para_dim} parameters to {spline.dim} coordinates; a volume maps 3 to 3")
+    full = spline.nurbs  # of every kind of spline
+    weights = np.asarray(full.weights)
+    if not 0.0 < weights.max() <= (1.0 + WEIGHTS_ALIKE) * weights.min():  # refuses NaN, too
+        raise ValueError("is rational: its weights are not all equal and positive; only polynomial splines are taken")
+    rows = np.array(full.control_points, dtype=np.float64)
+    net = rows.reshape(*reversed(full.control_mesh_resolutions), 3).transpose(2, 1, 0, 3)
+    knots = [np.array(row, dtype=np.float64) for row in full.knot_vectors]
+    k_u, k_v, k_w = ((row - row[0]) / (row[-1] - row[0]) for row in map(_spanning, knots))
+    p_u, p_v, p_w = (int(p) for p in full.degrees)
+    return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), np.ascontiguousarray(net))
+
+
+def _spanning(knots: Array) -> Array:
+    if not (np.all(np.isfinite(knots)) and knots[-1] > knots[0]):
+        raise ValueError("knots must be finite and span an interval")
+    return knots
+
+
+def _splinepy() -> Any:
+    """The package splinepy. Raises InputError with the way to install it."""
+    try:
+        import splinepy
+    except ImportError:
+        raise InputError(f"this format is read and written through splinepy, which is missing: {INSTALL}") from None
+    logging.getLogger("splinepy").setLevel("ERROR")  # it warns that one patch has no neighbours
+    return splinepy
+
+
+def _to_splinepy(spline: BSplineVolume | SplineField, net: Array) -> Any:
+    """net: control points or coefficients (n_u, n_v, n_w, c)."""
+    rows = net.transpose(2, 1, 0, 3).reshape(-1, net.shape[3])  # u fastest
+    return _splinepy().BSpline(list(spline.degrees), [knots.tolist() for knots in spline.knots], rows)

@@ -1,0 +1,138 @@
+"""A volume for ParaView and VTK, as exact Bezier cells or as samples on linear cells.
+
+Exact (`_bezier.vtu`): every knot span is a VTK_BEZIER_HEXAHEDRON (cell type 79) that holds the Bernstein coefficients
+of F; neighbours share the points between them. The order of a cell's points is `vtkHigherOrderHexahedron`'s: corners,
+edges, faces, inside. The cells count u fastest. The degrees of each cell (HigherOrderDegrees) and the weights of the
+points (RationalWeights, all 1) are active attributes: readers take them for the shape functions. Point data are
+Bernstein coefficients, too. Where a solution has a higher degree or more knots than the map, both are written in the
+higher degree on all spans, exactly.
+
+VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
+tessellations are right. For slicing and clipping there are the samples (`_view.vtu`): linear hexahedra whose nodes lie
+on the spline, SAMPLES a span and direction, with the values there of `arap` (distortion, scale as given), `det J`, and,
+with a solution, `u` and (the exact solution being known) `error` = |u - u_h|.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from parameterize.bezier import elevation, extraction
+from parameterize.bspline import Array, apply_along, breakpoints, insert_knots
+from parameterize.quality import arap
+from parameterize.volume import BSplineVolume
+
+if TYPE_CHECKING:
+    from solve import Poisson
+    from solve.field import SplineField
+
+SAMPLES = 3  # intervals of the view a span and direction
+BEZIER_HEXAHEDRON = 79
+
+
+def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None = None) -> None:
+    """Write the exact cells; `solution` becomes the point data `u`."""
+    import pyvista
+
+    shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
+    breaks = [np.unique(np.concatenate([s.knots[a] for s in shown])) for a in range(3)]
+    degrees = [max(s.degrees[a] for s in shown) for a in range(3)]
+    points = _bernstein(volume.degrees, volume.knots, volume.control_points, breaks, degrees).reshape(-1, 3)
+    cells = _cells([len(b) - 1 for b in breaks], degrees)  # (s, nodes of a cell)
+    counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
+    grid = pyvista.UnstructuredGrid(counted.ravel(), np.full(len(cells), BEZIER_HEXAHEDRON), points)
+    _mark_active(grid.GetCellData().SetHigherOrderDegrees, "HigherOrderDegrees", np.tile(degrees, (len(cells), 1)))
+    _mark_active(grid.GetPointData().SetRationalWeights, "RationalWeights", np.ones(len(points)))
+    if solution is not None:
+        values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)
+        grid.point_data["u"] = values.ravel()
+    _write(path, grid)
+
+
+def write_view(
+    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Poisson | None = None
+) -> None:
+    """Write samples of the map and of what is known on it; `problem` knows the exact solution."""
+    import pyvista
+
+    u, v, w = (_sample_points(knots) for knots in volume.knots)
+    points = volume.grid(u, v, w)  # (m_u, m_v, m_w, 3)
+    jacobians = volume.grid_jacobian(u, v, w)
+    fields = {"arap": arap(jacobians), "det J": np.linalg.det(jacobians)}
+    if solution is not None:
+        fields["u"] = solution.grid(u, v, w)
+        if problem is not None:
+            exact, _ = problem.exact_at(*np.moveaxis(points, -1, 0))
+            fields["error"] = np.abs(fields["u"] - exact)
+    grid = pyvista.StructuredGrid(*np.moveaxis(points, -1, 0)).cast_to_unstructured_grid()
+    for name, values in fields.items():
+        grid.point_data[name] = values.ravel(order="F")  # VTK counts the first index fastest
+    _write(path, grid)
+
+
+def _mark_active(mark: Callable[[Any], object], name: str, values: NDArray[Any]) -> None:
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    array = numpy_to_vtk(np.asarray(values, dtype=np.float64), deep=True)
+    array.SetName(name)
+    mark(array)
+
+
+def _sample_points(knots: Array) -> Array:
+    breaks = breakpoints(knots)
+    return np.interp(np.arange(SAMPLES * (len(breaks) - 1) + 1) / SAMPLES, np.arange(len(breaks)), breaks)
+
+
+def _bernstein(
+    degrees: Sequence[int], knots: Sequence[Array], field: Array, breaks: Sequence[Array], raised: Sequence[int]
+) -> Array:
+    """Bernstein coefficients of degrees `raised` on the spans between `breaks`: (s_u q_u + 1, s_v q_v + 1, ...)."""
+    for axis in range(3):
+        missing = np.setdiff1d(breaks[axis], knots[axis])
+        finer, insertion = insert_knots(knots[axis], degrees[axis], missing)
+        matrix = _span_matrix(finer, degrees[axis], raised[axis]) @ insertion
+        field = apply_along(csr_array(matrix), field, axis)
+    return field
+
+
+def _span_matrix(knots: Array, degree: int, raised: int) -> csr_array:
+    """From B-spline to Bernstein coefficients of degree `raised`, the one between two spans once: (s q + 1, n)."""
+    first, weights = extraction(knots, degree)
+    blocks = elevation(degree, raised) @ weights  # (s, q + 1, degree + 1)
+    rows = np.arange(len(first))[:, None] * raised + np.arange(raised + 1)
+    owned = np.ones(rows.shape, dtype=bool)
+    owned[1:, 0] = False
+    columns = np.broadcast_to((first[:, None] + np.arange(degree + 1))[:, None, :], blocks.shape)
+    places = (np.repeat(rows[owned], degree + 1), columns[owned].ravel())
+    return csr_array((blocks[owned].ravel(), places), shape=(len(first) * raised + 1, len(knots) - degree - 1))
+
+
+def _cells(spans: Sequence[int], degrees: Sequence[int]) -> NDArray[np.int64]:
+    """Numbers of the points of every Bezier cell in VTK's order, cells and nodes in it with u fastest: (s, nodes)."""
+    from vtkmodules.vtkCommonDataModel import vtkHigherOrderHexahedron
+
+    shape = [s * q + 1 for s, q in zip(spans, degrees, strict=True)]
+    lattice = np.arange(np.prod(shape)).reshape(shape)
+    local = np.stack(np.unravel_index(np.arange(np.prod(np.add(degrees, 1))), np.add(degrees, 1)), axis=1)
+    order = [vtkHigherOrderHexahedron.PointIndexFromIJK(i, j, k, degrees) for i, j, k in local.tolist()]
+    corners = np.stack(np.unravel_index(np.arange(np.prod(spans)), spans, order="F"), axis=1) * degrees  # (s, 3)
+    nodes = corners[:, None, :] + local[np.argsort(order)]
+    return lattice[tuple(np.moveaxis(nodes, -1, 0))]
+
+
+def _write(path: Path, grid: Any) -> None:
+    """Write through a string: on a full disk VTK's own writing fails with a page of its log and no reason."""
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    path.write_text(writer.GetOutputString(), encoding="ascii")

@@ -1,0 +1,403 @@
+"""Every file is read back by a program that did not write it, at 50 random points."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iga_nn.cli import main
+from iga_nn.formats import export, is_volume, load_volume
+from iga_nn.options import InputError
+from parameterize.bezier import binomials, elevation
+from parameterize.bspline import open_uniform_knots
+from parameterize.volume import BSplineVolume
+from solve import Poisson, solve_poisson
+from solve.field import SplineField
+from solve.study import benchmark_volume
+
+POINTS = np.random.default_rng(7).random((50, 3))
+
+
+def volume_of(degrees, knots):
+    """Irregular control points: an order mistaken anywhere shows."""
+    n = tuple(len(k) - p - 1 for k, p in zip(knots, degrees, strict=True))
+    grid = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, m) for m in n], indexing="ij"), axis=-1)
+    return BSplineVolume(degrees, knots, grid + 0.03 * np.random.default_rng(3).normal(size=grid.shape))
+
+
+VOLUMES = {
+    "cubic": volume_of((3, 3, 3), (open_uniform_knots(7, 3), open_uniform_knots(5, 3), open_uniform_knots(6, 3))),
+    "mixed": volume_of(
+        (2, 3, 1),
+        (
+            np.array([0, 0, 0, 0.2, 0.5, 0.5, 1, 1, 1]),
+            open_uniform_knots(5, 3),
+            np.array([0, 0, 0.3, 0.9, 1, 1]),
+        ),
+    ),
+    "one span": volume_of((1, 2, 3), (open_uniform_knots(2, 1), open_uniform_knots(3, 2), open_uniform_knots(4, 3))),
+}
+
+
+@pytest.fixture(params=VOLUMES)
+def volume(request, in_folder):
+    """One of them, saved as volume.npz in the current folder."""
+    VOLUMES[request.param].save("volume.npz")
+    return VOLUMES[request.param]
+
+
+def spans_at(volume, points):
+    """Element of each point, counted with u fastest, and the coordinates in it."""
+    numbers, local, step = np.zeros(len(points), dtype=int), np.empty_like(points), 1
+    for axis, knots in enumerate(volume.knots):
+        breaks = np.unique(knots)
+        i = np.searchsorted(breaks, points[:, axis], side="right") - 1
+        local[:, axis] = (points[:, axis] - breaks[i]) / (breaks[i + 1] - breaks[i])
+        numbers += step * i
+        step *= len(breaks) - 1
+    return numbers, local
+
+
+def largest(difference):
+    return float(np.abs(difference).max())
+
+
+def mfem_point(*where):
+    mfem = pytest.importorskip("mfem.ser")
+    point = mfem.IntegrationPoint()
+    (point.Set3 if len(where) == 3 else point.Set2)(*where)
+    return point
+
+
+def read_vtu(path):
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+    reader = vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    return reader.GetOutput()
+
+
+def cell_values(grid, volume, points, name=None):
+    """VTK's own evaluation of its cells: places (m, 3), or the point data of that name (m,)."""
+    found = []
+    for number, local in zip(*spans_at(volume, points), strict=True):
+        cell = grid.GetCell(int(number))
+        place, weights = [0.0] * 3, [0.0] * cell.GetNumberOfPoints()
+        cell.EvaluateLocation(sys.modules["vtkmodules.vtkCommonCore"].reference(0), local.tolist(), place, weights)
+        nodes = [cell.GetPointId(i) for i in range(len(weights))]
+        found.append(
+            place if name is None else np.dot(weights, [grid.GetPointData().GetArray(name).GetValue(i) for i in nodes])
+        )
+    return np.array(found)
+
+
+def test_gismo_reads_its_xml(volume):
+    pytest.importorskip("splinepy")
+    pygismo = pytest.importorskip("pygismo")
+    spline = pygismo.nurbs.gsTensorBSpline3()
+    pygismo.io.gsFileData(str(export("volume.npz", "gismo"))).getId(100, spline)
+    assert largest(spline.eval(POINTS.T).T - volume(POINTS)) < 1e-12
+
+
+def test_mfem_reads_its_mesh(volume):
+    mfem = pytest.importorskip("mfem.ser")
+    pytest.importorskip("splinepy")
+    mesh = mfem.Mesh(str(export("volume.npz", "mfem")), 1, 0)
+    places = zip(*spans_at(volume, POINTS), strict=True)
+    read = [np.array(mesh.GetElementTransformation(int(e)).Transform(mfem_point(*local))) for e, local in places]
+    assert largest(np.array(read) - volume(POINTS)) < 1e-12
+    assert mesh.GetNE() == np.prod([len(np.unique(k)) - 1 for k in volume.knots])
+
+
+def test_mfem_knows_the_faces_by_their_attributes(volume):
+    mfem = pytest.importorskip("mfem.ser")
+    pytest.importorskip("splinepy")
+    mesh = mfem.Mesh(str(export("volume.npz", "mfem")), 1, 0)
+    faces = {1: (2, 0), 2: (2, 1), 3: (1, 0), 4: (0, 1), 5: (1, 1), 6: (0, 0)}  # axis, side
+    corners = {number: [] for number in faces}
+    for element in range(mesh.GetNBE()):
+        shape = mesh.GetBdrElementTransformation(element)
+        corners[mesh.GetBdrAttribute(element)] += [
+            np.array(shape.Transform(mfem_point(s, t))) for s in (0, 1) for t in (0, 1)
+        ]
+    ends = np.indices((2, 2, 2)).reshape(3, 8).T
+    for number, (axis, side) in faces.items():
+        for place in volume(ends[ends[:, axis] == side]):
+            assert np.linalg.norm(np.array(corners[number]) - place, axis=1).min() < 1e-12
+
+
+def test_mfem_reads_a_solution_on_its_mesh(volume):
+    mfem = pytest.importorskip("mfem.ser")
+    pytest.importorskip("splinepy")
+    solution = solve_poisson(volume, Poisson(exact="x*y+z"), refine=1)
+    solution.save("solution.npz")
+    mesh = mfem.Mesh(str(export("volume.npz", "mfem", solution="solution.npz")), 1, 0)
+    field = mfem.GridFunction(mesh, "volume.gf")
+    read = []
+    for element, local in zip(*spans_at(volume.refined(), POINTS), strict=True):
+        read.append([*mesh.GetElementTransformation(int(element)).Transform(mfem_point(*local))])
+        read[-1].append(field.GetValue(int(element), mfem_point(*local)))
+    assert largest(np.array(read)[:, :3] - volume(POINTS)) < 1e-12
+    assert largest(np.array(read)[:, 3] - solution(POINTS)) < 1e-12
+
+
+def test_vtk_reads_its_bezier_cells(volume):
+    grid = read_vtu(export("volume.npz", "vtk"))
+    assert {grid.GetCellType(i) for i in range(grid.GetNumberOfCells())} == {79}
+    assert grid.GetCellData().GetHigherOrderDegrees().GetTuple(0) == volume.degrees
+    assert grid.GetPointData().GetRationalWeights().GetRange() == (1.0, 1.0)
+    assert largest(cell_values(grid, volume, POINTS) - volume(POINTS)) < 1e-12
+
+
+@pytest.mark.parametrize("degree", [None, 2, 4])
+def test_vtk_reads_a_solution_of_another_degree_on_finer_spans(degree, in_folder):
+    volume = benchmark_volume(2)
+    volume.save("volume.npz")
+    solution = solve_poisson(volume, Poisson(exact="x*y+z"), refine=1, degree=degree)
+    solution.save("solution.npz")
+    grid = read_vtu(export("volume.npz", "vtk", solution="solution.npz"))
+    finer = volume.refined()
+    assert largest(cell_values(grid, finer, POINTS) - volume(POINTS)) < 1e-12
+    assert largest(cell_values(grid, finer, POINTS, "u") - solution(POINTS)) < 1e-12
+
+
+def test_view_holds_the_spline_and_its_fields_at_its_nodes(volume):
+    solution = solve_poisson(volume, Poisson(exact="x*y+z*z"), refine=1)
+    solution.save("solution.npz")
+    Path("report.json").write_text(json.dumps({"schema": 1, "poisson": {"exact": "x*y+z*z"}}))
+    grid = read_vtu(export("volume.npz", "view", solution="solution.npz"))
+    axes = []
+    for knots in volume.knots:
+        breaks = np.unique(knots)
+        axes.append(np.unique(np.concatenate([np.linspace(a, b, 4) for a, b in pairwise(breaks)])))
+    where = np.stack([values.ravel(order="F") for values in np.meshgrid(*axes, indexing="ij")], axis=1)
+    nodes = np.array([grid.GetPoint(i) for i in range(grid.GetNumberOfPoints())])
+    fields = {
+        grid.GetPointData().GetArrayName(i): np.array(grid.GetPointData().GetArray(i))
+        for i in range(grid.GetPointData().GetNumberOfArrays())
+    }
+    assert {grid.GetCellType(i) for i in range(grid.GetNumberOfCells())} == {12}
+    assert largest(nodes - volume(where)) < 1e-12
+    x, y, z = nodes.T
+    assert largest(fields["u"] - solution(where)) < 1e-12
+    assert largest(fields["error"] - np.abs(solution(where) - (x * y + z * z))) < 1e-12
+    sigma = np.linalg.svd(volume.jacobian(where), compute_uv=False)
+    assert largest(np.abs(fields["det J"]) - sigma.prod(axis=1)) < 1e-12
+    upright = fields["det J"] > 0.0
+    assert largest(fields["arap"][upright] - ((sigma - 1.0) ** 2).sum(axis=1)[upright]) < 1e-10
+
+
+def test_a_degree_raised_is_the_same_polynomial():
+    t = np.linspace(0.0, 1.0, 9)
+    bernstein = [
+        binomials(q) * t[:, None] ** np.arange(q + 1) * (1 - t[:, None]) ** np.arange(q, -1, -1) for q in (2, 5)
+    ]
+    assert largest(bernstein[1] @ elevation(2, 5) - bernstein[0]) < 1e-14
+
+
+@pytest.mark.parametrize("to", ["gismo", "mfem", "json"])
+def test_what_was_exported_is_read_again(to, volume):
+    pytest.importorskip("splinepy")
+    again = load_volume(export("volume.npz", to))
+    assert again.degrees == volume.degrees
+    assert np.array_equal(again.control_points, volume.control_points)
+    assert all(np.array_equal(a, b) for a, b in zip(again.knots, volume.knots, strict=True))
+
+
+def test_a_mesh_that_mfem_wrote_is_read(volume):
+    mfem = pytest.importorskip("mfem.ser")
+    pytest.importorskip("splinepy")
+    mfem.Mesh(str(export("volume.npz", "mfem")), 1, 0).Print("printed.mesh", 17)
+    assert largest(load_volume("printed.mesh")(POINTS) - volume(POINTS)) < 1e-12
+
+
+def test_xml_that_gismo_wrote_is_read(volume):
+    pygismo = pytest.importorskip("pygismo")
+    pytest.importorskip("splinepy")
+    patches, written = pygismo.core.gsMultiPatch(), pygismo.io.gsFileData()
+    pygismo.io.gsFileData(str(export("volume.npz", "gismo"))).getId(0, patches)
+    written.setFloatPrecision(17)
+    written.add(patches)
+    written.save("written.xml")
+    assert largest(load_volume("written.xml")(POINTS) - volume(POINTS)) < 1e-12
+
+
+def test_knots_on_another_interval_are_brought_to_the_unit_cube(volume):
+    splinepy = pytest.importorskip("splinepy")
+    text = export("volume.npz", "json").read_text()
+    content = json.loads(text)
+    content["SplineList"][0]["knot_vectors"] = [
+        [3.0 + 8.0 * t for t in k] for k in content["SplineList"][0]["knot_vectors"]
+    ]
+    Path("moved.json").write_text(json.dumps(content))
+    original = splinepy.io.json.load("moved.json")[0]
+    assert largest(load_volume("moved.json")(POINTS) - original.evaluate(3.0 + 8.0 * POINTS)) < 1e-12
+
+
+def test_a_volume_from_elsewhere_is_checked_and_solved(in_folder, capsys):
+    pytest.importorskip("splinepy")
+    benchmark_volume(3).save("map.npz")
+    for to in ("gismo", "mfem", "json"):
+        assert main(["export", "map.npz", "--to", to, "--out", f"{to}{export_ending(to)}"]) == 0
+        name = capsys.readouterr().out.strip()
+        assert is_volume(name)
+        assert main(["check", name]) == 0
+        assert "certified" in capsys.readouterr().out
+    for name in ("gismo.xml", "map.npz"):
+        assert main(["solve", "poisson", name, "--refine", "0", "--source", "x", "--boundary", "y", "--quiet"]) == 0
+    ours, foreign = (SplineField.load(f"{folder}/solution.npz") for folder in ("map", "gismo"))
+    assert largest(ours.coefficients - foreign.coefficients) < 1e-12
+
+
+def export_ending(to):
+    return {"gismo": ".xml", "mfem": ".mesh", "json": ".json"}[to]
+
+
+def edited(to, old, new, count=1):
+    """The text of an exported cube with something replaced."""
+    BSplineVolume.uniform(np.stack(np.indices((2, 2, 2)), axis=-1), degree=1).save("cube.npz")
+    text = export("cube.npz", to, force=True).read_text()
+    assert old in text
+    return text.replace(old, new, count)
+
+
+GISMO_PATCH = '<Geometry id="101" type="TensorBSpline3"/></xml>'
+BOMB = '<!DOCTYPE xml [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><xml>'
+
+
+@pytest.mark.parametrize(
+    ("to", "old", "new", "says"),
+    [
+        ("gismo", "<xml>", BOMB, "entities are not expanded"),
+        ("gismo", "</xml>", GISMO_PATCH, "2 patches"),
+        ("gismo", "</xml>", "", "not well-formed"),
+        ("gismo", "TensorBSpline3", "TensorBSpline2", "TensorBSpline2; a volume is"),
+        ("gismo", "TensorBSplineBasis3", "TensorBSplineBasis999999999", "TensorBSplineBasis999999999"),
+        ("gismo", 'degree="1"', 'degree="900000000"', "splinepy finds no spline in it"),
+        ("gismo", "0.0 0.0 1.0 1.0", "0.0 0.0 1.0", "splinepy finds no spline in it"),
+        ("gismo", "0.0 0.0 1.0 1.0", "0.0 0.1 0.9 1.0", "open"),
+        ("gismo", "0.0 0.0 1.0 1.0", "2.0 2.0 2.0 2.0", "span an interval"),
+        ("gismo", "0.0 0.0 0.0", "0.0 nan 0.0", "finite"),
+        ("mfem", "weights\n1.0", "weights\n2.0", "rational"),
+        ("mfem", "weights\n1.0", "weights\n1e999", "rational"),
+        ("mfem", "weights" + 8 * "\n1.0", "weights" + 8 * "\n-1.0", "rational"),
+        ("mfem", "elements\n1\n", "elements\n2\n1 5 8 9 10 11 12 13 14 15\n", "2 patches"),
+        ("mfem", "1 5 0 1 2 3", "1 5 1 2 3 0", "numbers the vertices or edges"),
+        ("mfem", "0 3 2", "0 2 3", "numbers the vertices or edges"),
+        ("mfem", "knotvectors", "patches\n\nknotvectors", "Mesh.Print"),
+        ("mfem", "weights\n1.0", "weights\n(1.0)*9**9**9", "not made of numbers"),
+        ("mfem", "Ordering: 1", "Ordering: 0", "Ordering: 1"),
+        ("mfem", "1 2 0.0", "1 99999999999 0.0", "splinepy finds no spline in it"),
+        ("json", '"SplineList": [', '"SplineList": [1, ', "2 patches"),
+        ("json", '"para_dim": 3', '"para_dim": 2', "3 parameters"),
+        ("json", '"SplineList"', '"Other"', "as splinepy writes it"),
+        ("json", "{", "{" + "[" * 100_000, "as splinepy writes it"),
+        ("json", '"SplineType": "BSpline"', '"SplineType": "NoSuch"', "splinepy finds no spline in it"),
+        ("json", '"degrees"', '"degree"', "splinepy finds no spline in it"),
+    ],
+)  # fmt: skip
+def test_files_that_are_no_volume_are_refused_in_one_line(to, old, new, says, in_folder, capsys):
+    pytest.importorskip("splinepy")
+    Path("bad" + export_ending(to)).write_text(edited(to, old, new))
+    before = set(Path().iterdir())
+    assert main(["solve", "poisson", "bad" + export_ending(to)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"iga-nn: bad{export_ending(to)}: ") and says in line and len(line) < 400
+    assert set(Path().iterdir()) == before
+
+
+def test_rational_splines_are_refused_and_constant_weights_are_not(in_folder):
+    splinepy = pytest.importorskip("splinepy")
+    cube = splinepy.helpme.create.box(1, 2, 3).nurbs
+    splinepy.io.json.export("box.json", [cube])
+    assert load_volume("box.json")([[0.5, 0.5, 0.5]]) == pytest.approx(np.array([[0.5, 1.0, 1.5]]))
+    bent = splinepy.helpme.create.disk(1.0).create.extruded([0, 0, 1])
+    for name in ("json", "gismo"):
+        getattr(splinepy.io, name).export(f"bent.{name}", [bent])
+        with pytest.raises(InputError, match=r"bent\.\w+: is rational"):
+            load_volume(f"bent.{name}")
+
+
+def test_a_huge_file_is_refused_before_it_is_read(in_folder):
+    pytest.importorskip("splinepy")
+    with Path("huge.xml").open("wb") as stream:
+        stream.write(b"<xml>")
+        stream.truncate(1 << 40)
+    with pytest.raises(InputError, match="huge.xml: has 1099511627776 bytes, more than"):
+        load_volume("huge.xml")
+
+
+def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, capsys):
+    benchmark_volume(2).save("map.npz")
+    Path("foreign.xml").write_text("<xml></xml>")
+    monkeypatch.setitem(sys.modules, "splinepy", None)
+    for arguments in (["export", "map.npz", "--to", "gismo"], ["solve", "poisson", "foreign.xml"]):
+        assert main(arguments) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "pip install 'iga-nn[interop]'" in line
+    assert {path.name for path in Path().iterdir()} == {"map.npz", "foreign.xml"}
+    assert main(["export", "map.npz", "--to", "vtk"]) == 0  # VTK needs no splinepy
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["map.npz", "--to", "step"], "'step': choose one of gismo, mfem, vtk, view, json; IGES and STEP"),
+        (["missing.npz", "--to", "vtk"], "missing.npz: no such file"),
+        (["words.txt", "--to", "vtk"], "words.txt"),
+        (["map.npz", "--to", "vtk", "--out", "."], "is a directory"),
+        (["map.npz", "--to", "vtk", "--out", "map.vtk"], "vtk files end in .vtu"),
+        (["map.npz", "--to", "vtk", "--out", "no/such/map.vtu"], "no folder"),
+        (["map.npz", "--to", "vtk", "--out", "here.vtu"], "--force"),
+        (["map.npz", "--to", "json", "--solution", "solution.npz"], "--to vtk, view, mfem"),
+        (["map.npz", "--to", "mfem", "--solution", "raised.npz"], "this one has (4, 4, 4)"),
+        (["map.npz", "--to", "vtk", "--solution", "map.npz"], "coefficients"),
+        (["map.npz", "--to", "view", "--solution", "other.npz"], "another volume"),
+    ],
+)
+def test_bad_requests_are_one_line(arguments, says, in_folder, capsys):
+    benchmark_volume(2).save("map.npz")
+    Path("words.txt").write_text("once upon a time\n")
+    Path("here.vtu").write_text("mine\n")
+    solve_poisson(benchmark_volume(3), Poisson(exact="x")).save("other.npz")
+    solve_poisson(benchmark_volume(2), Poisson(exact="x"), degree=4).save("raised.npz")
+    before = set(Path().iterdir())
+    assert main(["export", *arguments]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("iga-nn:") and says in line
+    assert set(Path().iterdir()) == before and Path("here.vtu").read_text() == "mine\n"
+
+
+def test_force_replaces(in_folder):
+    benchmark_volume(2).save("map.npz")
+    Path("map_bezier.vtu").write_text("old")
+    assert main(["export", "map.npz", "--to", "vtk", "--force"]) == 0
+    assert read_vtu("map_bezier.vtu").GetNumberOfCells() == 8
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+@pytest.mark.parametrize("to", ["gismo", "mfem", "vtk", "view", "json"])
+def test_a_full_disk_is_one_line_and_leaves_the_old_file(to, in_folder, capsys):
+    import resource
+
+    if to in ("gismo", "mfem", "json"):
+        pytest.importorskip("splinepy")
+    benchmark_volume(6).save("map.npz")
+    target = export("map.npz", to)
+    before = {path: path.read_bytes() for path in Path().iterdir()}
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        assert main(["export", "map.npz", "--to", to, "--force"]) == 2
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"iga-nn: {target}: cannot be written (File too large)")
+    assert {path: path.read_bytes() for path in Path().iterdir()} == before
