@@ -79,7 +79,7 @@ class SplineConfig:
     min_facing: float = 0.1  # likewise (t_a x t_b) . n of the boundary's tangents and the mesh's normals
     penalties: tuple[float, ...] = (20.0, 100.0, 500.0, 2500.0)  # one a round, then the last one again
     rounds: int = 16  # at most
-    polish: int = 2  # of them, after the map is certified for the first time
+    polish: int = 3  # of them, after the map is certified for the first time
     steps: int = 60  # a round, at most
     first_gain: float = 4e-3  # the first round ends once a step lowers the energy by less than this share of it
     gain: float = 5e-4  # likewise the later ones

@@ -32,7 +32,6 @@ _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
 _SLIDES = 2  # of the boundary parameters after each step
 _RELAXATIONS = 1  # sweeps over triangles that they turned over
-_SETTLING_SWEEPS = 600
 _SHORTEST_STEP = 1e-6
 _LEAST_STEPS = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
 # After so many rounds the surface gives way where the map is not proved: a cube edge in a valley cannot lie on it.
@@ -62,7 +61,8 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the surface data near them loses weight. Once the map is certified,
-    a few more rounds polish it. The result is the last certified map, else the one with the fewest unproved spans.
+    a few more rounds take that back as far as they can. The result is the last certified map, else the one with the
+    fewest unproved spans.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
@@ -100,21 +100,19 @@ def _rounds(
         history.rows[:] = [tuple(row) for row in saved[1]["history"]]
         polished = int(saved[1]["polished"])
     for number in range(first, config.rounds):
-        settled = best.certificate.verdict == "certified" and number > 0
-        if settled:
+        if best.certificate.verdict == "certified" and number > 0:
             if polished == config.polish:
                 break
             polished += 1
-            surface.relax(_SETTLING_SWEEPS)
-            surface.emphasise(control)
+            surface.give_way(np.minimum(surface.yielding / _GIVING_WAY, 1.0))
         energy.start_round(control, config.penalties[min(number, len(config.penalties) - 1)])
-        control = _descend(control, energy, number, history, progress, settled=settled)
+        control = _descend(control, energy, number, history, progress)
         certificate = certify(_as_volume(control, knots, config.degree))
         _log.info("round %d: %s, %d spans unproved", number, certificate.verdict, len(certificate.unproved))
         if number == 0 or len(certificate.unproved) <= len(best.certificate.unproved):
             best = Optimized(control, certificate)
         energy.barrier.activate(certificate.unproved)
-        if number >= _PATIENT_ROUNDS and len(certificate.unproved):
+        if number >= _PATIENT_ROUNDS and not polished and len(certificate.unproved):
             near = surface.near_spans(certificate.unproved)
             surface.give_way(np.where(near, _GIVING_WAY, 1.0) * surface.yielding)
         _save(checkpoints, {"number": number + 1, "polished": polished}, control, best, energy, history)
@@ -199,10 +197,8 @@ def _descend(
     number: int,
     history: History,
     progress: ProgressCallback,
-    *,
-    settled: bool,
 ) -> Tensor:
-    """One round of Newton steps with sliding boundary parameters; once settled these keep the layout one-to-one."""
+    """One round of Newton steps with sliding boundary parameters."""
     steps = energy.config.steps
     total_steps = steps * energy.config.rounds
     started = time.perf_counter()
@@ -216,7 +212,7 @@ def _descend(
             break
         gain = point.total - found.total
         for _ in range(_SLIDES):
-            energy.surface.slide(found.control, 0.5 / control.shape[1], keep_layout=settled)
+            energy.surface.slide(found.control, 0.5 / control.shape[1])
         energy.surface.relax(_RELAXATIONS)
         energy.surface.watch_facing(found.control, energy.config.min_facing)
         point = replace(found, outer=energy.surface_part(found.control))

@@ -23,8 +23,6 @@ from .facing import FacingPenalty, facing_penalty
 from .layout import new_flips, sides, untangle
 from .tensor_grid import to_torch
 
-_HELD = 0.02  # share of the weight for the tangential distance of points that cannot slide
-_FAR, _EMPHASIS = 1.0, 10.0  # distance over its root mean square; factor on the weight
 _HALVINGS = 3
 _WATCHED = 3.0  # times the floor: points below may fall under it in the next step
 
@@ -56,9 +54,8 @@ class SurfaceFit:
         self._normals = vertex_normals(points, triangles)
         self._facing: FacingPenalty | None = None
         self.yielding = np.ones(len(points))
-        self._held = np.zeros(len(points), dtype=bool)
         self.place(parameters, cube_faces)
-        self._weigh()
+        self.give_way(self.yielding)
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
         """Take these parameters (N, 3) on these cube faces (N,)."""
@@ -73,17 +70,7 @@ class SurfaceFit:
     def give_way(self, yielding: Array) -> None:
         """Multiply the points' weights by `yielding` (N,), in place of earlier such factors."""
         self.yielding = yielding
-        self._weigh()
-
-    def emphasise(self, control: Tensor) -> None:
-        """Weigh points more, up to _EMPHASIS times, that lie far off; not those that have given way."""
-        distance = (self.residuals(control) ** 2).sum(axis=1)
-        factor = np.clip(distance / (_FAR**2 * distance.mean()), 1.0, _EMPHASIS)
-        self.give_way(np.where(self.yielding < 1.0, self.yielding, factor))
-
-    def _weigh(self) -> None:
-        quadrics = np.where(self._held[:, None, None], self._quadrics + _HELD * np.eye(3), self._quadrics)
-        self._metric = torch.as_tensor((self.yielding * self._weights)[:, None, None] * quadrics, device=self.device)
+        self._metric = torch.as_tensor((yielding * self._weights)[:, None, None] * self._quadrics, device=self.device)
 
     def near_spans(self, spans: IntArray) -> NDArray[np.bool_]:
         """Which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
@@ -151,8 +138,8 @@ class SurfaceFit:
         """One Gauss-Newton step of every parameter towards the point of F's boundary closest to its surface point.
 
         A step over an edge of the cube goes on upon the next face; `max_step` limits a step in the parameters. Points
-        that would end up farther away stay where they are. With `keep_layout` steps are shortened, too, that would turn
-        a triangle; as such points cannot come to F, F is to come to them: their distance counts in all directions.
+        that would end up farther away stay where they are; with `keep_layout` steps that would turn a triangle are
+        shortened.
         """
         net = np.asarray(control.cpu()).reshape(3, -1).T  # (n, 3)
         indices, values, d_a, d_b = self._rows(derivatives=True)
@@ -176,16 +163,13 @@ class SurfaceFit:
     def _hold_back(self, parameters: Array, cube_faces: IntArray, goal: Array) -> None:
         """Shorten steps from `parameters` towards `goal` until no further triangle is turned."""
         share = np.where((self.parameters == parameters).all(axis=1), 0.0, 1.0)
-        self._held = np.zeros(len(share), dtype=bool)
         for _ in range(_HALVINGS):
             blocked = new_flips(parameters, self.parameters, self.triangles)
             if not blocked.any():
                 break
-            self._held |= blocked
             share[blocked] *= 0.5
             self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
         self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
-        self._weigh()
 
     def relax(self, sweeps: int) -> None:
         """Lay flipped triangles out anew, within a few sweeps: what sliding tangles must not pile up."""

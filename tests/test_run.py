@@ -28,7 +28,7 @@ def tiny_config():
         network=NetworkConfig(width=16, modules=1, frequencies=3),
         train=replace(config.train, cell=0.2, triangles=200),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
-        spline=replace(config.spline, control_points=6, fit_cell=0.1, steps=3, penalties=(20.0, 500.0)),
+        spline=replace(config.spline, control_points=6, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2),
     )
 
 
@@ -160,7 +160,7 @@ def test_given_corners_are_honoured(surface):
         network=NetworkConfig(width=32, modules=2, frequencies=4),
         train=replace(config.train, learning_rate=3e-3),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, steps, strict=True)),
-        spline=replace(config.spline, penalties=(20.0,)),
+        spline=replace(config.spline, penalties=(20.0,), rounds=1),
     )
     result = parameterize(surface, config, device="cpu", corners=rolled)
     assert np.linalg.norm(result.boundary.parameters[chosen] - CORNERS, axis=1).max() < 0.2
