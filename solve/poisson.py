@@ -15,13 +15,14 @@ from .boundary import boundary_coefficients
 from .field import SplineField
 from .linear import conjugate_gradients
 from .norms import error_norms
-from .operators import System, assemble
+from .operators import System, assemble, prepare
 from .planes import map_planes
 from .precondition import fast_diagonalization
 from .problem import Poisson
 from .quadrature import gauss_rule
 from .report import SolveReport
 from .space import TrialSpace, longest_edge, trial_space
+from .threads import checked_threads, one_blas_thread
 
 log = logging.getLogger(__name__)
 
@@ -53,12 +54,14 @@ def solve_poisson(
     max_iterations: int = 1000,
     certified: str | None = None,
     strict: bool = False,
+    threads: int | None = None,
 ) -> Solution:
     """Solve -Laplace u = f with Dirichlet data on a volume.
 
     refine: how often every span of the map's knots is halved for the trial space; degree: default the map's own.
     tolerance: of |r| / |b| for the linear solver.
     certified: the verdict of the map's certificate, if known; anything but "certified" is logged and noted.
+    threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
     strict: raise ConvergenceError where the linear solver fails; otherwise the report says `converged` is False.
 
     Raises ValueError for arguments out of range, ExpressionError where the data are not finite.
@@ -71,7 +74,9 @@ def solve_poisson(
     if min(space.shape) < 3:
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up()
-    solution = _solve(volume, problem, space, tolerance, max_iterations, certified)
+    prepare(space)
+    with one_blas_thread():
+        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
     for notice in solution.report.notices:
         log.warning("%s", notice)
     if strict and not solution.report.converged:
@@ -98,7 +103,7 @@ def _warm_up() -> None:
     log.info("preparing the compiled kernels: some seconds on the first use, then they are cached")
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
-    _solve(cube, Poisson(exact="x*x"), trial_space(cube, 1), 1e-10, 10, None)
+    _solve(cube, Poisson(exact="x*x"), trial_space(cube, 1), 1e-10, 10, None, 1)
 
 
 def _solve(
@@ -108,10 +113,11 @@ def _solve(
     tolerance: float,
     max_iterations: int,
     certified: str | None,
+    threads: int,
 ) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
-    system = assemble(volume, space, problem.source_at, rule)
+    system = assemble(volume, space, problem.source_at, rule, threads=threads)
     coefficients = boundary_coefficients(volume, space, problem.boundary_at)
     residual = (system.load - system.operator.apply(coefficients))[1:-1, 1:-1, 1:-1]
     preconditioner = fast_diagonalization(system.operator, rule)
