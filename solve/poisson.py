@@ -24,6 +24,8 @@ from .report import SolveReport
 from .space import TrialSpace, longest_edge, trial_space
 from .threads import checked_threads, one_blas_thread
 
+DEVICES = ("cpu", "cuda")
+
 log = logging.getLogger(__name__)
 
 
@@ -55,6 +57,7 @@ def solve_poisson(
     certified: str | None = None,
     strict: bool = False,
     threads: int | None = None,
+    device: str = "cpu",
 ) -> Solution:
     """Solve -Laplace u = f with Dirichlet data on a volume.
 
@@ -62,6 +65,7 @@ def solve_poisson(
     tolerance: of |r| / |b| for the linear solver.
     certified: the verdict of the map's certificate, if known; anything but "certified" is logged and noted.
     threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
+    device: "cpu", or "cuda" for the iteration on a GPU by torch.
     strict: raise ConvergenceError where the linear solver fails; otherwise the report says `converged` is False.
 
     Raises ValueError for arguments out of range, ExpressionError where the data are not finite.
@@ -70,13 +74,21 @@ def solve_poisson(
         raise ValueError(f"tolerance must lie between 0 and 1, got {tolerance}")
     if max_iterations < 1:
         raise ValueError(f"max_iterations must be at least 1, got {max_iterations}")
+    if device not in DEVICES:
+        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
+    if device != "cpu":
+        from .cuda import check_device
+
+        check_device(device)
     space = trial_space(volume, refine, degree)
     if min(space.shape) < 3:
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up()
     prepare(space)
     with one_blas_thread():
-        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
+        solution = _solve(
+            volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads), device
+        )
     for notice in solution.report.notices:
         log.warning("%s", notice)
     if strict and not solution.report.converged:
@@ -103,7 +115,7 @@ def _warm_up() -> None:
     log.info("preparing the compiled kernels: some seconds on the first use, then they are cached")
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
-    _solve(cube, Poisson(exact="x*x"), trial_space(cube, 1), 1e-10, 10, None, 1)
+    _solve(cube, Poisson(exact="x*x"), trial_space(cube, 1), 1e-10, 10, None, 1, "cpu")
 
 
 def _solve(
@@ -114,6 +126,7 @@ def _solve(
     max_iterations: int,
     certified: str | None,
     threads: int,
+    device: str,
 ) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
@@ -122,7 +135,12 @@ def _solve(
     residual = (system.load - system.operator.apply(coefficients))[1:-1, 1:-1, 1:-1]
     preconditioner = fast_diagonalization(system.operator, rule)
     clock.append(time.process_time())
-    result = conjugate_gradients(system.operator.apply_free, residual, preconditioner, tolerance, max_iterations)
+    if device == "cpu":
+        result = conjugate_gradients(system.operator.apply_free, residual, preconditioner, tolerance, max_iterations)
+    else:
+        from .cuda import solve_on_device  # torch comes in here only
+
+        result = solve_on_device(system.operator, preconditioner, residual, tolerance, max_iterations, device)
     coefficients[1:-1, 1:-1, 1:-1] = result.x
     clock.append(time.process_time())
     errors = None
