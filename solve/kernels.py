@@ -153,6 +153,64 @@ def plane_factors(fields: Array, weights: Array, factors: Array, measure: Array)
 
 
 @compiled
+def plane_tensor_factors(fields: Array, weights: Array, kappa: Array, factors: Array, measure: Array) -> None:
+    """As `plane_factors` with a symmetric tensor kappa (6, q_w, q_v): w det J J^-1 kappa J^-T."""
+    n_w, n_v = weights.shape
+    rows = np.empty((3, 3))  # of det J J^-1
+    fluxes = np.empty((3, 3))  # each row times kappa
+    for q in range(n_w):
+        for m in range(n_v):
+            for a in range(3):
+                b, c = (a + 1) % 3, (a + 2) % 3
+                for i in range(3):
+                    j, k = (i + 1) % 3, (i + 2) % 3
+                    rows[a, i] = (
+                        fields[j, b + 1, q, m] * fields[k, c + 1, q, m]
+                        - fields[k, b + 1, q, m] * fields[j, c + 1, q, m]
+                    )
+            xx, xy, xz = kappa[0, q, m], kappa[1, q, m], kappa[2, q, m]
+            yy, yz, zz = kappa[3, q, m], kappa[4, q, m], kappa[5, q, m]
+            for a in range(3):
+                x, y, z = rows[a, 0], rows[a, 1], rows[a, 2]
+                fluxes[a, 0] = xx * x + xy * y + xz * z
+                fluxes[a, 1] = xy * x + yy * y + yz * z
+                fluxes[a, 2] = xz * x + yz * y + zz * z
+            det = 0.0
+            for i in range(3):
+                det += fields[i, 1, q, m] * rows[0, i]
+            index = 0
+            for a in range(3):
+                for b in range(a, 3):
+                    dot = rows[b, 0] * fluxes[a, 0] + rows[b, 1] * fluxes[a, 1] + rows[b, 2] * fluxes[a, 2]
+                    factors[q, index, m] = weights[q, m] / det * dot
+                    index += 1
+            measure[q, m] = weights[q, m] * det
+
+
+@compiled
+def add_mass(
+    x: Array,
+    first_u: Index,
+    u: Array,
+    first_v: Index,
+    v: Array,
+    first_w: Index,
+    w: Array,
+    mass: Array,
+    result: Array,
+) -> None:
+    """Mass matrix times x, added to result; both (n_u, n_v, n_w), from mass (q_u, q_w, q_v)."""
+    _, n_v, n_w = x.shape
+    fields = np.empty((4, w.shape[1], v.shape[1]))
+    plane = np.empty((n_v, n_w))
+    for p in range(u.shape[1]):
+        evaluate_plane(x, first_u[p], np.ascontiguousarray(u[:, p]), first_v, v, first_w, w, fields)
+        integrate_plane(mass[p] * fields[0], first_v, v[0], first_w, w[0], plane)
+        for i in range(u.shape[2]):
+            result[first_u[p] + i] += u[0, p, i] * plane
+
+
+@compiled
 def apply_stiffness(
     x: Array,
     first_u: Index,

@@ -113,10 +113,10 @@ def _solve(
     rule = gauss_rule(space)
     system = assemble(volume, space, problem.source_at, rule)
     coefficients = boundary_coefficients(volume, space, problem.boundary_at)
-    residual = (system.load - system.stiffness.apply(coefficients))[1:-1, 1:-1, 1:-1]
-    preconditioner = fast_diagonalization(system.stiffness, rule)
+    residual = (system.load - system.operator.apply(coefficients))[1:-1, 1:-1, 1:-1]
+    preconditioner = fast_diagonalization(system.operator, rule)
     clock.append(time.process_time())
-    result = conjugate_gradients(system.stiffness.apply_inside, residual, preconditioner, tolerance, max_iterations)
+    result = conjugate_gradients(system.operator.apply_free, residual, preconditioner, tolerance, max_iterations)
     coefficients[1:-1, 1:-1, 1:-1] = result.x
     clock.append(time.process_time())
     errors = None

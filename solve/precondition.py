@@ -2,38 +2,46 @@
 
 Sangalli, Tani, SIAM J. Sci. Comput. 38 (2016). Two additions make it cheaper on stretched maps: each direction
 carries the average of its own coefficient G_dd, and a diagonal scaling makes the diagonal agree with the operator's.
+A reaction and Robin's conditions enter by their averages.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
 
 from parameterize.bspline import Array
+from parameterize.volume import FACE_NAMES
 
-from .operators import Stiffness
+from .operators import Operator
 from .quadrature import GaussRule, Table
 
 
 @dataclass(frozen=True, eq=False)
 class FastDiagonalization:
-    """Applies D (U (x) U (x) U) L^-1 (U (x) U (x) U)^T D to interior residuals.
+    """Applies D (U (x) U (x) U) L^-1 (U (x) U (x) U)^T D to residuals of the free coefficients.
 
     vectors: per direction (n, n), generalized eigenvectors in columns. inverse, scaling: (n_u, n_v, n_w), the diagonals
-    L^-1 and D.
+    L^-1 and D. singular: constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin face), and
+    the preconditioner keeps to their orthogonal complement.
     """
 
     vectors: tuple[Array, Array, Array]
     inverse: Array
     scaling: Array
+    singular: bool = False
 
     def __call__(self, residual: Array) -> Array:
-        """Preconditioned residual, both (n_u, n_v, n_w) over the interior functions."""
+        """Preconditioned residual, both (n_u, n_v, n_w) over the free coefficients."""
         u, v, w = self.vectors
+        if self.singular:
+            residual = residual - residual.mean()
         spectral = _tensor_product(u.T, v.T, w.T, self.scaling * residual)
-        return self.scaling * _tensor_product(u, v, w, self.inverse * spectral)
+        result = self.scaling * _tensor_product(u, v, w, self.inverse * spectral)
+        return result - result.mean() if self.singular else result
 
 
 def _tensor_product(u: Array, v: Array, w: Array, x: Array) -> Array:
@@ -43,24 +51,41 @@ def _tensor_product(u: Array, v: Array, w: Array, x: Array) -> Array:
     return result
 
 
-def fast_diagonalization(stiffness: Stiffness, rule: GaussRule) -> FastDiagonalization:
-    """The preconditioner of an operator restricted to its interior functions."""
-    coefficients = stiffness.mean_coefficients()
+def fast_diagonalization(
+    operator: Operator, rule: GaussRule, robin: Mapping[str, float] | None = None, extra_diagonal: Array | None = None
+) -> FastDiagonalization:
+    """The preconditioner of an operator restricted to its free coefficients.
+
+    robin: of the faces with Robin's condition, the average over the face's parameters of alpha times the surface
+    element. extra_diagonal: (n_u, n_v, n_w), the diagonal of what is added to the operator elsewhere (Robin's terms).
+    """
+    robin = robin or {}
+    coefficients, reaction = operator.mean_coefficients(), operator.mean_mass()
     values, vectors, diagonals = [], [], []
-    for table, weights, n in zip(stiffness.tables, rule.weights, stiffness.space.shape, strict=True):
-        mass, slope = (_gram(table, weights, n, d)[1:-1, 1:-1] for d in (0, 1))
+    for axis, (table, weights, n, free) in enumerate(
+        zip(operator.tables, rule.weights, operator.space.shape, operator.window, strict=True)
+    ):
+        mass, slope = (_gram(table, weights, n, d) for d in (0, 1))
+        slope *= coefficients[axis]
+        for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
+            slope[end, end] += robin.get(name, 0.0)  # one function only is nonzero at the end, with value 1
+        mass, slope = mass[free, free], slope[free, free]
         eigenvalues, eigenvectors = eigh(slope, mass)
         values.append(eigenvalues)
         vectors.append(eigenvectors)
         diagonals.append((np.diag(mass), np.diag(slope)))
-    eigenvalues_3d = _sum_outer([c * v for c, v in zip(coefficients, values, strict=True)])
-    diagonal = sum(
-        c * np.einsum("i,j,k->ijk", *(diagonals[a][int(a == d)] for a in range(3))) for d, c in enumerate(coefficients)
-    )
+    eigenvalues_3d = _sum_outer(values) + reaction
+    diagonal = sum(np.einsum("i,j,k->ijk", *(diagonals[a][int(a == d)] for a in range(3))) for d in range(3))
+    diagonal += reaction * np.einsum("i,j,k->ijk", *(d[0] for d in diagonals))
+    wanted = operator.diagonal() + (0.0 if extra_diagonal is None else extra_diagonal)
     # A folded map has diagonal entries below zero; their size is all a scaling can use.
-    scaling = np.sqrt(np.abs(diagonal / stiffness.diagonal()[1:-1, 1:-1, 1:-1]))
+    scaling = np.sqrt(np.abs(diagonal / wanted[operator.window]))
+    whole = all(free == slice(0, n) for free, n in zip(operator.window, operator.space.shape, strict=True))
+    singular = whole and reaction == 0.0 and not any(robin.values())
+    if singular:
+        eigenvalues_3d[0, 0, 0] = np.inf
     u, v, w = vectors
-    return FastDiagonalization((u, v, w), 1.0 / eigenvalues_3d, scaling)
+    return FastDiagonalization((u, v, w), 1.0 / eigenvalues_3d, scaling, singular)
 
 
 def _gram(table: Table, weights: Array, n: int, derivative: int) -> Array:
