@@ -1,8 +1,9 @@
 """Isogeometric solver on a B-spline volume: Poisson's problem, its errors and convergence studies."""
 
 from .expressions import Expression, ExpressionError
+from .failure import ConvergenceError
 from .field import SplineField
-from .poisson import ConvergenceError, Solution, check_data, solve_poisson
+from .poisson import Solution, check_data, solve_poisson
 from .problem import Poisson
 from .report import SolveReport
 from .study import ConvergenceRow, benchmark_volume, convergence, rates

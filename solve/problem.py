@@ -119,10 +119,10 @@ class Poisson:
                 total += slopes[j] * gradient[i]
         return total
 
-    def kappa_at(self, x: Array, y: Array, z: Array) -> Array | None:
-        """kappa, a scalar (...) or a tensor (6, ...), None for 1. Raises ExpressionError where it is not positive."""
+    def kappa_at(self, x: Array, y: Array, z: Array) -> Array:
+        """kappa, a scalar (...) or a tensor (6, ...). Raises ExpressionError where it is not positive."""
         if not self._kappa:
-            return None
+            return np.ones(x.shape)
         entries = [values("kappa", entry, x, y, z) for entry in self._kappa]
         if len(entries) == 1:
             demand(entries[0] > 0.0, "kappa", "positive", x, y, z)
@@ -167,9 +167,8 @@ class Poisson:
         assert isinstance(exact, Expression)
         _, gradient = exact.gradient(*points)
         kappa = self.kappa_at(*points)
-        if kappa is not None:
-            gradient = kappa * gradient if len(self._kappa) == 1 else _times_symmetric(kappa, gradient)
-        return finite("flux of exact", (gradient * normal).sum(axis=0), *points)
+        flux = _times_symmetric(kappa, gradient) if len(self._kappa) == 6 else kappa * gradient
+        return finite("flux of exact", (flux * normal).sum(axis=0), *points)
 
     def exact_at(self, x: Array, y: Array, z: Array) -> tuple[Array, Array | None]:
         """Exact u and its gradient (3, ...), None for a function. Raises ExpressionError where they are not finite."""
