@@ -18,8 +18,9 @@ from solve.expressions import ExpressionError
 from . import __version__, console, pipeline
 from . import report as reports
 from .folder import Outcome
-from .options import InputError, MapOptions, PoissonOptions, input_errors, one_line
+from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, input_errors, one_line
 
+FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--force", "--displacement")
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
 
 app = App(
@@ -58,8 +59,9 @@ class OutputOptions:
 Output = Annotated[OutputOptions, Parameter(name="*")]
 Mapping = Annotated[MapOptions, Parameter(name="*")]
 Equation = Annotated[PoissonOptions, Parameter(name="*")]
+Body = Annotated[ElasticityOptions, Parameter(name="*")]
 
-NO_OUTPUT, NO_MAPPING, NO_POISSON = OutputOptions(), MapOptions(), PoissonOptions()
+NO_OUTPUT, NO_MAPPING, NO_POISSON, NO_BODY = OutputOptions(), MapOptions(), PoissonOptions(), ElasticityOptions()
 
 
 @run_app.command(name="poisson")
@@ -98,7 +100,19 @@ def solve_poisson(volume: Path, /, *, output: Output = NO_OUTPUT, poisson: Equat
         volume: a file written by `iga-nn parameterize` or `iga-nn run`.
     """
     with console.progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, poisson=poisson, force=output.force)
+        outcome = pipeline.solve_to(volume, output.out, problem=poisson, force=output.force)
+    return _tell(outcome, output)
+
+
+@solve_app.command(name="elasticity")
+def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body = NO_BODY) -> int:
+    """Solve linear elasticity on a volume.npz.
+
+    Args:
+        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+    """
+    with console.progress_line(output.quiet):
+        outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force)
     return _tell(outcome, output)
 
 
@@ -176,7 +190,7 @@ def main(argv: list[str]) -> int:
 def _minus_hint(argv: list[str]) -> str:
     """The remedy where a formula was taken for an option."""
     for option, value in pairwise(argv):
-        if option in ("--exact", "--source", "--boundary") and value.startswith("-"):
+        if option in FORMULAS and value.startswith("-"):
             return f" A formula that starts with a minus is written {option}={value}"
     return ""
 

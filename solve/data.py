@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from parameterize.bspline import Array
 from parameterize.volume import FACE_NAMES
@@ -51,7 +51,7 @@ def finite(name: str, found: Array, x: Array, y: Array, z: Array) -> Array:
     return found
 
 
-def demand(good: Array, name: str, must: str, x: Array, y: Array, z: Array) -> None:
+def demand(good: NDArray[np.bool_], name: str, must: str, x: Array, y: Array, z: Array) -> None:
     """Raise ExpressionError naming the first point where a condition on the data does not hold."""
     if not good.all():
         raise ExpressionError(f"{name} must be {must}, and is not at {_first(~good, x, y, z)}, a point of the domain")
@@ -64,6 +64,6 @@ def check_faces(name: str, faces: Collection[str]) -> None:
             raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
 
 
-def _first(bad: Array, x: Array, y: Array, z: Array) -> str:
+def _first(bad: NDArray[np.bool_], x: Array, y: Array, z: Array) -> str:
     at = tuple(np.argwhere(bad)[0][-x.ndim :]) if x.ndim else ()
     return f"x={x[at]:.6g}, y={y[at]:.6g}, z={z[at]:.6g}"

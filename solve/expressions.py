@@ -189,9 +189,7 @@ class Expression:
         """
         return self._derivatives((0.0,) * 6, x, y, z)
 
-    def _derivatives(
-        self, seconds: Numbers, x: ArrayLike, y: ArrayLike, z: ArrayLike
-    ) -> tuple[Array, Array, Array]:
+    def _derivatives(self, seconds: Numbers, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array, Array]:
         points = _coordinates(x, y, z)
         units = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         seeds = [Jet(point, unit, seconds) for point, unit in zip(points, units, strict=True)]

@@ -10,6 +10,7 @@ from parameterize.bspline import Array
 from parameterize.quality import scaled_jacobian
 from parameterize.volume import AXES, BSplineVolume
 
+from .elastic_operator import ElasticSystem
 from .linear import LinearResult
 from .operators import System
 from .planes import map_planes
@@ -34,7 +35,11 @@ def check_solver(tolerance: float, max_iterations: int) -> None:
 
 
 def solve_notices(
-    volume: BSplineVolume, space: TrialSpace, system: System, certified: str | None, result: LinearResult
+    volume: BSplineVolume,
+    space: TrialSpace,
+    system: System | ElasticSystem,
+    certified: str | None,
+    result: LinearResult,
 ) -> tuple[str, ...]:
     """What the reader of a solve's numbers must know; the last line is that of a solver that did not converge."""
     notices = []
@@ -65,12 +70,13 @@ def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array,
     angles, 0 where the map degenerates.
     """
     rule = gauss_rule(space)
-    worst = (np.zeros(3), np.zeros(3), np.inf)
+    parameters, point, least = np.zeros(3), np.zeros(3), np.inf
     for q, fields in map_planes(volume, rule):
         jacobian = np.moveaxis(fields[:, 1:], (0, 1), (2, 3))  # (q_w, q_v, 3, 3)
         scaled = scaled_jacobian(jacobian)
-        w, v = np.unravel_index(np.argmin(scaled), scaled.shape)
-        if scaled[w, v] < worst[2]:
+        w, v = (int(i) for i in np.unravel_index(np.argmin(scaled), scaled.shape))
+        if scaled[w, v] < least:
+            least = float(scaled[w, v])
             parameters = np.array([rule.points[a][i] for a, i in enumerate((q, v, w))])
-            worst = (parameters, fields[:, 0, w, v].copy(), float(scaled[w, v]))
-    return worst
+            point = fields[:, 0, w, v].copy()
+    return parameters, point, least

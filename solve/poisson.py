@@ -19,7 +19,7 @@ from .failure import ConvergenceError, check_solver, solve_notices
 from .field import SplineField
 from .linear import conjugate_gradients
 from .norms import error_norms
-from .operators import Operator, assemble, free_window
+from .operators import Operator, System, assemble, free_window
 from .planes import map_planes
 from .precondition import FastDiagonalization, fast_diagonalization
 from .problem import Poisson
@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Solution(SplineField):
-    """The discrete solution: a scalar spline of the parameters, the map it lives on, and the report."""
+    """The discrete solution: a spline of the parameters, the map it lives on, and the report."""
 
     geometry: BSplineVolume
     report: SolveReport
@@ -76,18 +76,29 @@ def solve_poisson(
 def check_data(volume: BSplineVolume, problem: Poisson) -> None:
     """Evaluate a problem's data where the coarsest solve needs them; finer levels need them at points between.
 
-    Raises ExpressionError where they are not finite.
+    Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
     space = trial_space(volume)
     boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet)
-    _add_faces(volume, space, problem, np.zeros(space.shape))
-    for _, fields in map_planes(volume, gauss_rule(space)):
-        where = fields[:, 0]
-        problem.source_at(*where)
-        problem.kappa_at(*where)
-        problem.reaction_at(*where)
-        if problem.exact is not None:
-            problem.exact_at(*where)
+    system = _assemble(volume, space, problem, gauss_rule(space))
+    _add_faces(volume, space, problem, system.load)
+    if problem.is_floating:
+        balanced(system.load)
+    if problem.exact is not None:
+        for _, fields in map_planes(volume, gauss_rule(space)):
+            problem.exact_at(*fields[:, 0])
+
+
+def _assemble(volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: GaussRule) -> System:
+    return assemble(
+        volume,
+        space,
+        problem.source_at,
+        rule,
+        kappa=None if problem.kappa is None else problem.kappa_at,
+        reaction=None if problem.reaction is None else problem.reaction_at,
+        window=free_window(space, problem.dirichlet),
+    )
 
 
 @functools.cache
@@ -110,15 +121,7 @@ def _solve(
 ) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
-    system = assemble(
-        volume,
-        space,
-        problem.source_at,
-        rule,
-        kappa=None if problem.kappa is None else problem.kappa_at,
-        reaction=None if problem.reaction is None else problem.reaction_at,
-        window=free_window(space, problem.dirichlet),
-    )
+    system = _assemble(volume, space, problem, rule)
     robin = _add_faces(volume, space, problem, system.load)
     operator = RobinOperator(system.operator, tuple(robin.values())) if robin else system.operator
     coefficients = boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet)

@@ -85,6 +85,11 @@ class Poisson:
         return tuple(face for face in FACE_NAMES if face not in self.neumann and face not in self.robin)
 
     @property
+    def is_floating(self) -> bool:
+        """Whether the data leave the solution's constant open: Neumann's on all faces, and no reaction."""
+        return len(self.neumann) == len(FACE_NAMES) and self.reaction is None
+
+    @property
     def is_smooth_kappa(self) -> bool:
         """Whether kappa's derivatives are known."""
         return all(isinstance(entry, Expression) for entry in self._kappa)
@@ -134,7 +139,7 @@ class Poisson:
         return np.stack(entries)
 
     def reaction_at(self, x: Array, y: Array, z: Array) -> Array:
-        """c at points given by arrays of equal shape. Raises ExpressionError where it is negative."""
+        """The reaction c at points given by arrays of equal shape. Raises ExpressionError where it is negative."""
         if self.reaction is None:
             return np.zeros(x.shape)
         found = values("reaction", self._parsed["reaction"], x, y, z)
@@ -149,7 +154,7 @@ class Poisson:
         return np.zeros(x.shape)
 
     def flux_at(self, face: str, points: Array, normal: Array) -> Array:
-        """kappa grad u . n on a Neumann face, at points (3, ...) with outward unit normals (3, ...)."""
+        """The flux kappa grad u . n on a Neumann face, at points (3, ...) with outward unit normals (3, ...)."""
         name = f"neumann {face}"
         return values(name, self._parsed[name], *points) if name in self._parsed else self._exact_flux(points, normal)
 

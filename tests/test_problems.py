@@ -20,7 +20,7 @@ PROBLEMS = {
     "reaction": Poisson(exact=WAVE, reaction="3+x*y"),
     "neumann": Poisson(exact=WAVE, neumann=NEUMANN),
     "robin": Poisson(exact=WAVE, robin=ROBIN),
-    "robin alone": Poisson(exact=WAVE, robin={face: ("1", None) for face in FACE_NAMES}),
+    "robin alone": Poisson(exact=WAVE, robin=dict.fromkeys(FACE_NAMES, ("1", None))),
     "pure neumann": Poisson(exact=WAVE, kappa=TENSOR, neumann=dict.fromkeys(FACE_NAMES)),
     "reaction, pure neumann": Poisson(exact=WAVE, reaction="1", neumann=dict.fromkeys(FACE_NAMES)),
     "all": Poisson(exact=WAVE, kappa=TENSOR, reaction="x*x", neumann=NEUMANN, robin=ROBIN),
