@@ -124,7 +124,7 @@ class PoissonOptions:
 
     def problem(self) -> Poisson:
         """The problem these options name. Raises InputError."""
-        from solve import Elasticity, Poisson
+        from solve import Poisson
 
         check_space(self.refine, self.degree)
         exact = self.exact

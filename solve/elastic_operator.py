@@ -11,15 +11,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from parameterize.bspline import Array
 from parameterize.volume import BSplineVolume
 
 from . import elastic_kernels, kernels
-from .operators import PAIRS, Operator, Window
+from .operators import PAIRS, Operator, Window, to_blocks
 from .planes import PlaneField, map_planes
-from .quadrature import GaussRule, Table
+from .quadrature import GaussRule, Table, span_tables
 from .space import TrialSpace
+from .threads import colours, in_parallel
 
 VectorFunction = Callable[[Array, Array, Array], Array]
 
@@ -29,7 +31,7 @@ class ElasticOperator:
     """Symmetric positive semidefinite matrix of the form, never assembled; its kernel are the rigid motions.
 
     tables: the trial basis at the Gauss points. factors: (q_u, 3, 3, q_w, q_v), F by rows. constants: Lame's lambda
-    and mu. window: the free coefficients of each component.
+    and mu. window: the free coefficients of each component. threads: of a product.
     """
 
     space: TrialSpace
@@ -37,20 +39,28 @@ class ElasticOperator:
     factors: Array
     constants: tuple[float, float]
     window: Window
+    threads: int = 1
 
     def apply(self, coefficients: Array) -> Array:
         """The product with coefficients (3, n_u, n_v, n_w), rows and columns that are not free included."""
         result = np.zeros((3, *self.space.shape))
         components = [PlaneField(component, self.tables) for component in coefficients]
         u, v, w = self.tables
-        fields = np.empty((3, 4, *self.factors.shape[3:]))
-        for q, factors in enumerate(self.factors):
-            for component, out in zip(components, fields, strict=True):
-                component.evaluate(q, out)
-            elastic_kernels.plane_stress(fields, factors, *self.constants)
-            weights = np.ascontiguousarray(u.values[:, q])
-            for field, total in zip(fields, result, strict=True):
-                elastic_kernels.spread_plane(field, u.first[q], weights, *v, *w, total)
+        spans = len(span_tables(self.space, self.tables)[0].first)
+        per_span = len(u.first) // spans
+
+        def add(layers: NDArray[np.int64]) -> None:
+            fields = np.empty((3, 4, *self.factors.shape[3:]))
+            for q in range(per_span * layers[0], per_span * (layers[-1] + 1)):
+                for component, out in zip(components, fields, strict=True):
+                    component.evaluate(q, out)
+                elastic_kernels.plane_stress(fields, self.factors[q], *self.constants)
+                weights = np.ascontiguousarray(u.values[:, q])
+                for field, total in zip(fields, result, strict=True):
+                    elastic_kernels.spread_plane(field, u.first[q], weights, *v, *w, total)
+
+        for pieces in colours(spans, self.space.degrees[0]):
+            in_parallel(add, pieces, self.threads)
         return result
 
     def apply_free(self, free: Array) -> Array:
@@ -62,13 +72,12 @@ class ElasticOperator:
     def block(self, component: int) -> Operator:
         """The diagonal block of one component: the scalar operator with kappa = mu I + (lambda + mu) e e^T."""
         lam, mu = self.constants
-        q_u, _, _, q_w, q_v = self.factors.shape
-        factors = np.empty((q_u, q_w, 6, q_v))
-        for place, (a, b) in enumerate(PAIRS):
-            along = self.factors[:, a, component] * self.factors[:, b, component]
-            full = (self.factors[:, a] * self.factors[:, b]).sum(axis=1)
-            factors[:, :, place] = mu * full + (lam + mu) * along
-        return Operator(self.space, self.tables, factors, None, self.window)
+        planes = []
+        for rows in self.factors:  # (3, 3, q_w, q_v), row of the parametric direction
+            terms = [mu * (rows[a] * rows[b]).sum(axis=0) + (lam + mu) * rows[a, component] * rows[b, component]
+                     for a, b in PAIRS]
+            planes.append(np.stack([to_blocks(term) for term in terms], axis=2))
+        return Operator(self.space, self.tables, np.stack(planes), self.window, self.threads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +97,7 @@ def assemble_elasticity(
     constants: tuple[float, float],
     rule: GaussRule,
     window: Window,
+    threads: int = 1,
 ) -> ElasticSystem:
     """One pass over the Gauss points; `force` returns (3, q_w, q_v). Where the map is folded |det J| replaces det J.
 
@@ -113,5 +123,5 @@ def assemble_elasticity(
         for component, density in zip(load, force(*fields[:, 0]), strict=True):
             kernels.integrate_plane(density * measure, v.first, v.values[0], w.first, w.values[0], plane)
             component[window_u] += np.multiply.outer(u.values[0, q], plane)
-    operator = ElasticOperator(space, tables, factors, constants, window)
+    operator = ElasticOperator(space, tables, factors, constants, window, threads)
     return ElasticSystem(operator, load, folded, int(np.prod(rule.shape)))

@@ -26,6 +26,7 @@ from .quadrature import gauss_rule
 from .report import SolveReport
 from .space import TrialSpace, longest_edge, trial_space
 from .surface import face_rule
+from .threads import checked_threads, one_blas_thread
 
 log = logging.getLogger(__name__)
 
@@ -40,6 +41,7 @@ def solve_elasticity(
     max_iterations: int = 1000,
     certified: str | None = None,
     strict: bool = False,
+    threads: int | None = None,
 ) -> Solution:
     """Displacements of an elastic body; arguments and errors raised as in `solve_poisson`.
 
@@ -50,7 +52,8 @@ def solve_elasticity(
     if 0 in np.zeros(space.shape)[free_window(space, problem.dirichlet)].shape:
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up()
-    solution = _solve(volume, problem, space, tolerance, max_iterations, certified)
+    with one_blas_thread():
+        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
     for notice in solution.report.notices:
         log.warning("%s", notice)
     if strict and not solution.report.converged:
@@ -74,7 +77,7 @@ def _warm_up() -> None:
     """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
-    _solve(cube, Elasticity(exact=("x*x", "y", "z")), trial_space(cube, 1), 1e-10, 10, None)
+    _solve(cube, Elasticity(exact=("x*x", "y", "z")), trial_space(cube, 1), 1e-10, 10, None, 1)
 
 
 def _solve(
@@ -84,11 +87,12 @@ def _solve(
     tolerance: float,
     max_iterations: int,
     certified: str | None,
+    threads: int,
 ) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
     window = free_window(space, problem.dirichlet)
-    system = assemble_elasticity(volume, space, problem.force_at, problem.constants, rule, window)
+    system = assemble_elasticity(volume, space, problem.force_at, problem.constants, rule, window, threads)
     _add_tractions(volume, space, problem, system.load)
     coefficients = _displacements(volume, space, problem)
     right = (system.load - system.operator.apply(coefficients))[:, *window]

@@ -46,14 +46,16 @@ def conjugate_gradients(
     while residuals[-1] > tolerance and len(residuals) <= max_iterations:
         z = preconditioner(r)
         rz = float(np.vdot(r, z))
-        p = z + (rz / rz_old) * p
+        p *= rz / rz_old
+        p += z
         product = operator(p)
         curvature = float(np.vdot(p, product))
         if not (rz > 0.0 and curvature > 0.0):  # NaN included
             break
         step = rz / curvature
         x += step * p
-        r -= step * product
+        product *= step
+        r -= product
         rz_old = rz
         residuals.append(float(np.linalg.norm(r)) / norm_b)
     return LinearResult(x, tuple(residuals), residuals[-1] <= tolerance)

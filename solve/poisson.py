@@ -19,7 +19,7 @@ from .failure import ConvergenceError, check_solver, solve_notices
 from .field import SplineField
 from .linear import conjugate_gradients
 from .norms import error_norms
-from .operators import Operator, System, assemble, free_window
+from .operators import Operator, System, assemble, free_window, prepare
 from .planes import map_planes
 from .precondition import FastDiagonalization, fast_diagonalization
 from .problem import Poisson
@@ -27,6 +27,7 @@ from .quadrature import GaussRule, gauss_rule
 from .report import SolveReport
 from .space import TrialSpace, longest_edge, trial_space
 from .surface import FaceMass, RobinOperator, face_rule
+from .threads import checked_threads, one_blas_thread
 
 log = logging.getLogger(__name__)
 
@@ -49,12 +50,14 @@ def solve_poisson(
     max_iterations: int = 1000,
     certified: str | None = None,
     strict: bool = False,
+    threads: int | None = None,
 ) -> Solution:
     """Solve -div(kappa grad u) + c u = f on a volume.
 
     refine: how often every span of the map's knots is halved for the trial space; degree: default the map's own.
     tolerance: of |r| / |b| for the linear solver.
     certified: the verdict of the map's certificate, if known; anything but "certified" is logged and noted.
+    threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
     strict: raise ConvergenceError where the linear solver fails; otherwise the report says `converged` is False.
 
     Raises ValueError for arguments out of range and for Neumann data that do not balance the source, ExpressionError
@@ -65,7 +68,9 @@ def solve_poisson(
     if 0 in np.zeros(space.shape)[free_window(space, problem.dirichlet)].shape:
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up()
-    solution = _solve(volume, problem, space, tolerance, max_iterations, certified)
+    prepare(space, problem.reaction is not None)
+    with one_blas_thread():
+        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
     for notice in solution.report.notices:
         log.warning("%s", notice)
     if strict and not solution.report.converged:
@@ -89,7 +94,9 @@ def check_data(volume: BSplineVolume, problem: Poisson) -> None:
             problem.exact_at(*fields[:, 0])
 
 
-def _assemble(volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: GaussRule) -> System:
+def _assemble(
+    volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: GaussRule, threads: int = 1
+) -> System:
     return assemble(
         volume,
         space,
@@ -98,6 +105,7 @@ def _assemble(volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: 
         kappa=None if problem.kappa is None else problem.kappa_at,
         reaction=None if problem.reaction is None else problem.reaction_at,
         window=free_window(space, problem.dirichlet),
+        threads=threads,
     )
 
 
@@ -107,8 +115,8 @@ def _warm_up() -> None:
     log.info("preparing the compiled kernels: some seconds on the first use, then they are cached")
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
-    for problem in (Poisson(exact="x*x"), Poisson(exact="x*x", kappa="1", reaction="1")):
-        _solve(cube, problem, trial_space(cube, 1), 1e-10, 10, None)
+    for problem in (Poisson(exact="x*x"), Poisson(exact="x*x", kappa=["1", "0", "0", "1", "0", "1"])):
+        _solve(cube, problem, trial_space(cube, 1), 1e-10, 10, None, 1)
 
 
 def _solve(
@@ -118,10 +126,11 @@ def _solve(
     tolerance: float,
     max_iterations: int,
     certified: str | None,
+    threads: int,
 ) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
-    system = _assemble(volume, space, problem, rule)
+    system = _assemble(volume, space, problem, rule, threads)
     robin = _add_faces(volume, space, problem, system.load)
     operator = RobinOperator(system.operator, tuple(robin.values())) if robin else system.operator
     coefficients = boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet)
