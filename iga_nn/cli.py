@@ -13,11 +13,13 @@ from typing import Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 
 from parameterize.mesh import MAX_FACES, MeshError
+from parameterize.volume import BSplineVolume
 from solve.expressions import ExpressionError
 
 from . import __version__, console, pipeline
 from . import report as reports
 from .folder import Outcome
+from .formats import Format, export
 from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, input_errors, one_line
 
 FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--force", "--displacement")
@@ -168,6 +170,22 @@ def fetch_model(name: str, /, *, out: Path | None = None) -> int:
     from .data import fetch
 
     _say(str(fetch(name, out)))
+    return DONE
+
+
+@app.command(name="export")
+def export_volume(volume: Path, /, *, to: Format, out: Path | None = None, force: bool = False) -> int:
+    """Write a volume in a format that other programs read.
+
+    Args:
+        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+        to: mfem, an MFEM NURBS mesh.
+        out: file to write; the volume's stem with the format's ending in the current folder by default.
+        force: replace that file where it exists.
+    """
+    with input_errors():
+        loaded = BSplineVolume.load(volume)
+    _say(str(export(loaded, to, out or Path(volume.stem), force=force)))
     return DONE
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.bspline import Array
+from parameterize.files import replacing
 from parameterize.quality import arap
 from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
 
@@ -219,9 +219,5 @@ def _color_bar(figure: Figure, panels: Any, norm: Any, title: str) -> None:
 
 def _save(figure: Figure, path: Path) -> None:
     """Write the PNG under a temporary name, then rename it."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.png")
-    try:
+    with replacing(path) as temporary:
         figure.savefig(temporary)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

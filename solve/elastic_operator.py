@@ -74,8 +74,10 @@ class ElasticOperator:
         lam, mu = self.constants
         planes = []
         for rows in self.factors:  # (3, 3, q_w, q_v), row of the parametric direction
-            terms = [mu * (rows[a] * rows[b]).sum(axis=0) + (lam + mu) * rows[a, component] * rows[b, component]
-                     for a, b in PAIRS]
+            terms = [
+                mu * (rows[a] * rows[b]).sum(axis=0) + (lam + mu) * rows[a, component] * rows[b, component]
+                for a, b in PAIRS
+            ]
             planes.append(np.stack([to_blocks(term) for term in terms], axis=2))
         return Operator(self.space, self.tables, np.stack(planes), self.window, self.threads)
 

@@ -94,9 +94,7 @@ def check_data(volume: BSplineVolume, problem: Poisson) -> None:
             problem.exact_at(*fields[:, 0])
 
 
-def _assemble(
-    volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: GaussRule, threads: int = 1
-) -> System:
+def _assemble(volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: GaussRule, threads: int = 1) -> System:
     return assemble(
         volume,
         space,
