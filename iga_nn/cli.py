@@ -238,6 +238,8 @@ def _lines(verdict: dict[str, Any]) -> list[str]:
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
     for level in verdict.get("levels", []):
         error = f"L2 error {level['l2']:.3e}, " if "l2" in level else ""
+        if "error_estimate" in level:
+            error += f"estimated L2 error {level['error_estimate']:.1e}, "
         end = "" if level["converged"] else ", NOT CONVERGED"
         lines.append(f"{level['dofs']:>8} unknowns {error}{level['iterations']} iterations{end}")
     lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")

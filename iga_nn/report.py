@@ -87,7 +87,8 @@ def verdict(report: Report, folder: Path) -> Report:
         short["arap"] = quality["arap"]
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
     if section := solved(report):
-        keys = ("dofs", "l2", "l2_relative", "h1_seminorm", "error_estimate", "iterations", "converged")
+        errors = ("l2", "l2_relative", "h1_seminorm", "error_estimate", "error_estimate_relative")
+        keys = ("dofs", *errors, "iterations", "converged")
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]
         short["notices"] = section["notices"]
     short["seconds"] = report["seconds"]["total"]

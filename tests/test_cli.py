@@ -116,11 +116,13 @@ def test_solve_poisson_on_a_saved_volume(in_folder, capsys):
         assert data["coefficients"].shape == (10, 10, 10)  # 8 spans of degree 2
 
 
-def test_source_without_exact_reports_no_errors(in_folder):
+def test_source_without_exact_reports_estimates(in_folder, capsys):
     benchmark_volume(4).save("map.npz")
     assert main(["solve", "poisson", "map.npz", "--source", "1", "--boundary", "0", "--refine", "0", "--quiet"]) == 0
     section = json.loads(Path("map/report.json").read_text())["poisson"]
     assert "exact" not in section and "l2" not in section["levels"][0]
+    assert 0.0 < section["levels"][0]["error_estimate_relative"] < 0.1
+    assert "estimated L2 error" in capsys.readouterr().out
     assert section["source"] == "1" and not Path("map/error.png").exists()
 
 
