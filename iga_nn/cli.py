@@ -8,18 +8,21 @@ import sys
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
 from parameterize.mesh import MAX_FACES, MeshError
+from parameterize.volume import BSplineVolume
 from solve.expressions import ExpressionError
 
 from . import __version__, console, pipeline
 from . import report as reports
 from .folder import Outcome
-from .options import InputError, MapOptions, PoissonOptions, input_errors, one_line
+from .formats import Format, export
+from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, input_errors, one_line
 
+FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--force", "--displacement")
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
 
 app = App(
@@ -58,8 +61,9 @@ class OutputOptions:
 Output = Annotated[OutputOptions, Parameter(name="*")]
 Mapping = Annotated[MapOptions, Parameter(name="*")]
 Equation = Annotated[PoissonOptions, Parameter(name="*")]
+Body = Annotated[ElasticityOptions, Parameter(name="*")]
 
-NO_OUTPUT, NO_MAPPING, NO_POISSON = OutputOptions(), MapOptions(), PoissonOptions()
+NO_OUTPUT, NO_MAPPING, NO_POISSON, NO_BODY = OutputOptions(), MapOptions(), PoissonOptions(), ElasticityOptions()
 
 
 @run_app.command(name="poisson")
@@ -91,14 +95,34 @@ def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapp
 
 
 @solve_app.command(name="poisson")
-def solve_poisson(volume: Path, /, *, output: Output = NO_OUTPUT, poisson: Equation = NO_POISSON) -> int:
+def solve_poisson(
+    volume: Path,
+    /,
+    *,
+    device: Literal["cpu", "cuda"] = "cpu",
+    output: Output = NO_OUTPUT,
+    poisson: Equation = NO_POISSON,
+) -> int:
     """Solve Poisson's equation on a volume.npz.
+
+    Args:
+        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+        device: where the linear system is solved.
+    """
+    with console.progress_line(output.quiet):
+        outcome = pipeline.solve_to(volume, output.out, problem=poisson, force=output.force, device=device)
+    return _tell(outcome, output)
+
+
+@solve_app.command(name="elasticity")
+def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body = NO_BODY) -> int:
+    """Solve linear elasticity on a volume.npz.
 
     Args:
         volume: a file written by `iga-nn parameterize` or `iga-nn run`.
     """
     with console.progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, poisson=poisson, force=output.force)
+        outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force)
     return _tell(outcome, output)
 
 
@@ -157,6 +181,22 @@ def fetch_model(name: str, /, *, out: Path | None = None) -> int:
     return DONE
 
 
+@app.command(name="export")
+def export_volume(volume: Path, /, *, to: Format, out: Path | None = None, force: bool = False) -> int:
+    """Write a volume in a format that other programs read.
+
+    Args:
+        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+        to: mfem, an MFEM NURBS mesh.
+        out: file to write; the volume's stem with the format's ending in the current folder by default.
+        force: replace that file where it exists.
+    """
+    with input_errors():
+        loaded = BSplineVolume.load(volume)
+    _say(str(export(loaded, to, out or Path(volume.stem), force=force)))
+    return DONE
+
+
 def main(argv: list[str]) -> int:
     """Run one command and return its exit code; everything but a bug of ours ends in one line and a code."""
     try:
@@ -176,7 +216,7 @@ def main(argv: list[str]) -> int:
 def _minus_hint(argv: list[str]) -> str:
     """The remedy where a formula was taken for an option."""
     for option, value in pairwise(argv):
-        if option in ("--exact", "--source", "--boundary") and value.startswith("-"):
+        if option in FORMULAS and value.startswith("-"):
             return f" A formula that starts with a minus is written {option}={value}"
     return ""
 
@@ -206,6 +246,8 @@ def _lines(verdict: dict[str, Any]) -> list[str]:
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
     for level in verdict.get("levels", []):
         error = f"L2 error {level['l2']:.3e}, " if "l2" in level else ""
+        if "error_estimate" in level:
+            error += f"estimated L2 error {level['error_estimate']:.1e}, "
         end = "" if level["converged"] else ", NOT CONVERGED"
         lines.append(f"{level['dofs']:>8} unknowns {error}{level['iterations']} iterations{end}")
     lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.bspline import Array
+from parameterize.files import replacing
 from parameterize.quality import arap
 from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
 
@@ -18,7 +18,9 @@ from .rendering import Patch, can_draw, draw, widest_view
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solve import Poisson, Solution
+    from solve import Elasticity, Poisson, Solution
+
+    Problem = Poisson | Elasticity
 
 SAMPLES = 141  # a direction and patch
 PANEL = (900, 700)  # pixels of one view
@@ -26,10 +28,16 @@ FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")
 MAP = "viridis"  # perceptually uniform
 
 
-def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Poisson) -> None:
+def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
     """Write error.png, where VTK can draw and the solver did not break down."""
     if can_draw() and np.all(np.isfinite(solution.coefficients)):
         draw_error(folder / "error.png", volume, solution, problem)
+
+
+def draw_face_names(folder: Path, volume: BSplineVolume) -> None:
+    """Write faces.png, where VTK can draw."""
+    if can_draw():
+        draw_faces(folder / "faces.png", volume)
 
 
 def draw_map(folder: Path, volume: BSplineVolume, history: dict[str, NDArray[Any]]) -> None:
@@ -77,7 +85,7 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
     _save(figure, path)
 
 
-def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Poisson) -> None:
+def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
     """|u - u_h| on the boundary and on the three mid-sections, logarithmic colours; the error norms beside it."""
     from matplotlib.colors import LogNorm
 
@@ -140,10 +148,12 @@ def _grid(axis: int, value: float) -> tuple[Array, Array, Array]:
     return u, v, w
 
 
-def _error(solution: Solution, problem: Poisson, grid: tuple[Array, Array, Array], points: Array) -> Array:
-    """|u - u_h| at the samples of a grid whose images are `points` (SAMPLES, SAMPLES, 3)."""
+def _error(solution: Solution, problem: Problem, grid: tuple[Array, Array, Array], points: Array) -> Array:
+    """|u - u_h| at the samples of a grid whose images are `points` (SAMPLES, SAMPLES, 3); of vectors, the length."""
     exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
-    return np.abs(solution.grid(*grid).reshape(SAMPLES, SAMPLES) - exact)
+    found = solution.grid(*grid).reshape(SAMPLES, SAMPLES, -1)
+    wanted = np.moveaxis(exact.reshape(-1, SAMPLES, SAMPLES), 0, -1)  # (SAMPLES, SAMPLES, 1 or 3)
+    return np.linalg.norm(found - wanted, axis=-1)
 
 
 def _colors(values: Array, norm: Any) -> Array:
@@ -154,7 +164,7 @@ def _colors(values: Array, norm: Any) -> Array:
 
 
 def _face_label(name: str) -> str:
-    return f"{name[0]} = {name[1]}"
+    return f"{name}: {name[0]} = {name[1]}"
 
 
 def _positive(values: NDArray[Any]) -> Array:
@@ -209,9 +219,5 @@ def _color_bar(figure: Figure, panels: Any, norm: Any, title: str) -> None:
 
 def _save(figure: Figure, path: Path) -> None:
     """Write the PNG under a temporary name, then rename it."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.png")
-    try:
+    with replacing(path) as temporary:
         figure.savefig(temporary)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

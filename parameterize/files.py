@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -22,14 +22,14 @@ def save_arrays(path: str | Path, **arrays: NDArray[Any]) -> None:
 
     The bytes depend on the arrays alone, so equal results are equal files. Raises OSError naming the file.
     """
-    with _replacing(Path(path)) as stream:
+    with replacing(Path(path)) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
 
 
 def save_bytes(path: str | Path, content: bytes) -> None:
     """Write a file under a temporary name, then rename it. Raises OSError naming the file."""
-    with _replacing(Path(path)) as stream:
-        stream.write(content)
+    with replacing(Path(path)) as temporary:
+        temporary.write_bytes(content)
 
 
 def save_text(path: str | Path, text: str) -> None:
@@ -38,11 +38,14 @@ def save_text(path: str | Path, text: str) -> None:
 
 
 @contextmanager
-def _replacing(target: Path) -> Iterator[IO[bytes]]:
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+def replacing(target: Path) -> Iterator[Path]:
+    """A temporary name beside `target`, of the same suffix, for the block to write to; then it is renamed.
+
+    Raises OSError naming the target; where the block fails, the target stays as it was.
+    """
+    temporary = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
-        with temporary.open("wb") as stream:
-            yield stream
+        yield temporary
         temporary.replace(target)
     except OSError as error:
         error.filename = str(target)  # a full disk is reported without one

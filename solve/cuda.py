@@ -23,7 +23,7 @@ from .quadrature import Table
 LAYER_BYTES = 2**28  # of one field on a layer of points of u
 
 
-def check_device(device: str) -> None:
+def check_available(device: str) -> None:
     """Raise ValueError where torch has no such device here."""
     if device.startswith("cuda") and not torch.cuda.is_available():
         raise ValueError(f"device {device!r}: torch finds no CUDA GPU here; use device='cpu'")
@@ -41,7 +41,7 @@ def solve_on_device(
 
     Raises ValueError where torch has no such device.
     """
-    check_device(device)
+    check_available(device)
     apply = DeviceOperator(operator, device).apply_free
     right_there = torch.as_tensor(np.ascontiguousarray(right), device=device)
     result = conjugate_gradients(

@@ -122,7 +122,7 @@ def _separable_coefficients(operator: Operator, rule: GaussRule) -> tuple[list[A
     lengths = [np.add.reduceat(w, np.arange(s) * c) for w, s, c in zip(rule.weights, spans, counts, strict=True)]
     means = [[np.zeros(s) for s in spans] for _ in range(3)]  # [d][axis]: of log G_dd
     for span, q in enumerate(middle[0]):
-        weights = rule.plane_weights(q)[np.ix_(middle[2], middle[1])]
+        weights = rule.plane_weights(int(q))[np.ix_(middle[2], middle[1])]
         for d, index in enumerate((0, 3, 5)):
             plane = from_blocks(operator.factors[q][:, middle[2], index], rule.shape[1])[:, middle[1]]
             logarithm = np.log(np.maximum(np.abs(plane / weights), 1e-300))  # (w, v)

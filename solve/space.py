@@ -45,13 +45,22 @@ class TrialSpace:
         than degree + 1 in three dimensions. Where the space is only continuous somewhere, as for degree 1, they
         would let hourglass modes through: one point more.
         """
-        counts = []
+        only_continuous = self._only_continuous
+        g_u, g_v, g_w = (degree + int(rough) for degree, rough in zip(self.degrees, only_continuous, strict=True))
+        return g_u, g_v, g_w
+
+    @property
+    def is_only_continuous(self) -> bool:
+        """Whether the functions' derivatives jump somewhere inside."""
+        return any(self._only_continuous)
+
+    @property
+    def _only_continuous(self) -> list[bool]:
+        found = []
         for degree, knots in zip(self.degrees, self.knots, strict=True):
             inner = np.unique(knots, return_counts=True)[1][1:-1]
-            only_continuous = degree == 1 or bool(np.any(inner == degree))
-            counts.append(degree + 1 if only_continuous else degree)
-        g_u, g_v, g_w = counts
-        return g_u, g_v, g_w
+            found.append(degree == 1 or bool(np.any(inner == degree)))
+        return found
 
 
 def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = None) -> TrialSpace:

@@ -11,9 +11,10 @@ import numpy as np
 from parameterize.bspline import greville, open_uniform_knots
 from parameterize.volume import BSplineVolume
 
-from .poisson import solve_poisson
+from .elastic_problem import Elasticity
 from .problem import Poisson
 from .report import SolveReport
+from .solver import solve_problem
 
 
 @dataclass(frozen=True)
@@ -31,14 +32,14 @@ class ConvergenceRow:
 
 def convergence(
     volume: BSplineVolume,
-    problem: Poisson,
+    problem: Poisson | Elasticity,
     refine: Iterable[int] = range(3),
     degree: int | None = None,
     *,
     certified: str | None = None,
 ) -> list[ConvergenceRow]:
     """Solve on each refinement level of one map; for smooth solutions the L2 rate tends to degree + 1."""
-    reports = [solve_poisson(volume, problem, refine=k, degree=degree, certified=certified).report for k in refine]
+    reports = [solve_problem(volume, problem, refine=k, degree=degree, certified=certified).report for k in refine]
     found = rates(reports)
     l2, h1 = ([None, *found.get(name, [None] * len(reports))] for name in ("l2", "h1"))
     return [ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports)]

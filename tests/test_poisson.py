@@ -105,6 +105,10 @@ def test_report_entry_has_the_keys_of_report_json():
     entry = report.as_dict()
     errors = {"l2", "l2_relative", "h1_seminorm"}
     assert set(entry) == errors | {"elements", "dofs", "h", "iterations", "converged", "residual", "seconds"}
+    assert set(solve_poisson(benchmark_volume(3), WAVE, estimate=True).report.as_dict()) - set(entry) == {
+        "error_estimate",
+        "error_estimate_relative",
+    }
     assert set(entry["seconds"]) == {"setup", "solve", "errors"}
     assert entry["elements"] == 27
     assert entry["residual"] <= 1e-10
