@@ -178,7 +178,7 @@ def _solve(
     clock.append(time.process_time())
     errors = None
     if problem.exact is not None:
-        errors = error_norms(volume, space, coefficients, problem.exact_at)
+        errors = error_norms(volume, space, coefficients, problem.exact_at, threads)
     clock.append(time.process_time())
     report = SolveReport(
         elements=space.elements,
