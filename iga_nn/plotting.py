@@ -14,6 +14,7 @@ from parameterize.quality import arap
 from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .rendering import Patch, can_draw, draw, widest_view
+from .studies import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,6 +105,30 @@ def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: P
         panel.set_title(f"{AXES[axis]} = 1/2", fontsize=13)
     _color_bar(figure, rows, norm, r"$|u - u_h|$")
     figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
+    _save(figure, path)
+
+
+def draw_study(path: Path, study: Study) -> None:
+    """L2 and H1 errors over the mesh size, a curve a degree, with the slopes that smooth solutions have."""
+    figure, panels = _blank(1, 2, (11, 5))
+    for panel, (title, name, lost) in zip(panels, (("L2", "l2", 0), ("H1 seminorm", "h1_seminorm", 1)), strict=True):
+        for (degree, levels), color in zip(study.items(), FACE_COLORS * 2, strict=False):
+            sizes = np.array([level.report.elements for level in levels]) ** (-1.0 / 3.0)
+            errors = _positive(np.array([getattr(level.report, name) for level in levels]))
+            panel.loglog(sizes, errors, "o-", color=color, label=f"degree {degree}")
+            order = degree + 1 - lost
+            reference = 0.6 * errors[-1] * (sizes / sizes[-1]) ** order
+            panel.loglog(sizes, reference, "--", color=color, linewidth=0.8)
+            label = {"textcoords": "offset points", "ha": "center", "color": color, "fontsize": 9}
+            panel.annotate(f"slope {order}", (sizes[-1], reference[-1]), (0, -12), **label)
+        counts = sorted({round(level.report.elements ** (1.0 / 3.0)) for levels in study.values() for level in levels})
+        panel.set_xticks([1.0 / count for count in counts], [f"1/{count}" for count in counts])
+        panel.minorticks_off()
+        panel.set_xlabel("h, the edge of an element in the unit cube")
+        panel.set_title(f"{title} error")
+        panel.grid(alpha=0.3)
+        panel.margins(x=0.12, y=0.08)
+    panels[0].legend(frameon=False)
     _save(figure, path)
 
 
