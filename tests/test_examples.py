@@ -60,4 +60,4 @@ def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(formula_
     assert "| santa4 | ours | model not public |" in text
     assert "| santa4 | paper | 194.23 | 38.71 | 232.93 |" in text
     assert "no measurement" in text
-    assert text.count("| conch | 0 | 343 |") == 1 and "![error](conch/error.png)" in text
+    assert text.count("| conch | 0 | 343 |") == 1 and "![error](conch/figure14.png)" in text
