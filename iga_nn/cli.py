@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -97,14 +97,22 @@ def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapp
 
 
 @solve_app.command(name="poisson")
-def solve_poisson(volume: Path, /, *, output: Output = NO_OUTPUT, poisson: Equation = NO_POISSON) -> int:
+def solve_poisson(
+    volume: Path,
+    /,
+    *,
+    device: Literal["cpu", "cuda"] = "cpu",
+    output: Output = NO_OUTPUT,
+    poisson: Equation = NO_POISSON,
+) -> int:
     """Solve Poisson's equation on a volume.npz.
 
     Args:
         volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+        device: where the linear system is solved.
     """
     with console.progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, problem=poisson, force=output.force)
+        outcome = pipeline.solve_to(volume, output.out, problem=poisson, force=output.force, device=device)
     return _tell(outcome, output)
 
 

@@ -97,10 +97,18 @@ def parameterize_to(
 
 
 def solve_to(
-    volume: str | Path, out: str | Path | None = None, *, problem: ProblemOptions | None = None, force: bool = False
+    volume: str | Path,
+    out: str | Path | None = None,
+    *,
+    problem: ProblemOptions | None = None,
+    force: bool = False,
+    device: str = "cpu",
 ) -> Outcome:
-    """Solve on a saved volume: solution.npz, report.json, error.png; raises as `run` does. Needs no torch."""
-    from solve import check_problem
+    """Solve on a saved volume: solution.npz, report.json, error.png; raises as `run` does. On the CPU without torch.
+
+    device: where Poisson's linear system is solved, "cpu" or "cuda".
+    """
+    from solve import Poisson, check_device, check_problem
 
     options = problem or PoissonOptions()
     equation = options.problem()
@@ -109,10 +117,12 @@ def solve_to(
     _check_size(loaded, options)
     with input_errors():
         check_problem(loaded, equation)
+        if isinstance(equation, Poisson):
+            check_device(device, equation)
     with open_folder(path, out, force) as (state, _):
         state.begin(*SOLUTION_FILES)
         _write_certificate(state, path, loaded)
-        _solve(state, loaded, equation, options)
+        _solve(state, loaded, equation, options, **({"device": device} if device != "cpu" else {}))
         if len(equation.dirichlet) < 6:  # the user names faces: show which is which
             _draw(state, lambda plotting: plotting.draw_face_names(state.folder, loaded))
         return state.finish()
@@ -232,7 +242,13 @@ def _parameterize(
     return result
 
 
-def _solve(state: RunFolder, volume: BSplineVolume, equation: Poisson | Elasticity, options: ProblemOptions) -> None:
+def _solve(
+    state: RunFolder,
+    volume: BSplineVolume,
+    equation: Poisson | Elasticity,
+    options: ProblemOptions,
+    **solver: Any,
+) -> None:
     from solve import rates, solve_problem
 
     verdict = state.report["parameterization"]["bijective"]
@@ -240,7 +256,9 @@ def _solve(state: RunFolder, volume: BSplineVolume, equation: Poisson | Elastici
     with state.timed("solve"):
         for level in sorted(options.refine):
             with input_errors():
-                solution = solve_problem(volume, equation, refine=level, degree=options.degree, certified=verdict)
+                solution = solve_problem(
+                    volume, equation, refine=level, degree=options.degree, certified=verdict, **solver
+                )
             solutions.append(solution)
             log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
             solution.save(state.folder / "solution.npz")  # the finest so far

@@ -5,7 +5,7 @@ from .elasticity import check_elastic_data, solve_elasticity
 from .expressions import Expression, ExpressionError
 from .failure import ConvergenceError
 from .field import SplineField
-from .poisson import Solution, check_data, solve_poisson
+from .poisson import Solution, check_data, check_device, solve_poisson
 from .problem import Poisson
 from .report import SolveReport
 from .solver import check_problem, solve_problem
@@ -23,6 +23,7 @@ __all__ = [
     "SplineField",
     "benchmark_volume",
     "check_data",
+    "check_device",
     "check_elastic_data",
     "check_problem",
     "convergence",

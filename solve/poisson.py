@@ -18,7 +18,7 @@ from .boundary import boundary_coefficients
 from .estimate import error_estimate
 from .failure import ConvergenceError, check_solver, solve_notices
 from .field import SplineField
-from .linear import conjugate_gradients
+from .linear import LinearResult, conjugate_gradients
 from .norms import error_norms
 from .operators import Operator, System, assemble, free_window, prepare
 from .planes import map_planes
@@ -29,6 +29,8 @@ from .report import SolveReport
 from .space import TrialSpace, longest_edge, trial_space
 from .surface import FaceMass, RobinOperator, face_rule
 from .threads import checked_threads, one_blas_thread
+
+DEVICES = ("cpu", "cuda")
 
 log = logging.getLogger(__name__)
 
@@ -53,6 +55,7 @@ def solve_poisson(
     strict: bool = False,
     estimate: bool | None = None,
     threads: int | None = None,
+    device: str = "cpu",
 ) -> Solution:
     """Solve -div(kappa grad u) + c u = f on a volume.
 
@@ -60,6 +63,7 @@ def solve_poisson(
     tolerance: of |r| / |b| for the linear solver.
     certified: the verdict of the map's certificate, if known; anything but "certified" is logged and noted.
     threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
+    device: "cpu", or "cuda" for the iteration on a GPU by torch (not with Robin faces).
     estimate: of the error, from the residual; default: where the problem has no exact solution.
     strict: raise ConvergenceError where the linear solver fails; otherwise the report says `converged` is False.
 
@@ -67,13 +71,15 @@ def solve_poisson(
     where the data are not finite or have the wrong sign.
     """
     check_solver(tolerance, max_iterations)
+    check_device(device, problem)
     space = trial_space(volume, refine, degree)
     if 0 in np.zeros(space.shape)[free_window(space, problem.dirichlet)].shape:
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up()
     prepare(space, problem.reaction is not None)
     with one_blas_thread():
-        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
+        threads = checked_threads(threads)
+        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, threads, device)
         if estimate or (estimate is None and problem.exact is None):
             solution = _with_estimate(solution, space, problem)
     for notice in solution.report.notices:
@@ -121,6 +127,18 @@ def _assemble(volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: 
     )
 
 
+def check_device(device: str, problem: Poisson) -> None:
+    """Raise ValueError for a device that is unknown or absent, or that cannot solve the problem."""
+    if device not in DEVICES:
+        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
+    if device != "cpu":
+        if problem.robin:
+            raise ValueError(f"device {device!r} does not know Robin faces; use device='cpu'")
+        from .cuda import check_available  # torch comes in here only
+
+        check_available(device)
+
+
 @functools.cache
 def _warm_up() -> None:
     """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
@@ -128,7 +146,7 @@ def _warm_up() -> None:
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
     for problem in (Poisson(exact="x*x"), Poisson(exact="x*x", kappa=["1", "0", "0", "1", "0", "1"])):
-        _solve(cube, problem, trial_space(cube, 1), 1e-10, 10, None, 1)
+        _solve(cube, problem, trial_space(cube, 1), 1e-10, 10, None, 1, "cpu")
 
 
 def _solve(
@@ -139,6 +157,7 @@ def _solve(
     max_iterations: int,
     certified: str | None,
     threads: int,
+    device: str,
 ) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
@@ -152,7 +171,7 @@ def _solve(
     if preconditioner.singular:
         right = balanced(right)
     clock.append(time.process_time())
-    result = conjugate_gradients(operator.apply_free, right, preconditioner, tolerance, max_iterations)
+    result = _iterate(operator, right, preconditioner, tolerance, max_iterations, device)
     coefficients[window] = result.x
     if preconditioner.singular:
         coefficients += missing_mean(volume, space, coefficients, problem)
@@ -174,6 +193,22 @@ def _solve(
         residuals=result.residuals,
     )
     return Solution(space.degrees, space.knots, coefficients, volume, report)
+
+
+def _iterate(
+    operator: Operator | RobinOperator,
+    right: Array,
+    preconditioner: FastDiagonalization,
+    tolerance: float,
+    max_iterations: int,
+    device: str,
+) -> LinearResult:
+    if device == "cpu":
+        return conjugate_gradients(operator.apply_free, right, preconditioner, tolerance, max_iterations)
+    from .cuda import solve_on_device
+
+    assert isinstance(operator, Operator)
+    return solve_on_device(operator, preconditioner, right, tolerance, max_iterations, device)
 
 
 def _add_faces(volume: BSplineVolume, space: TrialSpace, problem: Poisson, load: Array) -> dict[str, FaceMass]:
