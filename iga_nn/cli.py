@@ -20,7 +20,7 @@ from . import __version__, console, pipeline
 from . import report as reports
 from .folder import Outcome
 from .formats import Format, export
-from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, input_errors, one_line
+from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
 
 FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--force", "--displacement")
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
@@ -62,8 +62,10 @@ Output = Annotated[OutputOptions, Parameter(name="*")]
 Mapping = Annotated[MapOptions, Parameter(name="*")]
 Equation = Annotated[PoissonOptions, Parameter(name="*")]
 Body = Annotated[ElasticityOptions, Parameter(name="*")]
+Study = Annotated[StudyOptions, Parameter(name="*")]
 
 NO_OUTPUT, NO_MAPPING, NO_POISSON, NO_BODY = OutputOptions(), MapOptions(), PoissonOptions(), ElasticityOptions()
+NO_STUDY = StudyOptions()
 
 
 @run_app.command(name="poisson")
@@ -124,6 +126,24 @@ def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body 
     with console.progress_line(output.quiet):
         outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force)
     return _tell(outcome, output)
+
+
+@app.command(name="study")
+def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = NO_STUDY) -> int:
+    """Solve on finer and finer meshes of a volume.npz: table, CSV and plot of the errors and their rates.
+
+    Args:
+        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+    """
+    with console.progress_line(output.quiet):
+        outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force)
+    if output.as_json:
+        _say(json.dumps(outcome.report["study"], indent=2))
+    else:
+        _say(f"{table}\nresults in {outcome.folder}")
+    if not reports.is_certified(outcome.report):
+        return NOT_CERTIFIED
+    return DONE if reports.is_converged(outcome.report) else NOT_CONVERGED
 
 
 @app.command(name="check")

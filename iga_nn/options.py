@@ -194,6 +194,34 @@ class ElasticityOptions:
             )
 
 
+@dataclass(frozen=True)
+class StudyOptions:
+    """A known solution of Poisson's problem, and the trial spaces it is approximated in.
+
+    Attributes:
+        exact: the solution, a formula in x, y, z. One that starts with a minus is written --exact=-x.
+        degree: one or more; the map's own by default.
+        refine: levels, each halves every span of the map's knots that many times: 0 1 2, or 0..2.
+    """
+
+    exact: str = DEFAULT_EXACT
+    degree: tuple[int, ...] = ()
+    refine: tuple[str, ...] = ("0..2",)
+
+    def problem(self) -> Poisson:
+        """The problem these options name. Raises InputError."""
+        return PoissonOptions(exact=self.exact).problem()
+
+    def levels(self) -> list[int]:
+        """The refinement levels in order. Raises InputError, also for degrees that cannot be run."""
+        levels = [level for text in self.refine for level in _range(text)]
+        if len(set(self.degree)) != len(self.degree):
+            raise InputError(f"degree {self.degree}: give distinct degrees")
+        for degree in self.degree or (None,):
+            check_space(levels, degree)
+        return sorted(levels)
+
+
 ProblemOptions = PoissonOptions | ElasticityOptions
 
 
@@ -214,6 +242,17 @@ def check_size(volume: BSplineVolume, refine: int, degree: int | None, component
     dofs = components * trial_space(volume, refine, degree).dofs
     if dofs > MAX_DOFS:
         raise InputError(f"refine {refine} gives {dofs:,} unknowns, more than {MAX_DOFS:,}: lower refine or degree")
+
+
+def _range(text: str) -> list[int]:
+    """A level, or all from the first to the last of "0..4"."""
+    first, dots, last = text.partition("..")
+    if not (first.isdecimal() and (last.isdecimal() or not dots)):
+        raise InputError(f"refine {text!r}: write levels such as 0 1 2, or a range such as 0..2")
+    low, high = int(first), int(last or first)
+    if high > MAX_REFINE:
+        raise InputError(f"refine {high}: at most {MAX_REFINE}; each level has 8 times the unknowns")
+    return list(range(low, high + 1))
 
 
 def _faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:

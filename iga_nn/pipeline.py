@@ -15,16 +15,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from parameterize.files import save_arrays
+from parameterize.files import save_arrays, save_text
 from parameterize.volume import BSplineVolume
 
 from . import report as reports
+from . import studies
 from .folder import CHECKPOINT, Outcome, RunFolder, has_checkpoint, open_folder
 from .options import (
     InputError,
     MapOptions,
     PoissonOptions,
     ProblemOptions,
+    StudyOptions,
     check_size,
     input_errors,
     read_corners,
@@ -40,6 +42,7 @@ log = logging.getLogger(__name__)
 
 MAP_FILES = ("volume.npz", "boundary.npz", "history.npz", "history.png", "faces.png", "distortion.png")
 SOLUTION_FILES = ("solution.npz", "error.png")
+STUDY_FILES = ("study.csv", "study.png")
 
 
 def run(
@@ -118,18 +121,40 @@ def solve_to(
             check_device(device, equation)
     with open_folder(path, out, force) as (state, _):
         state.begin(*SOLUTION_FILES)
-        with state.timed("certify"):
-            certificate = _certify(loaded)
-        log.info("certificate: %s", certificate["bijective"])
-        state.write(
-            input={"file": str(volume), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
-            versions=reports.versions(),
-            parameterization=certificate,
-        )
+        _write_certificate(state, path, loaded)
         _solve(state, loaded, equation, options, **({"device": device} if device != "cpu" else {}))
         if len(equation.dirichlet) < 6:  # the user names faces: show which is which
             _draw(state, lambda plotting: plotting.draw_face_names(state.folder, loaded))
         return state.finish()
+
+
+def study_to(
+    volume: str | Path, out: str | Path | None = None, *, options: StudyOptions | None = None, force: bool = False
+) -> tuple[Outcome, str]:
+    """A convergence study on a saved volume: study.csv, study.png, report.json, and the table; raises as `run` does."""
+    from solve import check_problem, convergence
+
+    options = options or StudyOptions()
+    equation, levels, path = options.problem(), options.levels(), Path(volume)
+    loaded = _load_volume(path)
+    degrees = sorted(options.degree) or [max(loaded.degrees)]
+    for degree in degrees:
+        check_size(loaded, levels[-1], degree)
+    with input_errors():
+        check_problem(loaded, equation)
+    with open_folder(path, out or f"{path.name.split('.')[0]}-study", force) as (state, _):
+        state.begin(*STUDY_FILES)
+        _write_certificate(state, path, loaded)
+        verdict = state.report["parameterization"]["bijective"]
+        study = {}
+        with state.timed("solve"), input_errors():
+            for degree in degrees:
+                study[degree] = convergence(loaded, equation, levels, degree, certified=verdict)
+                log.info("degree %d: done", degree)
+        save_text(state.folder / "study.csv", studies.as_csv(study))
+        state.write(study={"exact": equation.exact, "levels": studies.rows_of(study)})
+        _draw(state, lambda plotting: plotting.draw_study(state.folder / "study.png", study))
+        return state.finish(), studies.as_table(study)
 
 
 def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str, Any]:
@@ -140,6 +165,18 @@ def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str,
 def check_volume(path: str | Path) -> dict[str, Any]:
     """The certificate of a saved volume. Raises InputError for a file that is none."""
     return _certify(_load_volume(path))
+
+
+def _write_certificate(state: RunFolder, path: Path, volume: BSplineVolume) -> None:
+    """Certify a saved volume, and write the sections of report.json that say what was given."""
+    with state.timed("certify"):
+        certificate = _certify(volume)
+    log.info("certificate: %s", certificate["bijective"])
+    state.write(
+        input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
+        versions=reports.versions(),
+        parameterization=certificate,
+    )
 
 
 def _parameterize(

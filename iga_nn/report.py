@@ -76,7 +76,7 @@ def is_converged(report: Report) -> bool:
 
 def solved(report: Report) -> Report:
     """The section of the problem that was solved, empty without one."""
-    return next((report[name] for name in ("poisson", "elasticity") if name in report), {})
+    return next((report[name] for name in ("poisson", "elasticity", "study") if name in report), {})
 
 
 def verdict(report: Report, folder: Path) -> Report:

@@ -24,6 +24,7 @@ from .space import TrialSpace
 
 Orders = tuple[int, int, int]
 UNITS: tuple[Orders, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+SECOND: tuple[Orders, ...] = ((2, 0, 0), (1, 1, 0), (1, 0, 1), (0, 2, 0), (0, 1, 1), (0, 0, 2))  # in order of PAIRS
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,9 @@ def error_estimate(volume: BSplineVolume, space: TrialSpace, coefficients: Array
 def _layers(
     coefficients: Array, degrees: Orders, knots: tuple[Array, ...], rule: GaussRule, count: int
 ) -> Iterator[tuple[slice, dict[Orders, Array]]]:
-    """Layer by layer of elements in u: its points, and all derivatives up to second order of splines (c, n_u, n_v, n_w).
+    """Layer by layer of elements in u: its points, and all derivatives up to second order of c splines.
 
-    Each derivative is (c, q_u, q_v, q_w) with `count` points of u in a layer.
+    coefficients: (c, n_u, n_v, n_w). Each derivative is (c, q_u, q_v, q_w) with `count` points of u in a layer.
     """
     rows = [[collocation(knots[a], degrees[a], rule.points[a], order) for order in range(3)] for a in range(3)]
     for start in range(0, rule.shape[0], count):
@@ -100,9 +101,11 @@ def _local_error(
 def _physical_hessian(
     geometry: dict[Orders, Array], spline: dict[Orders, Array], inverse: list[Array], gradient: Array
 ) -> Array:
-    """Second derivatives (6, ...) in x, y, z: J^-T (H - sum_c du/dx_c H_c) J^-1, H in the parameters, H_c of the map."""
-    orders = [tuple(UNITS[a][c] + UNITS[b][c] for c in range(3)) for a, b in PAIRS]
-    bent = [spline[order] - (gradient * geometry[order]).sum(axis=0) for order in orders]
+    """Second derivatives (6, ...) in x, y, z: J^-T (H - sum_c du/dx_c H_c) J^-1.
+
+    H holds the solution's second derivatives in the parameters, H_c those of the map's component c.
+    """
+    bent = [spline[order] - (gradient * geometry[order]).sum(axis=0) for order in SECOND]
     rows = [sum(bent[SYMMETRIC[a][b]] * inverse[b] for b in range(3)) for a in range(3)]
     return np.stack([sum(inverse[a][i] * rows[a][j] for a in range(3)) for i, j in PAIRS])
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -161,6 +162,20 @@ def test_elasticity_on_a_saved_volume(in_folder, capsys):
         assert data["coefficients"].shape == (9, 9, 9, 3)
 
 
+def test_study_writes_table_csv_and_plot(in_folder, capsys):
+    benchmark_volume(2).save("map.npz")
+    assert main(["study", "map.npz", "--degree", "3", "2", "--refine", "0..2"]) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert table[0].split()[:3] == ["degree", "elements", "dofs"] and len(table) == 8
+    assert {file.name for file in Path("map-study").iterdir()} == {"report.json", "study.csv", "study.png"}
+    with Path("map-study/study.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [(row["degree"], row["elements"]) for row in rows[:4]] == [("2", "8"), ("2", "64"), ("2", "512"), ("3", "8")]
+    assert rows[0]["rate_l2"] == "" and float(rows[5]["rate_l2"]) > 3.5
+    assert main(["study", "map.npz", "--refine", "0", "1", "--exact", "x*y*z", "--out", "other", "--json"]) == 0
+    assert [row["degree"] for row in json.loads(capsys.readouterr().out)["levels"]] == [3, 3]
+
+
 def test_check_surface_and_volume(in_folder, capsys):
     assert main(["check", "bean"]) == 0
     assert "vertices" in capsys.readouterr().out
@@ -221,6 +236,13 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--source", "1", "--neumann", "u0"], "neumann u0 has no data"),
         (["run", "poisson", "cube", "--robin", "u0"], "write u0=ALPHA"),
         (["run", "poisson", "cube", "--robin", "u0=1", "--neumann", "u0"], "face u0 has both"),
+        (["study", "good.npz", "--refine", "0..9"], "at most 6"),
+        (["study", "good.npz", "--refine", "2..0"], "distinct levels"),
+        (["study", "good.npz", "--refine", "a"], "write levels such as 0 1 2"),
+        (["study", "good.npz", "--refine", "0..1", "1"], "distinct levels"),
+        (["study", "good.npz", "--degree", "2", "2"], "distinct degrees"),
+        (["study", "good.npz", "--exact", "-x"], "--exact=-x"),
+        (["study", "missing.npz"], "missing.npz"),
         (["solve", "elasticity", "good.npz"], "force has no data"),
         (["solve", "elasticity", "good.npz", "--exact", "x;y"], "three entries"),
         (["solve", "elasticity", "good.npz", "--exact", "x;y;z", "--poisson-ratio", "0.5"], "poisson_ratio"),
