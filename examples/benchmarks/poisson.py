@@ -6,8 +6,8 @@
 Every row has a process of its own, whose peak memory it reports. Seconds are those of set-up and solve to a residual
 of 1e-10, compilation and error norms apart: process CPU seconds, and beside them wall seconds. t_cal, measured in the
 same process on the same threads, are the CPU seconds of 1e12 floating-point operations: CPU / t_cal compares between
-machines, idle or busy. Peers solve the same problem on the same map, where their package is installed: MFEM with its assembled
-matrix, Gauss-Seidel and conjugate gradients. All L2 errors come from rules of degree + 2 points.
+machines, idle or busy. Peers solve the same problem on the same map, where their package is installed: MFEM with its
+assembled matrix, Gauss-Seidel and conjugate gradients. All L2 errors come from rules of degree + 2 points.
 """
 
 from __future__ import annotations
