@@ -186,8 +186,8 @@ def table(rows: Sequence[Row]) -> str:
     lines = [f"| {' | '.join(headings)} |", "|" + " --- |" * len(headings)]
     lines += [f"| {' | '.join(row.cells())} |" for row in rows]
     named = ", ".join(f"{name} {number}" for name, number in versions().items())
-    t_cal = ", ".join(sorted({f"{row.t_cal:.1f}" for row in rows}))
-    return "\n".join([*lines, "", f"{processor()}; t_cal {t_cal} s; {named}."])
+    lowest, highest = min(row.t_cal for row in rows), max(row.t_cal for row in rows)
+    return "\n".join([*lines, "", f"{processor()}; t_cal {lowest:.1f} to {highest:.1f} s; {named}."])
 
 
 def save(rows: Sequence[Row], folder: Path) -> None:
@@ -199,7 +199,8 @@ def save(rows: Sequence[Row], folder: Path) -> None:
     writer.writerows(asdict(row) for row in rows)
     save_text(folder / "poisson.csv", text.getvalue())
     save_text(
-        folder / "poisson.md", f"# The solver on the twisted cube\n\n{__doc__.split(chr(10) * 2)[2]}\n\n{table(rows)}\n"
+        folder / "poisson.md",
+        f"# The solver on the twisted cube\n\n{(__doc__ or '').split(chr(10) * 2)[2].strip()}\n\n{table(rows)}\n",
     )
 
 
