@@ -20,10 +20,10 @@ from .linear import conjugate_gradients
 from .norms import Errors, error_norms
 from .operators import free_window
 from .planes import map_planes
-from .poisson import Solution
 from .precondition import fast_diagonalization
 from .quadrature import gauss_rule
 from .report import SolveReport
+from .solution import Solution, with_estimate
 from .space import TrialSpace, longest_edge, trial_space
 from .surface import face_rule
 from .threads import checked_threads, one_blas_thread
@@ -41,6 +41,7 @@ def solve_elasticity(
     max_iterations: int = 1000,
     certified: str | None = None,
     strict: bool = False,
+    estimate: bool | None = None,
     threads: int | None = None,
 ) -> Solution:
     """Displacements of an elastic body; arguments and errors raised as in `solve_poisson`.
@@ -54,6 +55,8 @@ def solve_elasticity(
     _warm_up()
     with one_blas_thread():
         solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
+        if estimate or (estimate is None and problem.exact is None):
+            solution = with_estimate(solution, space, problem)
     for notice in solution.report.notices:
         log.warning("%s", notice)
     if strict and not solution.report.converged:

@@ -6,7 +6,6 @@ import functools
 import logging
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,9 +14,7 @@ from parameterize.volume import BSplineVolume
 
 from .balance import balanced, missing_mean
 from .boundary import boundary_coefficients
-from .estimate import error_estimate
 from .failure import ConvergenceError, check_solver, solve_notices
-from .field import SplineField
 from .linear import LinearResult, conjugate_gradients
 from .norms import error_norms
 from .operators import Operator, System, assemble, free_window, prepare
@@ -26,6 +23,7 @@ from .precondition import FastDiagonalization, fast_diagonalization
 from .problem import Poisson
 from .quadrature import GaussRule, gauss_rule
 from .report import SolveReport
+from .solution import Solution, with_estimate
 from .space import TrialSpace, longest_edge, trial_space
 from .surface import FaceMass, RobinOperator, face_rule
 from .threads import checked_threads, one_blas_thread
@@ -33,14 +31,6 @@ from .threads import checked_threads, one_blas_thread
 DEVICES = ("cpu", "cuda")
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class Solution(SplineField):
-    """The discrete solution: a spline of the parameters, the map it lives on, and the report."""
-
-    geometry: BSplineVolume
-    report: SolveReport
 
 
 def solve_poisson(
@@ -81,21 +71,12 @@ def solve_poisson(
         threads = checked_threads(threads)
         solution = _solve(volume, problem, space, tolerance, max_iterations, certified, threads, device)
         if estimate or (estimate is None and problem.exact is None):
-            solution = _with_estimate(solution, space, problem)
+            solution = with_estimate(solution, space, problem)
     for notice in solution.report.notices:
         log.warning("%s", notice)
     if strict and not solution.report.converged:
         raise ConvergenceError(solution.report.notices[-1], solution)
     return solution
-
-
-def _with_estimate(solution: Solution, space: TrialSpace, problem: Poisson) -> Solution:
-    """The same solution with the estimated error, whose time counts as that of the errors."""
-    start = time.process_time()
-    found = error_estimate(solution.geometry, space, solution.coefficients, problem)
-    seconds = solution.report.seconds
-    seconds = seconds | {"errors": seconds["errors"] + time.process_time() - start}
-    return replace(solution, report=replace(solution.report, estimate=found, seconds=seconds))
 
 
 def check_data(volume: BSplineVolume, problem: Poisson) -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from parameterize.bspline import greville, open_uniform_knots
 from parameterize.volume import FACE_NAMES, BSplineVolume
-from solve import Poisson, benchmark_volume, solve_poisson
+from solve import Elasticity, Poisson, benchmark_volume, solve_elasticity, solve_poisson
 
 WAVE = "exp(x+z)*sin(y)"
 TENSOR = ("2+x*x", "0.3*y", "0.1", "1.5", "0.2*sin(z)", "1+z*z")
@@ -42,6 +42,12 @@ def test_estimate_errs_on_the_safe_side_where_elements_are_stretched():
     box = BSplineVolume.uniform(grid * [1.0, 1.0, 0.125], 3)
     assert 0.8 < effectivity(box, Poisson(exact="sin(3*x)*cos(2*y)"), refine=1) < 1.5
     assert effectivity(box, Poisson(exact="sin(20*z)"), refine=1) > 5.0
+
+
+def test_estimate_of_displacements_is_on_the_safe_side():
+    body = Elasticity(exact=("exp(x)*sin(y)", "cos(x*z)", "x*y*z+sin(z)"), traction={"u1": None}, young=210.0)
+    report = solve_elasticity(benchmark_volume(4), body, refine=1, estimate=True).report
+    assert 1.0 < report.error_estimate / report.l2 < 4.0
 
 
 def test_no_estimate_where_derivatives_jump_or_are_unknown():
