@@ -249,12 +249,14 @@ def _solve(
     options: ProblemOptions,
     **solver: Any,
 ) -> None:
-    from solve import rates, solve_problem
+    from solve import Poisson, rates, solve_problem
 
     verdict = state.report["parameterization"]["bijective"]
     solutions: list[Solution] = []
     with state.timed("solve"):
-        for level in sorted(options.refine):
+        for level in sorted(set(options.refine)):
+            if solutions and isinstance(equation, Poisson):
+                solver["start"] = solutions[-1]
             with input_errors():
                 solution = solve_problem(
                     volume, equation, refine=level, degree=options.degree, certified=verdict, **solver

@@ -36,6 +36,7 @@ def solve_on_device(
     tolerance: float,
     max_iterations: int,
     device: str,
+    start: Array | None = None,
 ) -> LinearResult:
     """As `conjugate_gradients` for an operator's free coefficients, on a torch device.
 
@@ -43,9 +44,11 @@ def solve_on_device(
     """
     check_available(device)
     apply = DeviceOperator(operator, device).apply_free
-    right_there = torch.as_tensor(np.ascontiguousarray(right), device=device)
+    right_there, start_there = (
+        None if x is None else torch.as_tensor(np.ascontiguousarray(x), device=device) for x in (right, start)
+    )
     result = conjugate_gradients(
-        apply, right_there, device_preconditioner(preconditioner, device), tolerance, max_iterations
+        apply, right_there, device_preconditioner(preconditioner, device), tolerance, max_iterations, start_there
     )
     return LinearResult(result.x.cpu().numpy(), result.residuals, result.converged)
 

@@ -30,9 +30,11 @@ def conjugate_gradients(
     preconditioner: Callable[[Vector], Vector],
     tolerance: float = 1e-10,
     max_iterations: int = 1000,
+    start: Vector | None = None,
 ) -> LinearResult:
-    """Solve A x = b from x = 0 until |r| <= tolerance |b| (Saad, *Iterative Methods for Sparse Linear Systems*,
-    2nd ed., algorithm 9.1).
+    """Solve A x = b from x = `start` (default: zero) until |r| <= tolerance |b|.
+
+    Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed., algorithm 9.1.
 
     b: an array or a tensor of any shape; the operator's answers are overwritten.
     Stops without convergence after `max_iterations`, or as soon as a direction shows that A is not positive definite.
@@ -41,7 +43,10 @@ def conjugate_gradients(
     x, p, r = 0.0 * b, 0.0 * b, 1.0 * b
     if norm_b == 0.0:
         return LinearResult(x, (0.0,), True)
-    residuals = [1.0]
+    if start is not None:
+        x += start
+        r -= operator(x)
+    residuals = [math.sqrt(_dot(r, r)) / norm_b]
     rz_old = 1.0
     while residuals[-1] > tolerance and len(residuals) <= max_iterations:
         z = preconditioner(r)

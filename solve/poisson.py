@@ -24,7 +24,7 @@ from .problem import Poisson
 from .quadrature import GaussRule, gauss_rule
 from .report import SolveReport
 from .solution import Solution, with_estimate
-from .space import TrialSpace, longest_edge, trial_space
+from .space import TrialSpace, embedded, longest_edge, trial_space
 from .surface import FaceMass, RobinOperator, face_rule
 from .threads import checked_threads, one_blas_thread
 
@@ -46,6 +46,7 @@ def solve_poisson(
     estimate: bool | None = None,
     threads: int | None = None,
     device: str = "cpu",
+    start: SplineField | None = None,
 ) -> Solution:
     """Solve -div(kappa grad u) + c u = f on a volume.
 
@@ -54,6 +55,8 @@ def solve_poisson(
     certified: the verdict of the map's certificate, if known; anything but "certified" is logged and noted.
     threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
     device: "cpu", or "cuda" for the iteration on a GPU by torch (not with Robin faces).
+    start: a solution in a space that this one contains, as that of one refinement less: the iteration starts there
+        instead of at zero, and saves a third on maps that take many.
     estimate: of the error, from the residual; default: where the problem has no exact solution.
     strict: raise ConvergenceError where the linear solver fails; otherwise the report says `converged` is False.
 
@@ -69,7 +72,7 @@ def solve_poisson(
     prepare(space, problem.reaction is not None)
     with one_blas_thread():
         threads = checked_threads(threads)
-        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, threads, device)
+        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, threads, device, start)
         if estimate or (estimate is None and problem.exact is None):
             solution = with_estimate(solution, space, problem)
     for notice in solution.report.notices:
@@ -139,6 +142,7 @@ def _solve(
     certified: str | None,
     threads: int,
     device: str,
+    start: SplineField | None = None,
 ) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
@@ -152,14 +156,15 @@ def _solve(
     if preconditioner.singular:
         right = balanced(right)
     clock.append(time.process_time())
-    result = _iterate(operator, right, preconditioner, tolerance, max_iterations, device)
+    guess = None if start is None else embedded(start.coefficients, start.degrees, start.knots, space)[window]
+    result = _iterate(operator, right, preconditioner, tolerance, max_iterations, device, guess)
     coefficients[window] = result.x
     if preconditioner.singular:
         coefficients += missing_mean(volume, space, coefficients, problem)
     clock.append(time.process_time())
     errors = None
     if problem.exact is not None:
-        errors = error_norms(volume, space, coefficients, problem.exact_at)
+        errors = error_norms(volume, space, coefficients, problem.exact_at, threads)
     clock.append(time.process_time())
     report = SolveReport(
         elements=space.elements,
@@ -183,13 +188,14 @@ def _iterate(
     tolerance: float,
     max_iterations: int,
     device: str,
+    start: Array | None,
 ) -> LinearResult:
     if device == "cpu":
-        return conjugate_gradients(operator.apply_free, right, preconditioner, tolerance, max_iterations)
+        return conjugate_gradients(operator.apply_free, right, preconditioner, tolerance, max_iterations, start)
     from .cuda import solve_on_device
 
     assert isinstance(operator, Operator)
-    return solve_on_device(operator, preconditioner, right, tolerance, max_iterations, device)
+    return solve_on_device(operator, preconditioner, right, tolerance, max_iterations, device, start)
 
 
 def _add_faces(volume: BSplineVolume, space: TrialSpace, problem: Poisson, load: Array) -> dict[str, FaceMass]:
