@@ -15,6 +15,7 @@ from parameterize.volume import BSplineVolume
 from .balance import balanced, missing_mean
 from .boundary import boundary_coefficients
 from .failure import ConvergenceError, check_solver, solve_notices
+from .field import SplineField
 from .linear import LinearResult, conjugate_gradients
 from .norms import error_norms
 from .operators import Operator, System, assemble, free_window, prepare
