@@ -14,7 +14,7 @@ from parameterize.volume import BSplineVolume
 
 from .balance import balanced, missing_mean
 from .boundary import boundary_coefficients
-from .failure import ConvergenceError, check_solver, solve_notices
+from .failure import announce, check_solver, check_unknowns, solve_notices
 from .field import SplineField
 from .linear import LinearResult, conjugate_gradients
 from .norms import error_norms
@@ -23,9 +23,8 @@ from .planes import map_planes
 from .precondition import FastDiagonalization, fast_diagonalization
 from .problem import Poisson
 from .quadrature import GaussRule, gauss_rule
-from .report import SolveReport
-from .solution import Solution, with_estimate
-from .space import TrialSpace, embedded, longest_edge, trial_space
+from .solution import Solution, solution_of, with_estimate
+from .space import TrialSpace, embedded, trial_space
 from .surface import FaceMass, RobinOperator, face_rule
 from .threads import checked_threads, one_blas_thread
 
@@ -67,8 +66,7 @@ def solve_poisson(
     check_solver(tolerance, max_iterations)
     check_device(device, problem)
     space = trial_space(volume, refine, degree)
-    if 0 in np.zeros(space.shape)[free_window(space, problem.dirichlet)].shape:
-        raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
+    check_unknowns(space, problem.dirichlet)
     _warm_up()
     prepare(space, problem.reaction is not None)
     with one_blas_thread():
@@ -76,10 +74,7 @@ def solve_poisson(
         solution = _solve(volume, problem, space, tolerance, max_iterations, certified, threads, device, start)
         if estimate or (estimate is None and problem.exact is None):
             solution = with_estimate(solution, space, problem)
-    for notice in solution.report.notices:
-        log.warning("%s", notice)
-    if strict and not solution.report.converged:
-        raise ConvergenceError(solution.report.notices[-1], solution)
+    announce(solution, strict)
     return solution
 
 
@@ -167,19 +162,8 @@ def _solve(
     if problem.exact is not None:
         errors = error_norms(volume, space, coefficients, problem.exact_at, threads)
     clock.append(time.process_time())
-    report = SolveReport(
-        elements=space.elements,
-        dofs=space.dofs,
-        h=longest_edge(volume, space),
-        iterations=result.iterations,
-        converged=result.converged,
-        residual=result.residuals[-1],
-        seconds=dict(zip(("setup", "solve", "errors"), np.diff(clock).tolist(), strict=True)),
-        errors=errors,
-        notices=solve_notices(volume, space, system, certified, result),
-        residuals=result.residuals,
-    )
-    return Solution(space.degrees, space.knots, coefficients, volume, report)
+    notices = solve_notices(volume, space, system, certified, result)
+    return solution_of(volume, space, coefficients, result, clock, errors, notices)
 
 
 def _iterate(
