@@ -195,6 +195,9 @@ def assemble(
 
 def prepare(space: TrialSpace, reaction: bool = False) -> None:
     """Compile the product for a space's degrees, or load it from the cache, so that no timing contains it."""
+    # A large block freed teaches glibc (mallopt(3), M_MMAP_THRESHOLD) to keep freed memory. Else every temporary of a
+    # plane goes back to the system and is faulted in again: formulas take five times as long.
+    np.empty(2**21)
     tables = gauss_rule(space).tabulate(space.degrees, space.knots)
     spans = span_tables(space, tables)[2]
     factors = np.zeros((0, 0, spans.values.shape[0] * spans.values.shape[1], 6 + reaction, kernels.LANES))
