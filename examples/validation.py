@@ -1,8 +1,9 @@
 """The paper's Table 3, Table 4 and Figure 14 for the models it solves Poisson's equation on, ours beside the paper's.
 
 `python examples/validation.py [--preset paper] [--models DIR] [--out DIR] [--steps-factor F]` runs conch and santa4 and
-writes validation.md, with figure14.png (the error on the boundary and three sections, refine 0 and 1) in each folder. The paper's santa4 is not public: its row waits for santa4.obj in
-the models' folder (--models, else IGA_NN_DATA, else ../shared/models).
+writes validation.md, and in each folder figure14.png: the error on the boundary and three sections, refined 0 and 1
+times. The paper's santa4 is not public: its row waits for santa4.obj in the models' folder (--models, else IGA_NN_DATA,
+else ../shared/models).
 """
 
 from __future__ import annotations

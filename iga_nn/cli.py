@@ -105,7 +105,10 @@ def solve_poisson(
     output: Output = NO_OUTPUT,
     poisson: Equation = NO_POISSON,
 ) -> int:
-    """Solve Poisson's equation on a volume.npz.
+    """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
+
+    The volume's six faces u0, u1, v0, v1, w0, w1, the images of u = 0, u = 1 and so on, carry values of u unless named
+    under --neumann or --robin.
 
     Args:
         volume: a file written by `iga-nn parameterize` or `iga-nn run`.
@@ -120,6 +123,10 @@ def solve_poisson(
 def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body = NO_BODY) -> int:
     """Solve linear elasticity on a volume.npz.
 
+    A vector is three formulas in x, y, z with semicolons between them, in quotes: "x*y;0;sin(z)". The volume's six
+    faces u0, u1, v0, v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under
+    --traction.
+
     Args:
         volume: a file written by `iga-nn parameterize` or `iga-nn run`.
     """
@@ -131,6 +138,8 @@ def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body 
 @app.command(name="study")
 def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = NO_STUDY) -> int:
     """Solve on finer and finer meshes of a volume.npz: table, CSV and plot of the errors and their rates.
+
+    Results go to STEM-study in the current folder, unless --out names another.
 
     Args:
         volume: a file written by `iga-nn parameterize` or `iga-nn run`.

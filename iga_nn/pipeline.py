@@ -205,6 +205,8 @@ def _parameterize(
         x, y, z = surface.vertices.T
         equation.boundary_at(x, y, z)
         equation.source_at(x, y, z)
+        equation.kappa_at(x, y, z)
+        equation.reaction_at(x, y, z)
     if options.resume and not has_checkpoint(state.folder):
         log.info("no checkpoint, starting anew")
     state.begin(*MAP_FILES, *SOLUTION_FILES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,7 +65,15 @@ def draw_faces(path: Path, volume: BSplineVolume) -> None:
     swatches = [
         Swatch(color=color, label=_face_label(name)) for name, color in zip(FACE_NAMES, FACE_COLORS, strict=True)
     ]
-    figure.legend(handles=swatches, loc="outside lower center", ncols=6, frameon=False, fontsize=12)
+    figure.legend(
+        handles=swatches,
+        loc="outside lower center",
+        ncols=6,
+        frameon=False,
+        fontsize=12,
+        columnspacing=1.2,
+        handlelength=1.4,
+    )
     figure.suptitle("Images of the six faces of the unit cube", fontsize=14)
     _save(figure, path)
 

@@ -5,9 +5,10 @@ from .elasticity import check_elastic_data, solve_elasticity
 from .expressions import Expression, ExpressionError
 from .failure import ConvergenceError
 from .field import SplineField
-from .poisson import Solution, check_data, check_device, solve_poisson
+from .poisson import check_data, check_device, solve_poisson
 from .problem import Poisson
 from .report import SolveReport
+from .solution import Solution
 from .solver import check_problem, solve_problem
 from .study import ConvergenceRow, benchmark_volume, convergence, rates
 

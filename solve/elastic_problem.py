@@ -79,13 +79,29 @@ class Elasticity:
         """Body force (3, ...) at points given by arrays of equal shape. Raises ExpressionError where not finite."""
         if "force" in self._parsed:
             return self._values("force", x, y, z)
-        hessians = [entry.hessian(x, y, z)[2] for entry in self._formulas()]  # three (6, ...)
+        hessians = np.stack([entry.hessian(x, y, z)[2] for entry in self._formulas()])
+        return finite("force (from exact)", -self._divergence(hessians), x, y, z)
+
+    def _divergence(self, hessian: Array) -> Array:
+        """The divergence of the stress, (lambda + mu) grad div u + mu Laplace u, from the Hessian (3, 6, ...) of u."""
         lam, mu = self.constants
-        force = np.empty((3, *x.shape))
-        for i, hessian in enumerate(hessians):
-            slope = sum(hessians[j][SYMMETRIC[i][j]] for j in range(3))  # of div u in direction i
-            force[i] = -(lam + mu) * slope - mu * (hessian[0] + hessian[3] + hessian[5])
-        return finite("force (from exact)", force, x, y, z)
+        slopes = [sum(hessian[j, SYMMETRIC[i][j]] for j in range(3)) for i in range(3)]  # of div u
+        found: Array = (lam + mu) * np.stack(slopes) + mu * (hessian[:, 0] + hessian[:, 3] + hessian[:, 5])
+        return found
+
+    @property
+    def is_differentiable(self) -> bool:
+        """Whether the coefficients' derivatives are known: they are constant."""
+        return True
+
+    def residual_at(self, value: Array, gradient: Array, hessian: Array, x: Array, y: Array, z: Array) -> Array:
+        """Values (3, ...) of f + div sigma(u) from the Hessian (3, 6, ...) of u."""
+        return self.force_at(x, y, z) + self._divergence(hessian)
+
+    def symbol_at(self, wave: Array, x: Array, y: Array, z: Array) -> Array:
+        """The value mu |k|^2 of shear waves, the least, for wave vectors k (3, ...)."""
+        found: Array = self.constants[1] * (wave * wave).sum(axis=0)
+        return found
 
     def displacement_at(self, x: Array, y: Array, z: Array) -> Array:
         """Displacement (3, ...) prescribed at points of the boundary."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import logging
 import time
 from collections.abc import Callable
 
@@ -15,20 +14,17 @@ from parameterize.volume import BSplineVolume
 from .boundary import boundary_coefficients
 from .elastic_operator import assemble_elasticity
 from .elastic_problem import Elasticity
-from .failure import ConvergenceError, check_solver, solve_notices
+from .failure import announce, check_solver, check_unknowns, solve_notices
 from .linear import conjugate_gradients
 from .norms import Errors, error_norms
 from .operators import free_window
 from .planes import map_planes
-from .poisson import Solution
 from .precondition import fast_diagonalization
 from .quadrature import gauss_rule
-from .report import SolveReport
-from .space import TrialSpace, longest_edge, trial_space
+from .solution import Solution, solution_of, with_estimate
+from .space import TrialSpace, trial_space
 from .surface import face_rule
 from .threads import checked_threads, one_blas_thread
-
-log = logging.getLogger(__name__)
 
 
 def solve_elasticity(
@@ -41,6 +37,7 @@ def solve_elasticity(
     max_iterations: int = 1000,
     certified: str | None = None,
     strict: bool = False,
+    estimate: bool | None = None,
     threads: int | None = None,
 ) -> Solution:
     """Displacements of an elastic body; arguments and errors raised as in `solve_poisson`.
@@ -49,15 +46,13 @@ def solve_elasticity(
     """
     check_solver(tolerance, max_iterations)
     space = trial_space(volume, refine, degree)
-    if 0 in np.zeros(space.shape)[free_window(space, problem.dirichlet)].shape:
-        raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
+    check_unknowns(space, problem.dirichlet)
     _warm_up()
     with one_blas_thread():
         solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
-    for notice in solution.report.notices:
-        log.warning("%s", notice)
-    if strict and not solution.report.converged:
-        raise ConvergenceError(solution.report.notices[-1], solution)
+        if estimate or (estimate is None and problem.exact is None):
+            solution = with_estimate(solution, space, problem)
+    announce(solution, strict)
     return solution
 
 
@@ -105,21 +100,10 @@ def _solve(
     result = conjugate_gradients(system.operator.apply_free, right, preconditioner, tolerance, max_iterations)
     coefficients[:, *window] = result.x
     clock.append(time.process_time())
-    errors = _errors(volume, space, coefficients, problem) if problem.exact is not None else None
+    errors = _errors(volume, space, coefficients, problem, threads) if problem.exact is not None else None
     clock.append(time.process_time())
-    report = SolveReport(
-        elements=space.elements,
-        dofs=3 * space.dofs,
-        h=longest_edge(volume, space),
-        iterations=result.iterations,
-        converged=result.converged,
-        residual=result.residuals[-1],
-        seconds=dict(zip(("setup", "solve", "errors"), np.diff(clock).tolist(), strict=True)),
-        errors=errors,
-        notices=solve_notices(volume, space, system, certified, result),
-        residuals=result.residuals,
-    )
-    return Solution(space.degrees, space.knots, np.moveaxis(coefficients, 0, -1), volume, report)
+    notices = solve_notices(volume, space, system, certified, result)
+    return solution_of(volume, space, np.moveaxis(coefficients, 0, -1), result, clock, errors, notices)
 
 
 def _displacements(volume: BSplineVolume, space: TrialSpace, problem: Elasticity) -> Array:
@@ -139,7 +123,7 @@ def _add_tractions(volume: BSplineVolume, space: TrialSpace, problem: Elasticity
             component[rule.layer] += rule.integrate(pull)
 
 
-def _errors(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Elasticity) -> Errors:
+def _errors(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Elasticity, threads: int) -> Errors:
     """Norms over the three components together."""
 
     def component(c: int) -> Callable[[Array, Array, Array], tuple[Array, Array | None]]:
@@ -149,7 +133,7 @@ def _errors(volume: BSplineVolume, space: TrialSpace, coefficients: Array, probl
 
         return exact
 
-    parts = [error_norms(volume, space, coefficients[c], component(c)) for c in range(3)]
+    parts = [error_norms(volume, space, coefficients[c], component(c), threads) for c in range(3)]
     norms = [part.l2 / part.l2_relative for part in parts if part.l2_relative]
     l2 = float(np.linalg.norm([part.l2 for part in parts]))
     slopes = [part.h1_seminorm for part in parts if part.h1_seminorm is not None]

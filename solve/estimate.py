@@ -9,8 +9,9 @@ of boundary data adds is of higher order, and left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from parameterize.bspline import Array, apply_along, breakpoints, collocation
 from parameterize.volume import BSplineVolume
 
 from .expressions import PAIRS
-from .problem import SYMMETRIC, Poisson
+from .problem import SYMMETRIC
 from .quadrature import GaussRule, gauss_rule
 from .space import TrialSpace
 
@@ -35,25 +36,39 @@ class Estimate:
     l2_relative: float | None
 
 
-def error_estimate(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Poisson) -> Estimate | None:
-    """Estimate of the error of a solution with coefficients (n_u, n_v, n_w).
+class Problem(Protocol):
+    """What the estimate asks of a problem; fields of several components have those first."""
+
+    @property
+    def is_differentiable(self) -> bool:
+        """Whether the coefficients' derivatives are known."""
+
+    def residual_at(self, value: Array, gradient: Array, hessian: Array, x: Array, y: Array, z: Array) -> Array:
+        """Source less operator (c, ...), from u (c, ...), its gradient (c, 3, ...) and its Hessian (c, 6, ...)."""
+
+    def symbol_at(self, wave: Array, x: Array, y: Array, z: Array) -> Array:
+        """The least factor (...) by which the operator multiplies a wave exp(i k . x) with wave vector k (3, ...)."""
+
+
+def error_estimate(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Problem) -> Estimate | None:
+    """Estimate of the error of a solution with coefficients (c, n_u, n_v, n_w), c components.
 
     None where the residual tells too little: in a space that is only continuous somewhere, whose derivatives jump, and
     with a function as kappa, whose derivatives are unknown.
     """
-    if space.is_only_continuous or not problem.is_smooth_kappa:
+    if space.is_only_continuous or not problem.is_differentiable:
         return None
     rule, counts = gauss_rule(space), space.gauss_points
     map_layers = _layers(np.moveaxis(volume.control_points, -1, 0), volume.degrees, volume.knots, rule, counts[0])
-    own_layers = _layers(coefficients[None], space.degrees, space.knots, rule, counts[0])
+    own_layers = _layers(coefficients, space.degrees, space.knots, rule, counts[0])
     sizes = [np.repeat(np.diff(breakpoints(k)), count) for k, count in zip(space.knots, counts, strict=True)]
     w_u, w_v, w_w = rule.weights
     sums = np.zeros(2)
     for (layer, geometry), (_, spline) in zip(map_layers, own_layers, strict=True):
         spacing = (sizes[0][layer, None, None], sizes[1][:, None], sizes[2])
-        error, det = _local_error(geometry, {order: field[0] for order, field in spline.items()}, problem, spacing)
-        for place, values in enumerate((error, spline[0, 0, 0][0])):
-            sums[place] += np.einsum("ijk,i,j,k", np.abs(det) * values**2, w_u[layer], w_v, w_w)
+        error, det = _local_error(geometry, spline, problem, spacing)
+        for place, field in enumerate((error, spline[0, 0, 0])):
+            sums[place] += np.einsum("ijk,i,j,k", np.abs(det) * (field**2).sum(axis=0), w_u[layer], w_v, w_w)
     l2, norm = np.sqrt(sums).tolist()
     return Estimate(l2, l2 / norm if norm > 0.0 else None)
 
@@ -79,39 +94,31 @@ def _layers(
 
 
 def _local_error(
-    geometry: dict[Orders, Array], spline: dict[Orders, Array], problem: Poisson, spacing: tuple[Array, ...]
+    geometry: dict[Orders, Array], spline: dict[Orders, Array], problem: Problem, spacing: tuple[Array, ...]
 ) -> tuple[Array, Array]:
-    """The estimated |u - u_h| and det J at the points of a layer."""
-    x, y, z = geometry[0, 0, 0]
+    """The estimated error (c, ...) and det J (...) at the points of a layer."""
+    where = geometry[0, 0, 0]
     tangents = [geometry[order] for order in UNITS]
     cofactors = [np.cross(tangents[a - 2], tangents[a - 1], axis=0) for a in range(3)]
     det = (tangents[0] * cofactors[0]).sum(axis=0)
     inverse = [row / det for row in cofactors]  # rows of J^-1, each (3, ...)
-    gradient = sum(inverse[a] * spline[UNITS[a]] for a in range(3))
-    hessian = _physical_hessian(geometry, spline, inverse, gradient)
-    residual = problem.source_at(x, y, z) + problem.divergence_at(gradient, hessian, x, y, z)
-    reaction = problem.reaction_at(x, y, z)
-    residual -= reaction * spline[0, 0, 0]
-    kappa = problem.kappa_at(x, y, z)
-    stretch = [(2.0 * np.pi / spacing[a]) ** 2 * _quadratic(kappa, inverse[a], det.ndim) for a in range(3)]
-    error: Array = np.abs(residual) / (np.min(stretch, axis=0) + reaction)
-    return error, det
+    gradients, hessians = [], []
+    for component in range(len(spline[0, 0, 0])):
+        gradient = _dot(inverse, [spline[order][component] for order in UNITS])
+        bent = [spline[order][component] - _dot(gradient, geometry[order]) for order in SECOND]
+        gradients.append(gradient)
+        hessians.append(_physical_hessian(bent, inverse))
+    residual = problem.residual_at(spline[0, 0, 0], np.stack(gradients), np.stack(hessians), *where)
+    symbols = [problem.symbol_at(2.0 * np.pi / spacing[a] * inverse[a], *where) for a in range(3)]
+    return residual / np.min(symbols, axis=0), det
 
 
-def _physical_hessian(
-    geometry: dict[Orders, Array], spline: dict[Orders, Array], inverse: list[Array], gradient: Array
-) -> Array:
-    """Second derivatives (6, ...) in x, y, z: J^-T (H - sum_c du/dx_c H_c) J^-1.
-
-    H holds the solution's second derivatives in the parameters, H_c those of the map's component c.
-    """
-    bent = [spline[order] - (gradient * geometry[order]).sum(axis=0) for order in SECOND]
-    rows = [sum(bent[SYMMETRIC[a][b]] * inverse[b] for b in range(3)) for a in range(3)]
-    return np.stack([sum(inverse[a][i] * rows[a][j] for a in range(3)) for i, j in PAIRS])
+def _physical_hessian(bent: list[Array], inverse: list[Array]) -> Array:
+    """J^-T H J^-1 (6, ...) from the six entries of H, second derivatives in the parameters, and the rows of J^-1."""
+    rows = [_dot([bent[place] for place in SYMMETRIC[a]], inverse) for a in range(3)]  # H J^-1, each (3, ...)
+    columns = list(zip(*inverse, strict=True)), list(zip(*rows, strict=True))
+    return np.stack([_dot(columns[0][i], columns[1][j]) for i, j in PAIRS])
 
 
-def _quadratic(kappa: Array, row: Array, dimensions: int) -> Array:
-    """The form row . kappa row for a scalar kappa (...) or a tensor (6, ...)."""
-    if kappa.ndim == dimensions:
-        return kappa * (row * row).sum(axis=0)
-    return sum(kappa[SYMMETRIC[i][j]] * row[i] * row[j] for i in range(3) for j in range(3))
+def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import logging
+from collections.abc import Collection
 
 import numpy as np
 
@@ -12,18 +13,29 @@ from parameterize.volume import AXES, BSplineVolume
 
 from .elastic_operator import ElasticSystem
 from .linear import LinearResult
-from .operators import System
+from .operators import System, free_window
 from .planes import map_planes
 from .quadrature import gauss_rule
+from .solution import Solution
 from .space import TrialSpace
+
+log = logging.getLogger(__name__)
 
 
 class ConvergenceError(RuntimeError):
     """The linear solver did not reach its tolerance; the last iterate is `solution`."""
 
-    def __init__(self, message: str, solution: Any) -> None:
-        super().__init__(message)
+    def __init__(self, solution: Solution) -> None:
+        super().__init__(solution.report.notices[-1])
         self.solution = solution
+
+
+def announce(solution: Solution, strict: bool) -> None:
+    """Log a solution's notices; raise ConvergenceError where it has not converged and `strict` is asked for."""
+    for notice in solution.report.notices:
+        log.warning("%s", notice)
+    if strict and not solution.report.converged:
+        raise ConvergenceError(solution)
 
 
 def check_solver(tolerance: float, max_iterations: int) -> None:
@@ -32,6 +44,12 @@ def check_solver(tolerance: float, max_iterations: int) -> None:
         raise ValueError(f"tolerance must lie between 0 and 1, got {tolerance}")
     if max_iterations < 1:
         raise ValueError(f"max_iterations must be at least 1, got {max_iterations}")
+
+
+def check_unknowns(space: TrialSpace, dirichlet: Collection[str]) -> None:
+    """Raise ValueError where data on the named faces leave nothing to solve for."""
+    if any(part.stop <= part.start for part in free_window(space, dirichlet)):
+        raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
 
 
 def solve_notices(

@@ -6,7 +6,6 @@ import functools
 import logging
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +14,7 @@ from parameterize.volume import BSplineVolume
 
 from .balance import balanced, missing_mean
 from .boundary import boundary_coefficients
-from .estimate import error_estimate
-from .failure import ConvergenceError, check_solver, solve_notices
+from .failure import announce, check_solver, check_unknowns, solve_notices
 from .field import SplineField
 from .linear import LinearResult, conjugate_gradients
 from .norms import error_norms
@@ -25,22 +23,14 @@ from .planes import map_planes
 from .precondition import FastDiagonalization, fast_diagonalization
 from .problem import Poisson
 from .quadrature import GaussRule, gauss_rule
-from .report import SolveReport
-from .space import TrialSpace, embedded, longest_edge, trial_space
+from .solution import Solution, solution_of, with_estimate
+from .space import TrialSpace, embedded, trial_space
 from .surface import FaceMass, RobinOperator, face_rule
 from .threads import checked_threads, one_blas_thread
 
 DEVICES = ("cpu", "cuda")
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class Solution(SplineField):
-    """The discrete solution: a spline of the parameters, the map it lives on, and the report."""
-
-    geometry: BSplineVolume
-    report: SolveReport
 
 
 def solve_poisson(
@@ -76,29 +66,16 @@ def solve_poisson(
     check_solver(tolerance, max_iterations)
     check_device(device, problem)
     space = trial_space(volume, refine, degree)
-    if 0 in np.zeros(space.shape)[free_window(space, problem.dirichlet)].shape:
-        raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
+    check_unknowns(space, problem.dirichlet)
     _warm_up()
     prepare(space, problem.reaction is not None)
     with one_blas_thread():
         threads = checked_threads(threads)
         solution = _solve(volume, problem, space, tolerance, max_iterations, certified, threads, device, start)
         if estimate or (estimate is None and problem.exact is None):
-            solution = _with_estimate(solution, space, problem)
-    for notice in solution.report.notices:
-        log.warning("%s", notice)
-    if strict and not solution.report.converged:
-        raise ConvergenceError(solution.report.notices[-1], solution)
+            solution = with_estimate(solution, space, problem)
+    announce(solution, strict)
     return solution
-
-
-def _with_estimate(solution: Solution, space: TrialSpace, problem: Poisson) -> Solution:
-    """The same solution with the estimated error, whose time counts as that of the errors."""
-    start = time.process_time()
-    found = error_estimate(solution.geometry, space, solution.coefficients, problem)
-    seconds = solution.report.seconds
-    seconds = seconds | {"errors": seconds["errors"] + time.process_time() - start}
-    return replace(solution, report=replace(solution.report, estimate=found, seconds=seconds))
 
 
 def check_data(volume: BSplineVolume, problem: Poisson) -> None:
@@ -185,19 +162,8 @@ def _solve(
     if problem.exact is not None:
         errors = error_norms(volume, space, coefficients, problem.exact_at, threads)
     clock.append(time.process_time())
-    report = SolveReport(
-        elements=space.elements,
-        dofs=space.dofs,
-        h=longest_edge(volume, space),
-        iterations=result.iterations,
-        converged=result.converged,
-        residual=result.residuals[-1],
-        seconds=dict(zip(("setup", "solve", "errors"), np.diff(clock).tolist(), strict=True)),
-        errors=errors,
-        notices=solve_notices(volume, space, system, certified, result),
-        residuals=result.residuals,
-    )
-    return Solution(space.degrees, space.knots, coefficients, volume, report)
+    notices = solve_notices(volume, space, system, certified, result)
+    return solution_of(volume, space, coefficients, result, clock, errors, notices)
 
 
 def _iterate(

@@ -73,7 +73,7 @@ class Poisson:
             raise ValueError(
                 "exact is a function, whose Laplacian is unknown: give source=... too, or a formula as exact"
             )
-        if self.source is None and not self.is_smooth_kappa:
+        if self.source is None and not self.is_differentiable:
             raise ValueError("kappa is a function, whose derivatives are unknown: give source=... too, or a formula")
         for name in [f"neumann {face}" for face in self.neumann] + [f"robin {face}" for face in self.robin]:
             if name not in self._parsed and not isinstance(exact, Expression):
@@ -90,7 +90,7 @@ class Poisson:
         return len(self.neumann) == len(FACE_NAMES) and self.reaction is None
 
     @property
-    def is_smooth_kappa(self) -> bool:
+    def is_differentiable(self) -> bool:
         """Whether kappa's derivatives are known."""
         return all(isinstance(entry, Expression) for entry in self._kappa)
 
@@ -101,13 +101,28 @@ class Poisson:
         exact = self._parsed["exact"]
         assert isinstance(exact, Expression)
         value, gradient, hessian = exact.hessian(x, y, z)
-        found = -self.divergence_at(gradient, hessian, x, y, z)
+        found = -self._divergence(gradient, hessian, x, y, z)
         if self.reaction is not None:
             found += self.reaction_at(x, y, z) * value
         return finite("source (from exact)", found, x, y, z)
 
-    def divergence_at(self, gradient: Array, hessian: Array, x: Array, y: Array, z: Array) -> Array:
-        """div(kappa grad u) from the gradient (3, ...) and the Hessian (6, ...) of u; needs kappa as a formula."""
+    def residual_at(self, value: Array, gradient: Array, hessian: Array, x: Array, y: Array, z: Array) -> Array:
+        """Values (1, ...) of f + div(kappa grad u) - c u from u (1, ...), gradient (1, 3, ...) and Hessian (1, 6, ...).
+
+        Needs kappa as formulas.
+        """
+        found = self.source_at(x, y, z) + self._divergence(gradient[0], hessian[0], x, y, z)
+        return (found - self.reaction_at(x, y, z) * value[0])[None]
+
+    def symbol_at(self, wave: Array, x: Array, y: Array, z: Array) -> Array:
+        """Values of k . kappa k + c for wave vectors k (3, ...)."""
+        kappa = self.kappa_at(x, y, z)
+        flux = _times_symmetric(kappa, wave) if len(self._kappa) == 6 else kappa * wave
+        found: Array = (flux * wave).sum(axis=0) + self.reaction_at(x, y, z)
+        return found
+
+    def _divergence(self, gradient: Array, hessian: Array, x: Array, y: Array, z: Array) -> Array:
+        """Values of div(kappa grad u) from the gradient (3, ...) and the Hessian (6, ...) of u."""
         if not self._kappa:
             found: Array = hessian[0] + hessian[3] + hessian[5]
             return found

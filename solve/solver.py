@@ -8,8 +8,9 @@ from parameterize.volume import BSplineVolume
 
 from .elastic_problem import Elasticity
 from .elasticity import check_elastic_data, solve_elasticity
-from .poisson import Solution, check_data, solve_poisson
+from .poisson import check_data, solve_poisson
 from .problem import Poisson
+from .solution import Solution
 
 
 def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity, **options: Any) -> Solution:

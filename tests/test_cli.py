@@ -231,6 +231,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--kappa", "1,2"], "kappa has 2 entries"),
         (["run", "poisson", "cube", "--kappa", "-x"], "--kappa=-x"),
         (["run", "poisson", "cube", "--reaction", "q"], "reaction: expression"),
+        (["run", "poisson", "cube", "--kappa", "x-0.5"], "kappa must be positive"),
         (["run", "poisson", "cube", "--neumann", "top"], "'top' is no face of the cube; the faces are u0, u1"),
         (["run", "poisson", "cube", "--neumann", "u0", "u0=x"], "u0 is given twice"),
         (["run", "poisson", "cube", "--source", "1", "--neumann", "u0"], "neumann u0 has no data"),
