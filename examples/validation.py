@@ -1,8 +1,9 @@
 """The paper's Table 3, Table 4 and Figure 14 for the models it solves Poisson's equation on, ours beside the paper's.
 
 `python examples/validation.py [--preset paper] [--models DIR] [--out DIR] [--steps-factor F]` runs conch and santa4 and
-writes validation.md with the error figures beside it. The paper's santa4 is not public: its row waits for santa4.obj in
-the models' folder (--models, else IGA_NN_DATA, else ../shared/models).
+writes validation.md, and in each folder figure14.png: the error on the boundary and three sections, refined 0 and 1
+times. The paper's santa4 is not public: its row waits for santa4.obj in the models' folder (--models, else IGA_NN_DATA,
+else ../shared/models).
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from typing import Any
 
 import iga_nn
 from iga_nn.cli import main as iga_nn_main
+from iga_nn.plotting import draw_errors
+from iga_nn.rendering import can_draw
 from iga_nn.report import read
 
 ABSENT, FAILED = "model not public", "run failed"
@@ -68,7 +71,19 @@ def _run(model: Path, options: argparse.Namespace) -> Result:
     command = ["run", "poisson", str(model), "--out", str(folder), "--force", "--preset", options.preset]
     command += ["--steps-factor", str(options.steps_factor), "--control-points", str(options.control_points)]
     code = iga_nn_main(command)
-    return (read(folder) if code in (0, 3, 4) else None) or FAILED
+    report = read(folder) if code in (0, 3, 4) else None
+    if report is None:
+        return FAILED
+    _draw_figure_14(folder)
+    return report
+
+
+def _draw_figure_14(folder: Path) -> None:
+    """The paper's Fig. 14 of one model: both meshes in one range of colours."""
+    if can_draw():
+        volume, problem = iga_nn.BSplineVolume.load(folder / "volume.npz"), iga_nn.Poisson(exact="exp(x+z)*sin(y)")
+        solutions = [iga_nn.solve(volume, problem, refine=level) for level in (0, 1)]
+        draw_errors(folder / "figure14.png", volume, solutions, problem)
 
 
 def _document(results: dict[str, Result], options: argparse.Namespace) -> str:
@@ -120,7 +135,7 @@ def _solve_rows(name: str, result: Result) -> list[tuple[str, ...]]:
         return [(name, "", result, "", "", "", "")]
     rows: list[tuple[str, ...]] = []
     for refined, level in enumerate(result["poisson"]["levels"]):
-        figure = f"![error]({name}/error.png)" if refined == len(result["poisson"]["levels"]) - 1 else ""
+        figure = f"![error]({name}/figure14.png)" if refined == len(result["poisson"]["levels"]) - 1 else ""
         numbers = (f"{level['l2']:.3e}", f"{level['l2_relative']:.3e}", str(level["iterations"]))
         rows.append((name, str(refined), str(level["dofs"]), *numbers, figure))
     return rows

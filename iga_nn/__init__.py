@@ -38,16 +38,18 @@ if TYPE_CHECKING:
     from parameterize.mesh import MeshError, Surface, load_surface
     from parameterize.run import Parameterization, parameterize
     from parameterize.volume import BSplineVolume
-    from solve import Poisson, convergence
-    from solve import solve_poisson as solve
+    from solve import Elasticity, Poisson, convergence
+    from solve import solve_problem as solve
 
     from .formats import export, load_volume
-    from .options import InputError, MapOptions, PoissonOptions
+    from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions
     from .pipeline import run
     from .samples import sample
 
 _HOME = {
     "BSplineVolume": "parameterize.volume",
+    "Elasticity": "solve",
+    "ElasticityOptions": "iga_nn.options",
     "InputError": "iga_nn.options",
     "MapOptions": "iga_nn.options",
     "MeshError": "parameterize.mesh",
@@ -64,11 +66,13 @@ _HOME = {
     "preset": "parameterize.config",
     "run": "iga_nn.pipeline",
     "sample": "iga_nn.samples",
-    "solve": "solve:solve_poisson",
+    "solve": "solve:solve_problem",
 }
 
 __all__ = [
     "BSplineVolume",
+    "Elasticity",
+    "ElasticityOptions",
     "InputError",
     "MapOptions",
     "MeshError",

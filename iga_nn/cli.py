@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -19,8 +19,9 @@ from . import __version__, console, pipeline
 from . import report as reports
 from .folder import Outcome
 from .formats import export, is_volume
-from .options import InputError, MapOptions, PoissonOptions, input_errors, one_line
+from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
 
+FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--force", "--displacement")
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
 
 app = App(
@@ -59,8 +60,11 @@ class OutputOptions:
 Output = Annotated[OutputOptions, Parameter(name="*")]
 Mapping = Annotated[MapOptions, Parameter(name="*")]
 Equation = Annotated[PoissonOptions, Parameter(name="*")]
+Body = Annotated[ElasticityOptions, Parameter(name="*")]
+Study = Annotated[StudyOptions, Parameter(name="*")]
 
-NO_OUTPUT, NO_MAPPING, NO_POISSON = OutputOptions(), MapOptions(), PoissonOptions()
+NO_OUTPUT, NO_MAPPING, NO_POISSON, NO_BODY = OutputOptions(), MapOptions(), PoissonOptions(), ElasticityOptions()
+NO_STUDY = StudyOptions()
 
 
 @run_app.command(name="poisson")
@@ -92,15 +96,62 @@ def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapp
 
 
 @solve_app.command(name="poisson")
-def solve_poisson(volume: Path, /, *, output: Output = NO_OUTPUT, poisson: Equation = NO_POISSON) -> int:
-    """Solve Poisson's equation on a volume.
+def solve_poisson(
+    volume: Path,
+    /,
+    *,
+    device: Literal["cpu", "cuda"] = "cpu",
+    output: Output = NO_OUTPUT,
+    poisson: Equation = NO_POISSON,
+) -> int:
+    """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
+
+    The volume's six faces u0, u1, v0, v1, w0, w1, the images of u = 0, u = 1 and so on, carry values of u unless named
+    under --neumann or --robin.
+
+    Args:
+        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+        device: where the linear system is solved.
+    """
+    with console.progress_line(output.quiet):
+        outcome = pipeline.solve_to(volume, output.out, problem=poisson, force=output.force, device=device)
+    return _tell(outcome, output)
+
+
+@solve_app.command(name="elasticity")
+def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body = NO_BODY) -> int:
+    """Solve linear elasticity on a volume.npz.
+
+    A vector is three formulas in x, y, z with semicolons between them, in quotes: "x*y;0;sin(z)". The volume's six
+    faces u0, u1, v0, v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under
+    --traction.
 
     Args:
         volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
     with console.progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, poisson=poisson, force=output.force)
+        outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force)
     return _tell(outcome, output)
+
+
+@app.command(name="study")
+def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = NO_STUDY) -> int:
+    """Solve on finer and finer meshes of a volume.npz: table, CSV and plot of the errors and their rates.
+
+    Results go to STEM-study in the current folder, unless --out names another.
+
+    Args:
+        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+    """
+    with console.progress_line(output.quiet):
+        outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force)
+    if output.as_json:
+        _say(json.dumps(outcome.report["study"], indent=2))
+    else:
+        _say(f"{table}\nresults in {outcome.folder}")
+    if not reports.is_certified(outcome.report):
+        return NOT_CERTIFIED
+    return DONE if reports.is_converged(outcome.report) else NOT_CONVERGED
 
 
 @app.command(name="check")
@@ -202,7 +253,7 @@ def main(argv: list[str]) -> int:
 def _minus_hint(argv: list[str]) -> str:
     """The remedy where a formula was taken for an option."""
     for option, value in pairwise(argv):
-        if option in ("--exact", "--source", "--boundary") and value.startswith("-"):
+        if option in FORMULAS and value.startswith("-"):
             return f" A formula that starts with a minus is written {option}={value}"
     return ""
 
@@ -232,6 +283,8 @@ def _lines(verdict: dict[str, Any]) -> list[str]:
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
     for level in verdict.get("levels", []):
         error = f"L2 error {level['l2']:.3e}, " if "l2" in level else ""
+        if "error_estimate" in level:
+            error += f"estimated L2 error {level['error_estimate']:.1e}, "
         end = "" if level["converged"] else ", NOT CONVERGED"
         lines.append(f"{level['dofs']:>8} unknowns {error}{level['iterations']} iterations{end}")
     lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 if TYPE_CHECKING:
     from parameterize.config import Config
     from parameterize.volume import BSplineVolume
-    from solve import Poisson
+    from solve import Elasticity, Poisson
 
 _CORNERS_BYTES = 65_536
 MAX_CONTROL_POINTS = 100  # per direction
@@ -92,13 +92,20 @@ class MapOptions:
 
 @dataclass(frozen=True)
 class PoissonOptions:
-    """Poisson's problem -Laplace u = f on the volume, u = g on its boundary, and the meshes it is solved on.
+    """-div(kappa grad u) + c u = f on the volume, data on its six faces, and the meshes it is solved on.
+
+    A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on.
 
     Attributes:
         exact: solution as a formula in x, y, z; gives f and g, and errors are reported. The paper's exp(x+z)*sin(y)
             where neither f nor g is given. A formula that starts with a minus is written --exact=-x.
         source: f, a formula in x, y, z.
-        boundary: g, a formula in x, y, z.
+        boundary: g, the values of u, a formula in x, y, z.
+        kappa: one formula, or six with commas between them for a symmetric tensor: xx,xy,xz,yy,yz,zz.
+        reaction: c, a formula in x, y, z.
+        neumann: faces with the flux kappa du/dn, each as FACE=FORMULA, or FACE alone for that of the exact solution.
+        robin: faces with kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
+            solution.
         refine: each level halves every span of the map's knots that many times.
         degree: of the trial space; the map's own by default.
     """
@@ -106,34 +113,161 @@ class PoissonOptions:
     exact: str | None = None
     source: str | None = None
     boundary: str | None = None
+    kappa: str | None = None
+    reaction: str | None = None
+    neumann: tuple[str, ...] = ()
+    robin: tuple[str, ...] = ()
     refine: tuple[int, ...] = (0, 1)
     degree: int | None = None
+
+    section: ClassVar[str] = "poisson"
 
     def problem(self) -> Poisson:
         """The problem these options name. Raises InputError."""
         from solve import Poisson
 
-        if not self.refine or min(self.refine) < 0 or len(set(self.refine)) != len(self.refine):
-            raise InputError(f"refine {self.refine}: give distinct levels, 0 or larger")
-        if max(self.refine) > MAX_REFINE:
-            raise InputError(f"refine {max(self.refine)}: at most {MAX_REFINE}; each level has 8 times the unknowns")
-        if self.degree is not None and not 1 <= self.degree <= 8:
-            raise InputError(f"degree {self.degree}: must lie between 1 and 8")
+        check_space(self.refine, self.degree)
         exact = self.exact
         if exact is None and self.source is None and self.boundary is None:
             exact = DEFAULT_EXACT
+        robin = {}
+        for face, text in _faces("robin", self.robin).items():
+            alpha, colon, g = (text or "").partition(":")
+            if not alpha.strip():
+                raise InputError(f"robin {face}: write {face}=ALPHA or {face}=ALPHA:FORMULA")
+            robin[face] = (alpha, g if colon else None)
         with input_errors():
-            return Poisson(exact=exact, source=self.source, boundary=self.boundary)
-
-    def check_size(self, volume: BSplineVolume) -> None:
-        """Raise InputError where the finest mesh on a volume of these knots has too many unknowns."""
-        from solve.space import trial_space
-
-        dofs = trial_space(volume, max(self.refine), self.degree).dofs
-        if dofs > MAX_DOFS:
-            raise InputError(
-                f"refine {max(self.refine)} gives {dofs:,} unknowns, more than {MAX_DOFS:,}: lower refine or degree"
+            return Poisson(
+                exact=exact,
+                source=self.source,
+                boundary=self.boundary,
+                kappa=self.kappa.split(",") if self.kappa else None,
+                reaction=self.reaction,
+                neumann=_faces("neumann", self.neumann),
+                robin=robin,
             )
+
+
+@dataclass(frozen=True)
+class ElasticityOptions:
+    """Linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
+
+    A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
+    with semicolons between them, in quotes: "x*y;0;sin(z)".
+
+    Attributes:
+        exact: displacement as a vector; gives force and boundary data, and errors are reported. One that starts with
+            a minus is written --exact="-x;0;0".
+        force: force per volume, a vector.
+        displacement: its values on the faces without traction, a vector; zero without it and without exact.
+        traction: faces that are pulled, each as "FACE=VECTOR", or FACE alone for the traction of the exact solution.
+        young: Young's modulus E.
+        poisson_ratio: Poisson's ratio nu.
+        refine: each level halves every span of the map's knots that many times.
+        degree: of the trial space; the map's own by default.
+    """
+
+    exact: str | None = None
+    force: str | None = None
+    displacement: str | None = None
+    traction: tuple[str, ...] = ()
+    young: float = 1.0
+    poisson_ratio: float = 0.3
+    refine: tuple[int, ...] = (0, 1)
+    degree: int | None = None
+
+    section: ClassVar[str] = "elasticity"
+
+    def problem(self) -> Elasticity:
+        """The problem these options name. Raises InputError."""
+        from solve import Elasticity
+
+        check_space(self.refine, self.degree)
+        with input_errors():
+            return Elasticity(
+                exact=_vector(self.exact),
+                force=_vector(self.force),
+                displacement=_vector(self.displacement),
+                traction={face: _vector(text) for face, text in _faces("traction", self.traction).items()},
+                young=self.young,
+                poisson_ratio=self.poisson_ratio,
+            )
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """A known solution of Poisson's problem, and the trial spaces it is approximated in.
+
+    Attributes:
+        exact: the solution, a formula in x, y, z. One that starts with a minus is written --exact=-x.
+        degree: one or more; the map's own by default.
+        refine: levels, each halves every span of the map's knots that many times: 0 1 2, or 0..2.
+    """
+
+    exact: str = DEFAULT_EXACT
+    degree: tuple[int, ...] = ()
+    refine: tuple[str, ...] = ("0..2",)
+
+    def problem(self) -> Poisson:
+        """The problem these options name. Raises InputError."""
+        return PoissonOptions(exact=self.exact).problem()
+
+    def levels(self) -> list[int]:
+        """The refinement levels in order. Raises InputError, also for degrees that cannot be run."""
+        levels = [level for text in self.refine for level in _range(text)]
+        if len(set(self.degree)) != len(self.degree):
+            raise InputError(f"degree {self.degree}: give distinct degrees")
+        for degree in self.degree or (None,):
+            check_space(levels, degree)
+        return sorted(levels)
+
+
+ProblemOptions = PoissonOptions | ElasticityOptions
+
+
+def check_space(refine: Sequence[int], degree: int | None) -> None:
+    """Raise InputError for levels or a degree that cannot be run."""
+    if not refine or min(refine) < 0 or len(set(refine)) != len(refine):
+        raise InputError(f"refine {refine}: give distinct levels, 0 or larger")
+    if max(refine) > MAX_REFINE:
+        raise InputError(f"refine {max(refine)}: at most {MAX_REFINE}; each level has 8 times the unknowns")
+    if degree is not None and not 1 <= degree <= 8:
+        raise InputError(f"degree {degree}: must lie between 1 and 8")
+
+
+def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1) -> None:
+    """Raise InputError where a mesh on a volume of these knots has too many unknowns."""
+    from solve.space import trial_space
+
+    dofs = components * trial_space(volume, refine, degree).dofs
+    if dofs > MAX_DOFS:
+        raise InputError(f"refine {refine} gives {dofs:,} unknowns, more than {MAX_DOFS:,}: lower refine or degree")
+
+
+def _range(text: str) -> list[int]:
+    """A level, or all from the first to the last of "0..4"."""
+    first, dots, last = text.partition("..")
+    if not (first.isdecimal() and (last.isdecimal() or not dots)):
+        raise InputError(f"refine {text!r}: write levels such as 0 1 2, or a range such as 0..2")
+    low, high = int(first), int(last or first)
+    if high > MAX_REFINE:
+        raise InputError(f"refine {high}: at most {MAX_REFINE}; each level has 8 times the unknowns")
+    return list(range(low, high + 1))
+
+
+def _faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
+    """FACE=TEXT and FACE entries as a table. Raises InputError for a face named twice."""
+    found: dict[str, str | None] = {}
+    for entry in entries:
+        face, equals, text = entry.partition("=")
+        if face in found:
+            raise InputError(f"{name}: face {face} is given twice")
+        found[face] = text if equals else None
+    return found
+
+
+def _vector(text: str | None) -> list[str] | None:
+    return None if text is None else text.split(";")
 
 
 def read_corners(path: Path) -> np.ndarray[Any, Any]:

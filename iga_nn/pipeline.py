@@ -15,24 +15,35 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from parameterize.files import save_arrays
+from parameterize.files import save_arrays, save_text
 from parameterize.volume import BSplineVolume
 
 from . import report as reports
+from . import studies
 from .folder import CHECKPOINT, Outcome, RunFolder, has_checkpoint, open_folder
 from .formats import load_volume
-from .options import InputError, MapOptions, PoissonOptions, input_errors, read_corners
+from .options import (
+    InputError,
+    MapOptions,
+    PoissonOptions,
+    ProblemOptions,
+    StudyOptions,
+    check_size,
+    input_errors,
+    read_corners,
+)
 
 if TYPE_CHECKING:
     from parameterize.mesh import Surface
     from parameterize.progress import ProgressCallback
     from parameterize.run import Parameterization
-    from solve import Poisson, Solution
+    from solve import Elasticity, Poisson, Solution
 
 log = logging.getLogger(__name__)
 
 MAP_FILES = ("volume.npz", "boundary.npz", "history.npz", "history.png", "faces.png", "distortion.png")
 SOLUTION_FILES = ("solution.npz", "error.png")
+STUDY_FILES = ("study.csv", "study.png")
 
 
 def run(
@@ -55,7 +66,7 @@ def run(
         raise InputError(f"problem {problem!r}: only 'poisson' can be solved")
     mapping, poisson = mapping or MapOptions(), poisson or PoissonOptions()
     equation, spline = poisson.problem(), mapping.config().spline
-    poisson.check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree))
+    _check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree), poisson)
     with open_folder(mesh, out, force, mapping.resume) as (state, finished):
         if finished and "poisson" not in finished.report:
             volume = finished.folder / "volume.npz"
@@ -87,29 +98,64 @@ def parameterize_to(
 
 
 def solve_to(
-    volume: str | Path, out: str | Path | None = None, *, poisson: PoissonOptions | None = None, force: bool = False
+    volume: str | Path,
+    out: str | Path | None = None,
+    *,
+    problem: ProblemOptions | None = None,
+    force: bool = False,
+    device: str = "cpu",
 ) -> Outcome:
-    """Solve on a saved volume: solution.npz, report.json, error.png; raises as `run` does. Needs no torch."""
-    from solve import check_data
+    """Solve on a saved volume: solution.npz, report.json, error.png; raises as `run` does. On the CPU without torch.
 
-    poisson = poisson or PoissonOptions()
-    equation = poisson.problem()
+    device: where Poisson's linear system is solved, "cpu" or "cuda".
+    """
+    from solve import Poisson, check_device, check_problem
+
+    options = problem or PoissonOptions()
+    equation = options.problem()
     path = Path(volume)
     loaded = load_volume(path)
-    poisson.check_size(loaded)
-    check_data(loaded, equation)
+    _check_size(loaded, options)
+    with input_errors():
+        check_problem(loaded, equation)
+        if isinstance(equation, Poisson):
+            check_device(device, equation)
     with open_folder(path, out, force) as (state, _):
         state.begin(*SOLUTION_FILES)
-        with state.timed("certify"):
-            certificate = _certify(loaded)
-        log.info("certificate: %s", certificate["bijective"])
-        state.write(
-            input={"file": str(volume), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
-            versions=reports.versions(),
-            parameterization=certificate,
-        )
-        _solve(state, loaded, equation, poisson)
+        _write_certificate(state, path, loaded)
+        _solve(state, loaded, equation, options, **({"device": device} if device != "cpu" else {}))
+        if len(equation.dirichlet) < 6:  # the user names faces: show which is which
+            _draw(state, lambda plotting: plotting.draw_face_names(state.folder, loaded))
         return state.finish()
+
+
+def study_to(
+    volume: str | Path, out: str | Path | None = None, *, options: StudyOptions | None = None, force: bool = False
+) -> tuple[Outcome, str]:
+    """A convergence study on a saved volume: study.csv, study.png, report.json, and the table; raises as `run` does."""
+    from solve import check_problem, convergence
+
+    options = options or StudyOptions()
+    equation, levels, path = options.problem(), options.levels(), Path(volume)
+    loaded = load_volume(path)
+    degrees = sorted(options.degree) or [max(loaded.degrees)]
+    for degree in degrees:
+        check_size(loaded, levels[-1], degree)
+    with input_errors():
+        check_problem(loaded, equation)
+    with open_folder(path, out or f"{path.name.split('.')[0]}-study", force) as (state, _):
+        state.begin(*STUDY_FILES)
+        _write_certificate(state, path, loaded)
+        verdict = state.report["parameterization"]["bijective"]
+        study = {}
+        with state.timed("solve"), input_errors():
+            for degree in degrees:
+                study[degree] = convergence(loaded, equation, levels, degree, certified=verdict)
+                log.info("degree %d: done", degree)
+        save_text(state.folder / "study.csv", studies.as_csv(study))
+        state.write(study={"exact": equation.exact, "levels": studies.rows_of(study)})
+        _draw(state, lambda plotting: plotting.draw_study(state.folder / "study.png", study))
+        return state.finish(), studies.as_table(study)
 
 
 def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str, Any]:
@@ -120,6 +166,18 @@ def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str,
 def check_volume(path: str | Path) -> dict[str, Any]:
     """The certificate of a saved volume. Raises InputError for a file that is none."""
     return _certify(load_volume(path))
+
+
+def _write_certificate(state: RunFolder, path: Path, volume: BSplineVolume) -> None:
+    """Certify a saved volume, and write the sections of report.json that say what was given."""
+    with state.timed("certify"):
+        certificate = _certify(volume)
+    log.info("certificate: %s", certificate["bijective"])
+    state.write(
+        input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
+        versions=reports.versions(),
+        parameterization=certificate,
+    )
 
 
 def _parameterize(
@@ -148,6 +206,8 @@ def _parameterize(
         x, y, z = surface.vertices.T
         equation.boundary_at(x, y, z)
         equation.source_at(x, y, z)
+        equation.kappa_at(x, y, z)
+        equation.reaction_at(x, y, z)
     if options.resume and not has_checkpoint(state.folder):
         log.info("no checkpoint, starting anew")
     state.begin(*MAP_FILES, *SOLUTION_FILES)
@@ -185,30 +245,43 @@ def _parameterize(
     return result
 
 
-def _solve(state: RunFolder, volume: BSplineVolume, equation: Poisson, options: PoissonOptions) -> None:
-    from solve import rates, solve_poisson
+def _solve(
+    state: RunFolder,
+    volume: BSplineVolume,
+    equation: Poisson | Elasticity,
+    options: ProblemOptions,
+    **solver: Any,
+) -> None:
+    from solve import Poisson, rates, solve_problem
 
     verdict = state.report["parameterization"]["bijective"]
     solutions: list[Solution] = []
     with state.timed("solve"):
-        for level in sorted(options.refine):
+        for level in sorted(set(options.refine)):
+            if solutions and isinstance(equation, Poisson):
+                solver["start"] = solutions[-1]
             with input_errors():
-                solution = solve_poisson(volume, equation, refine=level, degree=options.degree, certified=verdict)
+                solution = solve_problem(
+                    volume, equation, refine=level, degree=options.degree, certified=verdict, **solver
+                )
             solutions.append(solution)
             log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
             solution.save(state.folder / "solution.npz")  # the finest so far
     found = [solution.report for solution in solutions]
-    given = {"exact": equation.exact, "source": equation.source, "boundary": equation.boundary}
-    state.write(
-        poisson={
-            **{name: formula for name, formula in given.items() if formula is not None},
-            "levels": [item.as_dict() for item in found],
-            "rates": rates(found),
-            "notices": list(dict.fromkeys(notice for item in found for notice in item.notices)),  # each once
-        }
-    )
+    section = {
+        **{name: given for name, given in asdict(options).items() if given and name not in ("refine", "degree")},
+        **({"exact": equation.exact} if isinstance(equation.exact, str) else {}),  # the default one, too
+        "levels": [item.as_dict() for item in found],
+        "rates": rates(found),
+        "notices": list(dict.fromkeys(notice for item in found for notice in item.notices)),  # each once
+    }
+    state.write(**{options.section: section})
     if equation.exact is not None:
         _draw(state, lambda plotting: plotting.draw_solution(state.folder, volume, solutions[-1], equation))
+
+
+def _check_size(volume: BSplineVolume, options: ProblemOptions) -> None:
+    check_size(volume, max(options.refine), options.degree, 3 if options.section == "elasticity" else 1)
 
 
 def _load(mesh: str | Path, component: int | None, max_faces: int) -> Surface:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,22 +15,32 @@ from parameterize.quality import arap
 from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .rendering import Patch, can_draw, draw, widest_view
+from .studies import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from solve import Poisson, Solution
+    from solve import Elasticity, Poisson, Solution
+
+    Problem = Poisson | Elasticity
 
 SAMPLES = 141  # a direction and patch
 PANEL = (900, 700)  # pixels of one view
 FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # distinct for the colour-blind, too
+SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
 MAP = "viridis"  # perceptually uniform
 
 
-def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Poisson) -> None:
+def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
     """Write error.png, where VTK can draw and the solver did not break down."""
     if can_draw() and np.all(np.isfinite(solution.coefficients)):
         draw_error(folder / "error.png", volume, solution, problem)
+
+
+def draw_face_names(folder: Path, volume: BSplineVolume) -> None:
+    """Write faces.png, where VTK can draw."""
+    if can_draw():
+        draw_faces(folder / "faces.png", volume)
 
 
 def draw_map(folder: Path, volume: BSplineVolume, history: dict[str, NDArray[Any]]) -> None:
@@ -54,7 +65,15 @@ def draw_faces(path: Path, volume: BSplineVolume) -> None:
     swatches = [
         Swatch(color=color, label=_face_label(name)) for name, color in zip(FACE_NAMES, FACE_COLORS, strict=True)
     ]
-    figure.legend(handles=swatches, loc="outside lower center", ncols=6, frameon=False, fontsize=12)
+    figure.legend(
+        handles=swatches,
+        loc="outside lower center",
+        ncols=6,
+        frameon=False,
+        fontsize=12,
+        columnspacing=1.2,
+        handlelength=1.4,
+    )
     figure.suptitle("Images of the six faces of the unit cube", fontsize=14)
     _save(figure, path)
 
@@ -71,21 +90,16 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
         energy = arap(volume.grid_jacobian(*grid)).reshape(SAMPLES, SAMPLES)
         patch = Patch(points, _colors(np.tanh(np.sqrt(energy) / 2.0), norm), lit=False)
         panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
-        panel.set_title(f"{AXES[axis]} = 1/2", fontsize=13)
+        panel.set_title(SECTIONS[axis], fontsize=13)
     _color_bar(figure, panels, norm, "tanh(√ARAP / 2), scale as given")
     figure.suptitle("Distortion on the mid-sections", fontsize=14)
     _save(figure, path)
 
 
-def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Poisson) -> None:
+def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
     """|u - u_h| on the boundary and on the three mid-sections, logarithmic colours; the error norms beside it."""
-    from matplotlib.colors import LogNorm
-
-    grids = [_face_grid(face) for face in range(6)] + [_section_grid(axis) for axis in range(3)]
-    points = [volume.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
-    errors = [_error(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
-    top = max(float(error.max()) for error in errors) or 1.0
-    norm = LogNorm(1e-4 * top, top, clip=True)
+    points, errors = _sampled_error(volume, solution, problem)
+    norm = _error_norm([errors])
     figure, rows = _panels(2, 3)
     boundary = [Patch(p, _colors(e, norm)) for p, e in zip(points[:6], errors[:6], strict=True)]
     _show_around(rows[0][:2], boundary)
@@ -93,9 +107,55 @@ def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: P
     for axis, panel in enumerate(rows[1]):
         patch = Patch(points[6 + axis], _colors(errors[6 + axis], norm), lit=False)
         panel.imshow(draw([patch], widest_view(patch.points.reshape(-1, 3)), PANEL))
-        panel.set_title(f"{AXES[axis]} = 1/2", fontsize=13)
+        panel.set_title(SECTIONS[axis], fontsize=13)
     _color_bar(figure, rows, norm, r"$|u - u_h|$")
     figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
+    _save(figure, path)
+
+
+def draw_errors(path: Path, volume: BSplineVolume, solutions: Sequence[Solution], problem: Problem) -> None:
+    """|u - u_h| of several meshes in one range of colours, a row a mesh: the boundary and the three mid-sections.
+
+    The layout of the paper's Fig. 14, with the L2 error marked.
+    """
+    samples = [_sampled_error(volume, solution, problem) for solution in solutions]
+    norm = _error_norm([errors for _, errors in samples])
+    figure, rows = _panels(len(solutions), 4)
+    for row, (points, errors), solution in zip(rows, samples, solutions, strict=True):
+        for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
+            lit = isinstance(shown, slice)
+            chosen = range(6) if isinstance(shown, slice) else (shown,)
+            patches = [Patch(points[i], _colors(errors[i], norm), lit=lit) for i in chosen]
+            cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
+            panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if lit else 0.0), PANEL))
+            panel.set_title(title, fontsize=13)
+        label = f"{solution.report.dofs} unknowns, L2 error {solution.report.l2:.3e}"
+        row[0].text(0.0, 0.0, label, transform=row[0].transAxes, fontsize=14)
+    _color_bar(figure, rows, norm, r"$|u - u_h|$")
+    _save(figure, path)
+
+
+def draw_study(path: Path, study: Study) -> None:
+    """L2 and H1 errors over the mesh size, a curve a degree, with the slopes that smooth solutions have."""
+    figure, panels = _blank(1, 2, (11, 5))
+    for panel, (title, name, lost) in zip(panels, (("L2", "l2", 0), ("H1 seminorm", "h1_seminorm", 1)), strict=True):
+        for (degree, levels), color in zip(study.items(), FACE_COLORS * 2, strict=False):
+            sizes = np.array([level.report.elements for level in levels]) ** (-1.0 / 3.0)
+            errors = _positive(np.array([getattr(level.report, name) for level in levels]))
+            panel.loglog(sizes, errors, "o-", color=color, label=f"degree {degree}")
+            order = degree + 1 - lost
+            reference = 0.6 * errors[-1] * (sizes / sizes[-1]) ** order
+            panel.loglog(sizes, reference, "--", color=color, linewidth=0.8)
+            label = {"textcoords": "offset points", "ha": "center", "color": color, "fontsize": 9}
+            panel.annotate(f"slope {order}", (sizes[-1], reference[-1]), (0, -12), **label)
+        counts = sorted({round(level.report.elements ** (1.0 / 3.0)) for levels in study.values() for level in levels})
+        panel.set_xticks([1.0 / count for count in counts], [f"1/{count}" for count in counts])
+        panel.minorticks_off()
+        panel.set_xlabel("h, the edge of an element in the unit cube")
+        panel.set_title(f"{title} error")
+        panel.grid(alpha=0.3)
+        panel.margins(x=0.12, y=0.08)
+    panels[0].legend(frameon=False)
     _save(figure, path)
 
 
@@ -140,10 +200,27 @@ def _grid(axis: int, value: float) -> tuple[Array, Array, Array]:
     return u, v, w
 
 
-def _error(solution: Solution, problem: Poisson, grid: tuple[Array, Array, Array], points: Array) -> Array:
-    """|u - u_h| at the samples of a grid whose images are `points` (SAMPLES, SAMPLES, 3)."""
+def _error(solution: Solution, problem: Problem, grid: tuple[Array, Array, Array], points: Array) -> Array:
+    """|u - u_h| at the samples of a grid whose images are `points` (SAMPLES, SAMPLES, 3); of vectors, the length."""
     exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
-    return np.abs(solution.grid(*grid).reshape(SAMPLES, SAMPLES) - exact)
+    found = solution.grid(*grid).reshape(SAMPLES, SAMPLES, -1)
+    wanted = np.moveaxis(exact.reshape(-1, SAMPLES, SAMPLES), 0, -1)  # (SAMPLES, SAMPLES, 1 or 3)
+    return np.linalg.norm(found - wanted, axis=-1)
+
+
+def _sampled_error(volume: BSplineVolume, solution: Solution, problem: Problem) -> tuple[list[Array], list[Array]]:
+    """Points (SAMPLES, SAMPLES, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
+    grids = [_face_grid(face) for face in range(6)] + [_section_grid(axis) for axis in range(3)]
+    points = [volume.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
+    return points, [_error(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
+
+
+def _error_norm(meshes: Sequence[Sequence[Array]]) -> Any:
+    """Logarithmic colours from the largest error of all meshes to four decades below that of the best one."""
+    from matplotlib.colors import LogNorm
+
+    tops = [max(float(error.max()) for error in errors) or 1.0 for errors in meshes]
+    return LogNorm(1e-4 * min(tops), max(tops), clip=True)
 
 
 def _colors(values: Array, norm: Any) -> Array:
@@ -154,7 +231,7 @@ def _colors(values: Array, norm: Any) -> Array:
 
 
 def _face_label(name: str) -> str:
-    return f"{name[0]} = {name[1]}"
+    return f"{name}: {name[0]} = {name[1]}"
 
 
 def _positive(values: NDArray[Any]) -> Array:

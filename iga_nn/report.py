@@ -71,7 +71,12 @@ def is_certified(report: Report) -> bool:
 
 def is_converged(report: Report) -> bool:
     """Whether every solve converged; True where nothing was solved."""
-    return all(level["converged"] for level in report.get("poisson", {}).get("levels", []))
+    return all(level["converged"] for level in solved(report).get("levels", []))
+
+
+def solved(report: Report) -> Report:
+    """The section of the problem that was solved, empty without one."""
+    return next((report[name] for name in ("poisson", "elasticity", "study") if name in report), {})
 
 
 def verdict(report: Report, folder: Path) -> Report:
@@ -81,9 +86,10 @@ def verdict(report: Report, folder: Path) -> Report:
     if "arap" in quality:
         short["arap"] = quality["arap"]
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
-    if "poisson" in report:
-        keys = ("dofs", "l2", "l2_relative", "h1_seminorm", "iterations", "converged")
-        short["levels"] = [{key: level[key] for key in keys if key in level} for level in report["poisson"]["levels"]]
-        short["notices"] = report["poisson"]["notices"]
+    if section := solved(report):
+        errors = ("l2", "l2_relative", "h1_seminorm", "error_estimate", "error_estimate_relative")
+        keys = ("dofs", *errors, "iterations", "converged")
+        short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]
+        short["notices"] = section["notices"]
     short["seconds"] = report["seconds"]["total"]
     return short

@@ -5,13 +5,14 @@ Projection instead of interpolation at Greville points lowers the L2 error of th
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from itertools import product
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from parameterize.bspline import Array, apply_along, collocation, gauss_points
-from parameterize.volume import BSplineVolume
+from parameterize.volume import FACE_NAMES, BSplineVolume
 
 from .operators import ScalarFunction
 from .space import TrialSpace
@@ -20,15 +21,17 @@ FREE = None
 Entity = tuple[int | None, ...]  # per direction: the side 0 or 1, or FREE
 
 
-def boundary_coefficients(volume: BSplineVolume, space: TrialSpace, values: ScalarFunction) -> Array:
-    """Coefficients (n_u, n_v, n_w) of the boundary data's approximation, zero inside.
+def boundary_coefficients(
+    volume: BSplineVolume, space: TrialSpace, values: ScalarFunction, faces: Collection[str] = FACE_NAMES
+) -> Array:
+    """Coefficients (n_u, n_v, n_w) of the approximation of boundary data on the named faces, zero elsewhere.
 
     The 8 corners, 12 edges and 6 faces follow one another; each takes up what the smaller ones have fixed.
     """
     coefficients = np.zeros(space.shape)
-    entities = sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE))
-    for entity in entities[:-1]:  # the last one is the interior
-        _project(volume, space, values, entity, coefficients)
+    for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
+        if any(FACE_NAMES[2 * axis + side] in faces for axis, side in enumerate(entity) if side is not FREE):
+            _project(volume, space, values, entity, coefficients)
     return coefficients
 
 

@@ -1,8 +1,8 @@
 """Formulas a user types, such as "exp(x+z)*sin(y)": parsed by a whitelist, evaluated on arrays with derivatives.
 
 Nothing is ever passed to eval or exec. Python's own parser makes the tree; every node is then checked against the few
-kinds allowed and translated. Value, gradient and Laplacian follow together by forward automatic differentiation
-(Griewank and Walther, *Evaluating Derivatives*, 2nd ed., chapter 13), so a source -Laplace(u) is exact.
+kinds allowed and translated. Value, gradient and Hessian follow together by forward automatic differentiation
+(Griewank and Walther, *Evaluating Derivatives*, 2nd ed., chapter 13), so a source -div(kappa grad u) is exact.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Number = float | Array  # constants stay NumPy scalars (a kind of float): products with 0.0 and 1.0 are then free
-Gradient = tuple[Number, Number, Number]
+Numbers = tuple[Number, ...]
+PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six second derivatives
 
 MAX_LENGTH = 1000
 MAX_DEPTH = 100
@@ -33,11 +34,14 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Jet:
-    """A function's value, gradient and Laplacian at the points of an array; constants are scalars."""
+    """A function's value, gradient and Hessian (xx, xy, xz, yy, yz, zz) at the points of an array.
+
+    What is constant is a scalar. Variables seeded without Hessian carry none, and no work is spent on it.
+    """
 
     value: Number
-    gradient: Gradient = (0.0, 0.0, 0.0)
-    laplacian: Number = 0.0
+    gradient: Numbers = (0.0, 0.0, 0.0)
+    hessian: Numbers = (0.0,) * 6
 
 
 def _plus(a: Number, b: Number) -> Number:
@@ -53,39 +57,44 @@ def _times(a: Number, b: Number) -> Number:
     return a * b
 
 
-def _dot(a: Jet, b: Jet) -> Number:
-    total: Number = 0.0
-    for da, db in zip(a.gradient, b.gradient, strict=True):
-        total = _plus(total, _times(da, db))
-    return total
-
-
-def _combine(operation: Callable[..., Number], *gradients: Gradient) -> Gradient:
-    """Apply an operation component by component."""
-    x, y, z = (operation(*components) for components in zip(*gradients, strict=True))
-    return x, y, z
+def _combine(operation: Callable[..., Number], *rows: Numbers) -> Numbers:
+    """Apply an operation entry by entry; the shortest row, a Hessian left out, decides how many there are."""
+    return tuple(operation(*entries) for entries in zip(*rows, strict=False))
 
 
 def _add(a: Jet, b: Jet) -> Jet:
-    return Jet(a.value + b.value, _combine(_plus, a.gradient, b.gradient), _plus(a.laplacian, b.laplacian))
+    return Jet(a.value + b.value, _combine(_plus, a.gradient, b.gradient), _combine(_plus, a.hessian, b.hessian))
 
 
 def _scale(factor: float, a: Jet) -> Jet:
-    gradient = _combine(lambda da: _times(factor, da), a.gradient)
-    return Jet(factor * a.value, gradient, _times(factor, a.laplacian))
+    gradient, hessian = (_combine(lambda da: _times(factor, da), row) for row in (a.gradient, a.hessian))
+    return Jet(factor * a.value, gradient, hessian)
 
 
 def _multiply(a: Jet, b: Jet) -> Jet:
-    """Product rule: Laplace(a b) = a Laplace(b) + 2 grad a . grad b + b Laplace(a)."""
-    gradient = _combine(lambda da, db: _plus(_times(a.value, db), _times(b.value, da)), a.gradient, b.gradient)
-    outer = _plus(_times(a.value, b.laplacian), _times(b.value, a.laplacian))
-    return Jet(a.value * b.value, gradient, _plus(outer, _times(2.0, _dot(a, b))))
+    """Product rule: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
+
+    def product(da: Number, db: Number) -> Number:
+        return _plus(_times(a.value, db), _times(b.value, da))
+
+    def mixed(second_a: Number, second_b: Number, pair: tuple[int, int]) -> Number:
+        i, j = pair
+        one, other = _times(a.gradient[i], b.gradient[j]), _times(a.gradient[j], b.gradient[i])
+        return _plus(product(second_a, second_b), _plus(one, other))
+
+    hessian = tuple(mixed(*entries) for entries in zip(a.hessian, b.hessian, PAIRS, strict=False))
+    return Jet(a.value * b.value, _combine(product, a.gradient, b.gradient), hessian)
 
 
 def _chain(a: Jet, value: Number, first: Number, second: Number) -> Jet:
-    """Chain rule for h(a) from h, h' and h'' at a: Laplace(h(a)) = h' Laplace(a) + h'' |grad a|^2."""
+    """Chain rule for h(a) from h, h' and h'' at a: h(a)_ij = h' a_ij + h'' a_i a_j."""
+
+    def entry(second_a: Number, pair: tuple[int, int]) -> Number:
+        i, j = pair
+        return _plus(_times(first, second_a), _times(second, _times(a.gradient[i], a.gradient[j])))
+
     gradient = _combine(lambda da: _times(first, da), a.gradient)
-    return Jet(value, gradient, _plus(_times(first, a.laplacian), _times(second, _dot(a, a))))
+    return Jet(value, gradient, tuple(entry(*entries) for entries in zip(a.hessian, PAIRS, strict=False)))
 
 
 def _raise_to(a: Jet, n: float) -> Jet:
@@ -168,14 +177,35 @@ class Expression:
             jet = self._evaluate((Jet(points[0]), Jet(points[1]), Jet(points[2])))
         return np.broadcast_to(np.asarray(jet.value), points[0].shape)
 
-    def jet(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array, Array]:
-        """Value (...), gradient (3, ...) and Laplacian (...) at points given by arrays of equal shape."""
+    def gradient(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array]:
+        """Value (...) and gradient (3, ...) at points given by arrays of equal shape."""
+        value, gradient, _ = self._derivatives((), x, y, z)
+        return value, gradient
+
+    def hessian(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array, Array]:
+        """Value (...), gradient (3, ...) and Hessian (6, ...) at points given by arrays of equal shape.
+
+        The order of the second derivatives is xx, xy, xz, yy, yz, zz.
+        """
+        return self._derivatives((0.0,) * 6, x, y, z)
+
+    def _derivatives(self, seconds: Numbers, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array, Array]:
         points = _coordinates(x, y, z)
-        seeds = (Jet(points[0], (1.0, 0.0, 0.0)), Jet(points[1], (0.0, 1.0, 0.0)), Jet(points[2], (0.0, 0.0, 1.0)))
+        units = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        seeds = [Jet(point, unit, seconds) for point, unit in zip(points, units, strict=True)]
         with np.errstate(all="ignore"):
-            jet = self._evaluate(seeds)
-        rows = [np.broadcast_to(np.asarray(row), points[0].shape) for row in (jet.value, *jet.gradient, jet.laplacian)]
-        return rows[0], np.stack(rows[1:4]), rows[4]
+            jet = self._evaluate((seeds[0], seeds[1], seeds[2]))
+        shape = points[0].shape
+        value = np.broadcast_to(np.asarray(jet.value), shape)
+        return value, _stacked(jet.gradient, shape), _stacked(jet.hessian[: len(seconds)], shape)
+
+
+def _stacked(rows: Numbers, shape: tuple[int, ...]) -> Array:
+    """Rows, constants among them, as one array (len(rows), *shape)."""
+    full = np.empty((len(rows), *shape))
+    for i, row in enumerate(rows):
+        full[i] = row
+    return full
 
 
 def _coordinates(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> list[Array]:

@@ -1,4 +1,4 @@
-"""SplineField: a scalar trivariate spline on the unit cube, as solution.npz holds it."""
+"""SplineField: a scalar or vector-valued trivariate spline on the unit cube, as solution.npz holds it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from parameterize.volume import AXES
 
 @dataclass(frozen=True, eq=False)
 class SplineField:
-    """A scalar function of the parameters.
+    """A function of the parameters.
 
-    degrees: one per direction. knots: three open knot vectors on [0, 1]. coefficients: (m_u, m_v, m_w).
+    degrees: one per direction. knots: three open knot vectors on [0, 1]. coefficients: (m_u, m_v, m_w), with three
+    components (m_u, m_v, m_w, 3).
     Raises ValueError where the parts do not fit together.
     """
 
@@ -26,18 +27,21 @@ class SplineField:
     coefficients: Array
 
     def __post_init__(self) -> None:
-        if len(self.degrees) != 3 or len(self.knots) != 3 or np.ndim(self.coefficients) != 3:
-            raise ValueError("a field has three degrees, three knot vectors and coefficients (m_u, m_v, m_w)")
-        for axis, degree, knots, n in zip(AXES, self.degrees, self.knots, np.shape(self.coefficients), strict=True):
+        shape = np.shape(self.coefficients)
+        if len(self.degrees) != 3 or len(self.knots) != 3 or len(shape) < 3 or shape[3:] not in ((), (3,)):
+            raise ValueError(
+                "a field has three degrees, three knot vectors, coefficients (m_u, m_v, m_w) or with (, 3)"
+            )
+        for axis, degree, knots, n in zip(AXES, self.degrees, self.knots, shape[:3], strict=True):
             if len(check_knots(knots, degree)) != n + degree + 1:
                 raise ValueError(f"direction {axis}: {n} coefficients of degree {degree} need {n + degree + 1} knots")
 
     def __call__(self, points: ArrayLike) -> Array:
-        """Values (m,) at parameters (m, 3)."""
+        """Values (m,) or (m, 3) at parameters (m, 3)."""
         return evaluate_at(self.degrees, self.knots, self.coefficients, points)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
-        """Values (len(u), len(v), len(w)) on a tensor grid of parameters."""
+        """Values (len(u), len(v), len(w)) or (len(u), len(v), len(w), 3) on a tensor grid of parameters."""
         return evaluate_grid(self.degrees, self.knots, self.coefficients, (u, v, w))
 
     def save(self, path: str | Path) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from parameterize.bspline import Array
 
 Index = NDArray[np.int64]
+LANES = 32  # points of direction v in a block of factors
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
@@ -126,102 +127,92 @@ def integrate_plane(field: Array, first_v: Index, v: Array, first_w: Index, w: A
 
 
 @compiled
-def plane_factors(fields: Array, weights: Array, factors: Array, measure: Array) -> None:
+def plane_factors(fields: Array, weights: Array, kappa: Array, factors: Array, measure: Array) -> None:
     """Geometry of a plane from fields (3, 4, q_w, q_v), a map's components as `evaluate_plane` gives them.
 
-    Writes factors (q_w, 6, q_v) = w det J J^-1 J^-T and measure (q_w, q_v) = w det J.
+    Writes factors (v blocks, q_w, 6 or 7, LANES): w kappa det J J^-1 J^-T, zero where a block exceeds the plane, and
+    measure (q_w, q_v) = w det J. kappa: (q_w, q_v).
     """
     n_w, n_v = weights.shape
+    near = np.zeros(12 * LANES)  # a row's tangents, weights, coefficients and measure, at fixed distances
+    for a in range(3):  # the identity: lanes beyond the plane must not divide by zero
+        near[4 * a * LANES : (4 * a + 1) * LANES] = 1.0
+    for block in range(factors.shape[0]):
+        start = block * LANES
+        width = min(LANES, n_v - start)
+        for q in range(n_w):
+            for a in range(3):
+                for b in range(3):
+                    to, row = (3 * a + b) * LANES, fields[a, b + 1, q, start : start + width]
+                    for m in range(width):
+                        near[to + m] = row[m]
+            row, row_kappa = weights[q, start : start + width], kappa[q, start : start + width]
+            near[9 * LANES : 11 * LANES] = 0.0
+            for m in range(width):
+                near[9 * LANES + m] = row[m]
+                near[10 * LANES + m] = row_kappa[m]
+            _block_factors(near, factors[block, q].reshape(-1))
+            row = measure[q, start : start + width]
+            for m in range(width):
+                row[m] = near[11 * LANES + m]
+
+
+@compiled
+def _block_factors(near: Array, factors: Array) -> None:
+    for m in range(LANES):
+        xu, xv, xw = near[m], near[LANES + m], near[2 * LANES + m]
+        yu, yv, yw = near[3 * LANES + m], near[4 * LANES + m], near[5 * LANES + m]
+        zu, zv, zw = near[6 * LANES + m], near[7 * LANES + m], near[8 * LANES + m]
+        # rows of det J J^-1: the cross products of the tangents
+        ax, ay, az = yv * zw - zv * yw, zv * xw - xv * zw, xv * yw - yv * xw
+        bx, by, bz = yw * zu - zw * yu, zw * xu - xw * zu, xw * yu - yw * xu
+        cx, cy, cz = yu * zv - zu * yv, zu * xv - xu * zv, xu * yv - yu * xv
+        det = xu * ax + yu * ay + zu * az
+        weight = near[9 * LANES + m]
+        scale = weight * near[10 * LANES + m] / det
+        near[11 * LANES + m] = weight * det
+        factors[m] = scale * (ax * ax + ay * ay + az * az)
+        factors[LANES + m] = scale * (ax * bx + ay * by + az * bz)
+        factors[2 * LANES + m] = scale * (ax * cx + ay * cy + az * cz)
+        factors[3 * LANES + m] = scale * (bx * bx + by * by + bz * bz)
+        factors[4 * LANES + m] = scale * (bx * cx + by * cy + bz * cz)
+        factors[5 * LANES + m] = scale * (cx * cx + cy * cy + cz * cz)
+
+
+@compiled
+def plane_tensor_factors(fields: Array, weights: Array, kappa: Array, factors: Array, measure: Array) -> None:
+    """As `plane_factors` with a symmetric tensor kappa (6, q_w, q_v): w det J J^-1 kappa J^-T."""
+    factors[:] = 0.0
+    n_w, n_v = weights.shape
+    rows = np.empty((3, 3))  # of det J J^-1
+    fluxes = np.empty((3, 3))  # each row times kappa
     for q in range(n_w):
         for m in range(n_v):
-            xu, xv, xw = fields[0, 1, q, m], fields[0, 2, q, m], fields[0, 3, q, m]
-            yu, yv, yw = fields[1, 1, q, m], fields[1, 2, q, m], fields[1, 3, q, m]
-            zu, zv, zw = fields[2, 1, q, m], fields[2, 2, q, m], fields[2, 3, q, m]
-            # rows of det J J^-1: the cross products of the tangents
-            ax, ay, az = yv * zw - zv * yw, zv * xw - xv * zw, xv * yw - yv * xw
-            bx, by, bz = yw * zu - zw * yu, zw * xu - xw * zu, xw * yu - yw * xu
-            cx, cy, cz = yu * zv - zu * yv, zu * xv - xu * zv, xu * yv - yu * xv
-            det = xu * ax + yu * ay + zu * az
-            scale = weights[q, m] / det
-            factors[q, 0, m] = scale * (ax * ax + ay * ay + az * az)
-            factors[q, 1, m] = scale * (ax * bx + ay * by + az * bz)
-            factors[q, 2, m] = scale * (ax * cx + ay * cy + az * cz)
-            factors[q, 3, m] = scale * (bx * bx + by * by + bz * bz)
-            factors[q, 4, m] = scale * (bx * cx + by * cy + bz * cz)
-            factors[q, 5, m] = scale * (cx * cx + cy * cy + cz * cz)
+            for a in range(3):
+                b, c = (a + 1) % 3, (a + 2) % 3
+                for i in range(3):
+                    j, k = (i + 1) % 3, (i + 2) % 3
+                    rows[a, i] = (
+                        fields[j, b + 1, q, m] * fields[k, c + 1, q, m]
+                        - fields[k, b + 1, q, m] * fields[j, c + 1, q, m]
+                    )
+            xx, xy, xz = kappa[0, q, m], kappa[1, q, m], kappa[2, q, m]
+            yy, yz, zz = kappa[3, q, m], kappa[4, q, m], kappa[5, q, m]
+            for a in range(3):
+                x, y, z = rows[a, 0], rows[a, 1], rows[a, 2]
+                fluxes[a, 0] = xx * x + xy * y + xz * z
+                fluxes[a, 1] = xy * x + yy * y + yz * z
+                fluxes[a, 2] = xz * x + yz * y + zz * z
+            det = 0.0
+            for i in range(3):
+                det += fields[i, 1, q, m] * rows[0, i]
+            index = 0
+            for a in range(3):
+                for b in range(a, 3):
+                    dot = rows[b, 0] * fluxes[a, 0] + rows[b, 1] * fluxes[a, 1] + rows[b, 2] * fluxes[a, 2]
+                    factors[m // LANES, q, index, m % LANES] = weights[q, m] / det * dot
+                    index += 1
             measure[q, m] = weights[q, m] * det
-
-
-@compiled
-def apply_stiffness(
-    x: Array,
-    first_u: Index,
-    u: Array,
-    first_v: Index,
-    v: Array,
-    first_w: Index,
-    w: Array,
-    factors: Array,
-    result: Array,
-) -> None:
-    """Stiffness times x: result = A x, both (n_u, n_v, n_w), from factors (q_u, q_w, 6, q_v).
-
-    The gradient lives one row of q_v points at a time, between the contraction in w and its transpose.
-    """
-    _, n_v, n_w = x.shape
-    planes = np.empty((2, n_v, n_w))
-    lines = np.empty((3, n_w, v.shape[1]))
-    sums = np.empty((3, n_w, v.shape[1]))
-    rows = np.empty((3, v.shape[1]))
-    result[:] = 0.0
-    for p in range(u.shape[1]):
-        u_here = np.ascontiguousarray(u[:, p])
-        contract_uv(x, first_u[p], u_here, first_v, v, planes, lines)
-        sums[:] = 0.0
-        for q in range(w.shape[1]):
-            _gradient_row(lines, first_w[q], w[0, q], w[1, q], rows)
-            _flux_row(factors[p, q], rows)
-            _spread_row(rows, first_w[q], w[0, q], w[1, q], sums)
-        spread_uv(sums, first_u[p], u_here, first_v, v, planes, result)
-
-
-@compiled
-def _gradient_row(lines: Array, first: int, values: Array, slopes: Array, rows: Array) -> None:
-    """Contract w: rows (3, q_v) = d/du, d/dv, d/dw at one point of w."""
-    rows[:] = 0.0
-    row_u, row_v, row_w = rows[0], rows[1], rows[2]
-    for k in range(values.size):
-        value, slope = values[k], slopes[k]
-        line, line_u, line_v = lines[0, first + k], lines[1, first + k], lines[2, first + k]
-        for m in range(row_u.size):
-            row_u[m] += value * line_u[m]
-            row_v[m] += value * line_v[m]
-            row_w[m] += slope * line[m]
-
-
-@compiled
-def _flux_row(factors: Array, rows: Array) -> None:
-    """Multiply the gradients of a row by their symmetric factors (6, q_v), in place."""
-    row_u, row_v, row_w = rows[0], rows[1], rows[2]
-    uu, uv, uw, vv, vw, ww = factors[0], factors[1], factors[2], factors[3], factors[4], factors[5]
-    for m in range(row_u.size):
-        a, b, c = row_u[m], row_v[m], row_w[m]
-        row_u[m] = uu[m] * a + uv[m] * b + uw[m] * c
-        row_v[m] = uv[m] * a + vv[m] * b + vw[m] * c
-        row_w[m] = uw[m] * a + vw[m] * b + ww[m] * c
-
-
-@compiled
-def _spread_row(rows: Array, first: int, values: Array, slopes: Array, sums: Array) -> None:
-    """Transpose of `_gradient_row`: adds to sums (3, n_w, q_v)."""
-    row_u, row_v, row_w = rows[0], rows[1], rows[2]
-    for k in range(values.size):
-        value, slope = values[k], slopes[k]
-        line, line_u, line_v = sums[0, first + k], sums[1, first + k], sums[2, first + k]
-        for m in range(row_u.size):
-            line[m] += slope * row_w[m]
-            line_u[m] += value * row_u[m]
-            line_v[m] += value * row_v[m]
 
 
 @compiled

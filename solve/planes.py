@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -30,15 +30,17 @@ class PlaneField:
         kernels.evaluate_plane(self._coefficients, u.first[q], weights, *v, *w, out)
 
 
-def map_planes(volume: BSplineVolume, rule: GaussRule) -> Iterator[tuple[int, Array]]:
+def map_planes(
+    volume: BSplineVolume, rule: GaussRule, points: Iterable[int] | None = None
+) -> Iterator[tuple[int, Array]]:
     """For every point q of direction u: q and the map on its plane, (3, 4, q_w, q_v): components x value and gradient.
 
-    The array is reused from one step to the next.
+    points: the q wanted, default all. The array is reused from one step to the next.
     """
     tables = rule.tabulate(volume.degrees, volume.knots)
     components = [PlaneField(volume.control_points[..., c], tables) for c in range(3)]
     fields = np.empty((3, 4, *rule.plane_shape))
-    for q in range(rule.shape[0]):
+    for q in range(rule.shape[0]) if points is None else points:
         for component, out in zip(components, fields, strict=True):
             component.evaluate(q, out)
         yield q, fields

@@ -1,46 +1,36 @@
-"""solve_poisson: from a volume and a problem to a solution with its errors."""
+"""solve_poisson: from a volume and a scalar problem to a solution with its errors."""
 
 from __future__ import annotations
 
 import functools
 import logging
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 
+from parameterize.bspline import Array
 from parameterize.volume import BSplineVolume
 
+from .balance import balanced, missing_mean
 from .boundary import boundary_coefficients
+from .failure import announce, check_solver, check_unknowns, solve_notices
 from .field import SplineField
-from .linear import conjugate_gradients
+from .linear import LinearResult, conjugate_gradients
 from .norms import error_norms
-from .operators import System, assemble
+from .operators import Operator, System, assemble, free_window, prepare
 from .planes import map_planes
-from .precondition import fast_diagonalization
+from .precondition import FastDiagonalization, fast_diagonalization
 from .problem import Poisson
-from .quadrature import gauss_rule
-from .report import SolveReport
-from .space import TrialSpace, longest_edge, trial_space
+from .quadrature import GaussRule, gauss_rule
+from .solution import Solution, solution_of, with_estimate
+from .space import TrialSpace, embedded, trial_space
+from .surface import FaceMass, RobinOperator, face_rule
+from .threads import checked_threads, one_blas_thread
+
+DEVICES = ("cpu", "cuda")
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class Solution(SplineField):
-    """The discrete solution: a scalar spline of the parameters, the map it lives on, and the report."""
-
-    geometry: BSplineVolume
-    report: SolveReport
-
-
-class ConvergenceError(RuntimeError):
-    """The linear solver did not reach its tolerance; the last iterate is `solution`."""
-
-    def __init__(self, solution: Solution) -> None:
-        self.solution = solution
-        report = solution.report
-        super().__init__(f"no convergence: residual {report.residual:.1e} after {report.iterations} iterations")
 
 
 def solve_poisson(
@@ -53,43 +43,80 @@ def solve_poisson(
     max_iterations: int = 1000,
     certified: str | None = None,
     strict: bool = False,
+    estimate: bool | None = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    start: SplineField | None = None,
 ) -> Solution:
-    """Solve -Laplace u = f with Dirichlet data on a volume.
+    """Solve -div(kappa grad u) + c u = f on a volume.
 
     refine: how often every span of the map's knots is halved for the trial space; degree: default the map's own.
     tolerance: of |r| / |b| for the linear solver.
     certified: the verdict of the map's certificate, if known; anything but "certified" is logged and noted.
+    threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
+    device: "cpu", or "cuda" for the iteration on a GPU by torch (not with Robin faces).
+    start: a solution in a space that this one contains, as that of one refinement less: the iteration starts there
+        instead of at zero, and saves a third on maps that take many.
+    estimate: of the error, from the residual; default: where the problem has no exact solution.
     strict: raise ConvergenceError where the linear solver fails; otherwise the report says `converged` is False.
 
-    Raises ValueError for arguments out of range, ExpressionError where the data are not finite.
+    Raises ValueError for arguments out of range and for Neumann data that do not balance the source, ExpressionError
+    where the data are not finite or have the wrong sign.
     """
-    if not 0.0 < tolerance < 1.0:
-        raise ValueError(f"tolerance must lie between 0 and 1, got {tolerance}")
-    if max_iterations < 1:
-        raise ValueError(f"max_iterations must be at least 1, got {max_iterations}")
+    check_solver(tolerance, max_iterations)
+    check_device(device, problem)
     space = trial_space(volume, refine, degree)
-    if min(space.shape) < 3:
-        raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
+    check_unknowns(space, problem.dirichlet)
     _warm_up()
-    solution = _solve(volume, problem, space, tolerance, max_iterations, certified)
-    for notice in solution.report.notices:
-        log.warning("%s", notice)
-    if strict and not solution.report.converged:
-        raise ConvergenceError(solution)
+    prepare(space, problem.reaction is not None)
+    with one_blas_thread():
+        threads = checked_threads(threads)
+        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, threads, device, start)
+        if estimate or (estimate is None and problem.exact is None):
+            solution = with_estimate(solution, space, problem)
+    announce(solution, strict)
     return solution
 
 
 def check_data(volume: BSplineVolume, problem: Poisson) -> None:
     """Evaluate a problem's data where the coarsest solve needs them; finer levels need them at points between.
 
-    Raises ExpressionError where they are not finite.
+    Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
     space = trial_space(volume)
-    boundary_coefficients(volume, space, problem.boundary_at)
-    for _, fields in map_planes(volume, gauss_rule(space)):
-        problem.source_at(*fields[:, 0])
-        if problem.exact is not None:
+    boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet)
+    system = _assemble(volume, space, problem, gauss_rule(space))
+    _add_faces(volume, space, problem, system.load)
+    if problem.is_floating:
+        balanced(system.load)
+    if problem.exact is not None:
+        for _, fields in map_planes(volume, gauss_rule(space)):
             problem.exact_at(*fields[:, 0])
+
+
+def _assemble(volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: GaussRule, threads: int = 1) -> System:
+    return assemble(
+        volume,
+        space,
+        problem.source_at,
+        rule,
+        kappa=None if problem.kappa is None else problem.kappa_at,
+        reaction=None if problem.reaction is None else problem.reaction_at,
+        window=free_window(space, problem.dirichlet),
+        threads=threads,
+    )
+
+
+def check_device(device: str, problem: Poisson) -> None:
+    """Raise ValueError for a device that is unknown or absent, or that cannot solve the problem."""
+    if device not in DEVICES:
+        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
+    if device != "cpu":
+        if problem.robin:
+            raise ValueError(f"device {device!r} does not know Robin faces; use device='cpu'")
+        from .cuda import check_available  # torch comes in here only
+
+        check_available(device)
 
 
 @functools.cache
@@ -98,7 +125,8 @@ def _warm_up() -> None:
     log.info("preparing the compiled kernels: some seconds on the first use, then they are cached")
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
-    _solve(cube, Poisson(exact="x*x"), trial_space(cube, 1), 1e-10, 10, None)
+    for problem in (Poisson(exact="x*x"), Poisson(exact="x*x", kappa=["1", "0", "0", "1", "0", "1"])):
+        _solve(cube, problem, trial_space(cube, 1), 1e-10, 10, None, 1, "cpu")
 
 
 def _solve(
@@ -108,40 +136,69 @@ def _solve(
     tolerance: float,
     max_iterations: int,
     certified: str | None,
+    threads: int,
+    device: str,
+    start: SplineField | None = None,
 ) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
-    system = assemble(volume, space, problem.source_at, rule)
-    coefficients = boundary_coefficients(volume, space, problem.boundary_at)
-    residual = (system.load - system.stiffness.apply(coefficients))[1:-1, 1:-1, 1:-1]
-    preconditioner = fast_diagonalization(system.stiffness, rule)
+    system = _assemble(volume, space, problem, rule, threads)
+    robin = _add_faces(volume, space, problem, system.load)
+    operator = RobinOperator(system.operator, tuple(robin.values())) if robin else system.operator
+    coefficients = boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet)
+    window = system.operator.window
+    right = (system.load - operator.apply(coefficients))[window]
+    preconditioner = _preconditioner(system.operator, rule, robin)
+    if preconditioner.singular:
+        right = balanced(right)
     clock.append(time.process_time())
-    result = conjugate_gradients(system.stiffness.apply_inside, residual, preconditioner, tolerance, max_iterations)
-    coefficients[1:-1, 1:-1, 1:-1] = result.x
+    guess = None if start is None else embedded(start.coefficients, start.degrees, start.knots, space)[window]
+    result = _iterate(operator, right, preconditioner, tolerance, max_iterations, device, guess)
+    coefficients[window] = result.x
+    if preconditioner.singular:
+        coefficients += missing_mean(volume, space, coefficients, problem)
     clock.append(time.process_time())
     errors = None
     if problem.exact is not None:
-        errors = error_norms(volume, space, coefficients, problem.exact_at)
+        errors = error_norms(volume, space, coefficients, problem.exact_at, threads)
     clock.append(time.process_time())
-    report = SolveReport(
-        elements=space.elements,
-        dofs=space.dofs,
-        h=longest_edge(volume, space),
-        iterations=result.iterations,
-        converged=result.converged,
-        residual=result.residuals[-1],
-        seconds=dict(zip(("setup", "solve", "errors"), np.diff(clock).tolist(), strict=True)),
-        errors=errors,
-        notices=_notices(system, certified),
-        residuals=result.residuals,
-    )
-    return Solution(space.degrees, space.knots, coefficients, volume, report)
+    notices = solve_notices(volume, space, system, certified, result)
+    return solution_of(volume, space, coefficients, result, clock, errors, notices)
 
 
-def _notices(system: System, certified: str | None) -> tuple[str, ...]:
-    notices = []
-    if certified not in (None, "certified"):
-        notices.append(f"the map is {certified}, not certified: do not trust the solution")
-    if system.folded:
-        notices.append(f"det J < 0 at {system.folded} of {system.points} Gauss points: solved with |det J| instead")
-    return tuple(notices)
+def _iterate(
+    operator: Operator | RobinOperator,
+    right: Array,
+    preconditioner: FastDiagonalization,
+    tolerance: float,
+    max_iterations: int,
+    device: str,
+    start: Array | None,
+) -> LinearResult:
+    if device == "cpu":
+        return conjugate_gradients(operator.apply_free, right, preconditioner, tolerance, max_iterations, start)
+    from .cuda import solve_on_device
+
+    assert isinstance(operator, Operator)
+    return solve_on_device(operator, preconditioner, right, tolerance, max_iterations, device, start)
+
+
+def _add_faces(volume: BSplineVolume, space: TrialSpace, problem: Poisson, load: Array) -> dict[str, FaceMass]:
+    """Add Neumann's and Robin's data to the load (n_u, n_v, n_w), in place; the terms of the Robin faces by name."""
+    terms = {}
+    for name in (*problem.neumann, *problem.robin):
+        rule = face_rule(volume, space, name)
+        if name in problem.neumann:
+            data = problem.flux_at(name, rule.points, rule.normal)
+        else:
+            alpha, data = problem.robin_at(name, rule.points, rule.normal)
+            terms[name] = FaceMass(rule, alpha * rule.measure)
+        load[rule.layer] += rule.integrate(data)
+    return terms
+
+
+def _preconditioner(operator: Operator, rule: GaussRule, robin: Mapping[str, FaceMass]) -> FastDiagonalization:
+    extra = np.zeros(operator.space.shape)
+    for term in robin.values():
+        term.add_diagonal(extra)
+    return fast_diagonalization(operator, rule, {name: term.mean for name, term in robin.items()}, extra)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from parameterize.bspline import Array, basis_derivatives, gauss_points
+from parameterize.bspline import Array, basis_derivatives, breakpoints, gauss_points
 
 from .space import TrialSpace
 
@@ -22,6 +22,29 @@ class Table(NamedTuple):
 
     first: NDArray[np.int64]
     values: Array
+
+    def by_spans(self, spans: int) -> SpanTable:
+        """The same span by span, for a rule with as many points in each of its `spans` spans."""
+        values = self.values.reshape(2, spans, -1, self.values.shape[2])
+        first = self.first.reshape(spans, -1)[:, 0]
+        return SpanTable(np.ascontiguousarray(first), np.ascontiguousarray(values.transpose(1, 2, 0, 3)))
+
+
+class SpanTable(NamedTuple):
+    """The basis functions of one direction, span by span.
+
+    first: (spans,) index of the first function that is nonzero there.
+    values: (spans, points per span, 2, degree + 1) values and first derivatives of the nonzero ones.
+    """
+
+    first: NDArray[np.int64]
+    values: Array
+
+    @property
+    def sizes(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Zeros, one for each point of a span and one for each function: sizes that the kernels are compiled for."""
+        _, points, _, functions = self.values.shape
+        return (0,) * points, (0,) * functions
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +78,12 @@ class GaussRule:
         """Tables of any spline basis (the trial space's or the map's) at the points of this rule."""
         u, v, w = (Table(*basis_derivatives(knots[a], degrees[a], self.points[a], derivatives=1)) for a in range(3))
         return u, v, w
+
+
+def span_tables(space: TrialSpace, tables: tuple[Table, Table, Table]) -> tuple[SpanTable, SpanTable, SpanTable]:
+    """Tables at a Gauss rule on the spans of `space`, span by span."""
+    u, v, w = (table.by_spans(len(breakpoints(k)) - 1) for table, k in zip(tables, space.knots, strict=True))
+    return u, v, w
 
 
 def gauss_rule(space: TrialSpace, counts: tuple[int, int, int] | None = None) -> GaussRule:

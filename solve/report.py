@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from .estimate import Estimate
 from .norms import Errors
 
 
@@ -16,6 +17,7 @@ class SolveReport:
     h: longest straight edge of a mapped element, in the volume's units.
     errors: the norms, None without an exact solution; `l2`, `l2_relative` and
         `h1_seminorm` read from it.
+    estimate: of the L2 error, from the residual; where there is no exact solution, or on request.
     residual: |r| / |b| at the end; residuals: the same before the first and after every iteration.
     seconds: process CPU seconds of setup, solve and errors.
     notices: what the reader of these numbers must know, one line each.
@@ -29,6 +31,7 @@ class SolveReport:
     residual: float
     seconds: dict[str, float]
     errors: Errors | None = None
+    estimate: Estimate | None = None
     notices: tuple[str, ...] = ()
     residuals: tuple[float, ...] = field(default=(), repr=False)
 
@@ -47,14 +50,26 @@ class SolveReport:
         """L2 norm of the error's gradient; None where the exact gradient is unknown."""
         return self.errors.h1_seminorm if self.errors else None
 
+    @property
+    def error_estimate(self) -> float | None:
+        """Estimated L2 norm of the error."""
+        return self.estimate.l2 if self.estimate else None
+
+    @property
+    def error_estimate_relative(self) -> float | None:
+        """The same over the L2 norm of the solution; None where the latter is zero."""
+        return self.estimate.l2_relative if self.estimate else None
+
     def as_dict(self) -> dict[str, Any]:
         """The entry as report.json holds it; errors that are not known are absent."""
-        names = ("elements", "dofs", "h", "l2", "l2_relative", "h1_seminorm", "iterations", "converged", "residual")
-        entry = {name: getattr(self, name) for name in (*names, "seconds")}
+        norms = ("l2", "l2_relative", "h1_seminorm", "error_estimate", "error_estimate_relative")
+        names = ("elements", "dofs", "h", *norms, "iterations", "converged", "residual", "seconds")
+        entry = {name: getattr(self, name) for name in names}
         return {name: value for name, value in entry.items() if value is not None}
 
     def __str__(self) -> str:
         errors = [("L2", self.l2), ("relative L2", self.l2_relative), ("H1", self.h1_seminorm)]
+        errors += [("estimated L2", self.error_estimate), ("estimated relative L2", self.error_estimate_relative)]
         parts = [f"{self.elements} elements", f"{self.dofs} dofs", f"h {self.h:.4g}"]
         parts += [f"{name} {value:.4e}" for name, value in errors if value is not None]
         state = "" if self.converged else f", NOT CONVERGED (residual {self.residual:.1e})"

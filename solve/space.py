@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from parameterize.bspline import Array, breakpoints, insert_knots, midpoints
+from parameterize.bspline import Array, apply_along, breakpoints, insert_knots, midpoints
 from parameterize.volume import BSplineVolume
 
 
@@ -45,13 +45,22 @@ class TrialSpace:
         than degree + 1 in three dimensions. Where the space is only continuous somewhere, as for degree 1, they
         would let hourglass modes through: one point more.
         """
-        counts = []
+        only_continuous = self._only_continuous
+        g_u, g_v, g_w = (degree + int(rough) for degree, rough in zip(self.degrees, only_continuous, strict=True))
+        return g_u, g_v, g_w
+
+    @property
+    def is_only_continuous(self) -> bool:
+        """Whether the functions' derivatives jump somewhere inside."""
+        return any(self._only_continuous)
+
+    @property
+    def _only_continuous(self) -> list[bool]:
+        found = []
         for degree, knots in zip(self.degrees, self.knots, strict=True):
             inner = np.unique(knots, return_counts=True)[1][1:-1]
-            only_continuous = degree == 1 or bool(np.any(inner == degree))
-            counts.append(degree + 1 if only_continuous else degree)
-        g_u, g_v, g_w = counts
-        return g_u, g_v, g_w
+            found.append(degree == 1 or bool(np.any(inner == degree)))
+        return found
 
 
 def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = None) -> TrialSpace:
@@ -74,6 +83,23 @@ def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = Non
         degrees.append(new_degree)
         rows.append(row)
     return TrialSpace((degrees[0], degrees[1], degrees[2]), (rows[0], rows[1], rows[2]))
+
+
+def embedded(
+    coefficients: Array, degrees: tuple[int, int, int], knots: tuple[Array, Array, Array], space: TrialSpace
+) -> Array:
+    """Coefficients in `space` of a spline given in a smaller space of the same degrees; exact.
+
+    Raises ValueError where the smaller space is not contained in the larger.
+    """
+    for axis, (own, wanted) in enumerate(zip(knots, space.knots, strict=True)):
+        values, counts = np.unique(wanted, return_counts=True)
+        extra = counts - np.array([np.count_nonzero(own == value) for value in values])
+        if degrees[axis] != space.degrees[axis] or extra.min() < 0 or len(own) + extra.sum() != len(wanted):
+            raise ValueError("start: its space is not contained in the trial space; refine it by halving, same degree")
+        _, matrix = insert_knots(own, degrees[axis], np.repeat(values, extra))
+        coefficients = apply_along(matrix, coefficients, axis)
+    return coefficients
 
 
 def _same_smoothness(knots: Array, old: int, new: int) -> Array:

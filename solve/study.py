@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from parameterize.bspline import greville, open_uniform_knots
 from parameterize.volume import BSplineVolume
 
-from .poisson import solve_poisson
+from .elastic_problem import Elasticity
 from .problem import Poisson
 from .report import SolveReport
+from .solver import solve_problem
 
 
 @dataclass(frozen=True)
@@ -31,14 +33,19 @@ class ConvergenceRow:
 
 def convergence(
     volume: BSplineVolume,
-    problem: Poisson,
+    problem: Poisson | Elasticity,
     refine: Iterable[int] = range(3),
     degree: int | None = None,
     *,
     certified: str | None = None,
+    tolerance: float = 1e-13,
 ) -> list[ConvergenceRow]:
-    """Solve on each refinement level of one map; for smooth solutions the L2 rate tends to degree + 1."""
-    reports = [solve_poisson(volume, problem, refine=k, degree=degree, certified=certified).report for k in refine]
+    """Solve on each refinement level of one map; for smooth solutions the L2 rate tends to degree + 1.
+
+    tolerance: of the linear solver; a degree of 5 needs less than its default to show its rate.
+    """
+    solve = partial(solve_problem, volume, problem, degree=degree, certified=certified, tolerance=tolerance)
+    reports = [solve(refine=level).report for level in refine]
     found = rates(reports)
     l2, h1 = ([None, *found.get(name, [None] * len(reports))] for name in ("l2", "h1"))
     return [ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports)]

@@ -43,3 +43,12 @@ def test_errors_are_orthogonal_to_the_functions_inside_an_edge_and_a_face(volume
     assert np.abs(inner.T @ edge).max() < 1e-15
     face = smooth(*np.moveaxis(volume.grid(points, points, [1.0])[:, :, 0], -1, 0)) - basis @ found[:, :, -1] @ basis.T
     assert np.abs(inner.T @ face @ inner).max() < 1e-15
+
+
+def test_data_on_some_faces_leave_the_others_free(volume):
+    """A face with data keeps its edges; what lies on the other faces alone stays zero."""
+    space = trial_space(volume)
+    found = boundary_coefficients(volume, space, smooth, ("u0", "w1"))
+    everywhere = boundary_coefficients(volume, space, smooth)
+    assert np.array_equal(found[0], everywhere[0]) and np.array_equal(found[:, :, -1], everywhere[:, :, -1])
+    assert np.all(found[1:, :, :-1] == 0.0)

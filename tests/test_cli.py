@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -16,6 +17,7 @@ import solve
 from iga_nn.cli import main
 from iga_nn.folder import open_folder
 from parameterize.checkpoint import CheckpointError
+from parameterize.volume import FACE_NAMES
 from solve.study import benchmark_volume
 
 FILES = ("volume.npz", "boundary.npz", "history.npz", "solution.npz", "report.json", "history.png")
@@ -95,11 +97,12 @@ def test_folded_map_is_solved_with_a_warning_and_exit_code_3(formula_training, i
 
 
 def test_solve_that_does_not_converge_is_exit_code_4(monkeypatch, in_folder):
-    monkeypatch.setattr(solve, "solve_poisson", partial(solve.solve_poisson, max_iterations=1))
+    monkeypatch.setattr(solve, "solve_problem", partial(solve.solve_problem, max_iterations=1))
     benchmark_volume(6).save("volume.npz")
     assert main(["solve", "poisson", "volume.npz", "--refine", "0", "--out", "out"]) == 4
-    level = json.loads(Path("out/report.json").read_text())["poisson"]["levels"][0]
-    assert level["converged"] is False and level["iterations"] == 1
+    section = json.loads(Path("out/report.json").read_text())["poisson"]
+    assert section["levels"][0]["converged"] is False and section["levels"][0]["iterations"] == 1
+    assert "after 1 iterations" in section["notices"][0] and "the map is worst at u=" in section["notices"][0]
     assert Path("out/solution.npz").exists()
 
 
@@ -114,12 +117,63 @@ def test_solve_poisson_on_a_saved_volume(in_folder, capsys):
         assert data["coefficients"].shape == (10, 10, 10)  # 8 spans of degree 2
 
 
-def test_source_without_exact_reports_no_errors(in_folder):
+def test_source_without_exact_reports_estimates(in_folder, capsys):
     benchmark_volume(4).save("map.npz")
     assert main(["solve", "poisson", "map.npz", "--source", "1", "--boundary", "0", "--refine", "0", "--quiet"]) == 0
     section = json.loads(Path("map/report.json").read_text())["poisson"]
     assert "exact" not in section and "l2" not in section["levels"][0]
+    assert 0.0 < section["levels"][0]["error_estimate_relative"] < 0.1
+    assert "estimated L2 error" in capsys.readouterr().out
     assert section["source"] == "1" and not Path("map/error.png").exists()
+
+
+def test_every_term_and_face_of_a_scalar_problem(in_folder):
+    benchmark_volume(3).save("map.npz")
+    terms = [
+        "--kappa",
+        "2,0.1,0,1,0,1+z*z",
+        "--reaction",
+        "x*x",
+        "--neumann",
+        "u1",
+        "v0",
+        "--robin",
+        "w0=2",
+        "w1=1+x*x",
+    ]
+    assert main(["solve", "poisson", "map.npz", "--refine", "1", "--quiet", *terms]) == 0
+    section = json.loads(Path("map/report.json").read_text())["poisson"]
+    assert section["neumann"] == ["u1", "v0"] and section["kappa"] == "2,0.1,0,1,0,1+z*z"
+    assert section["levels"][0]["l2_relative"] < 1e-4
+    given = ["--source", "0", "--neumann", "u1=-y", "--robin", "u0=3:-1"]
+    assert main(["solve", "poisson", "map.npz", "--refine", "0", "--quiet", "--out", "given", *given]) == 0
+    assert "l2" not in json.loads(Path("given/report.json").read_text())["poisson"]["levels"][0]
+
+
+def test_elasticity_on_a_saved_volume(in_folder, capsys):
+    benchmark_volume(3).save("map.npz")
+    body = ["--exact", "x*y;sin(z);x", "--traction", "u1", "--young", "200", "--poisson-ratio", "0.25"]
+    assert main(["solve", "elasticity", "map.npz", "--refine", "0", "1", *body]) == 0
+    report = json.loads(Path("map/report.json").read_text())
+    assert report["elasticity"]["exact"] == "x*y;sin(z);x" and report["elasticity"]["young"] == 200.0
+    assert report["elasticity"]["rates"]["l2"][0] > 3.0
+    assert "2187 unknowns" in capsys.readouterr().out
+    with np.load("map/solution.npz") as data:
+        assert data["coefficients"].shape == (9, 9, 9, 3)
+
+
+def test_study_writes_table_csv_and_plot(in_folder, capsys):
+    benchmark_volume(2).save("map.npz")
+    assert main(["study", "map.npz", "--degree", "3", "2", "--refine", "0..2"]) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert table[0].split()[:3] == ["degree", "elements", "dofs"] and len(table) == 8
+    assert {file.name for file in Path("map-study").iterdir()} == {"report.json", "study.csv", "study.png"}
+    with Path("map-study/study.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [(row["degree"], row["elements"]) for row in rows[:4]] == [("2", "8"), ("2", "64"), ("2", "512"), ("3", "8")]
+    assert rows[0]["rate_l2"] == "" and float(rows[5]["rate_l2"]) > 3.5
+    assert main(["study", "map.npz", "--refine", "0", "1", "--exact", "x*y*z", "--out", "other", "--json"]) == 0
+    assert [row["degree"] for row in json.loads(capsys.readouterr().out)["levels"]] == [3, 3]
 
 
 def test_check_surface_and_volume(in_folder, capsys):
@@ -174,6 +228,31 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--steps-factor", "inf"], "factor"),
         (["run", "poisson", "cube", "--steps-factor", "nan"], "factor"),
         (["run", "poisson", "cube", "--out", ""], "out is empty"),
+        (["run", "poisson", "cube", "--kappa", "1,2"], "kappa has 2 entries"),
+        (["run", "poisson", "cube", "--kappa", "-x"], "--kappa=-x"),
+        (["run", "poisson", "cube", "--reaction", "q"], "reaction: expression"),
+        (["run", "poisson", "cube", "--kappa", "x-0.5"], "kappa must be positive"),
+        (["run", "poisson", "cube", "--neumann", "top"], "'top' is no face of the cube; the faces are u0, u1"),
+        (["run", "poisson", "cube", "--neumann", "u0", "u0=x"], "u0 is given twice"),
+        (["run", "poisson", "cube", "--source", "1", "--neumann", "u0"], "neumann u0 has no data"),
+        (["run", "poisson", "cube", "--robin", "u0"], "write u0=ALPHA"),
+        (["run", "poisson", "cube", "--robin", "u0=1", "--neumann", "u0"], "face u0 has both"),
+        (["study", "good.npz", "--refine", "0..9"], "at most 6"),
+        (["study", "good.npz", "--refine", "2..0"], "distinct levels"),
+        (["study", "good.npz", "--refine", "a"], "write levels such as 0 1 2"),
+        (["study", "good.npz", "--refine", "0..1", "1"], "distinct levels"),
+        (["study", "good.npz", "--degree", "2", "2"], "distinct degrees"),
+        (["study", "good.npz", "--exact", "-x"], "--exact=-x"),
+        (["study", "missing.npz"], "missing.npz"),
+        (["solve", "elasticity", "good.npz"], "force has no data"),
+        (["solve", "elasticity", "good.npz", "--exact", "x;y"], "three entries"),
+        (["solve", "elasticity", "good.npz", "--exact", "x;y;z", "--poisson-ratio", "0.5"], "poisson_ratio"),
+        (["solve", "elasticity", "good.npz", "--exact", "x;y;log(0-2-x)"], "not finite at x="),
+        (["solve", "poisson", "good.npz", "--kappa", "0-1"], "kappa must be positive"),
+        (
+            ["solve", "poisson", "good.npz", "--source", "1", "--neumann", *(f"{f}=0" for f in FACE_NAMES)],
+            "not balance",
+        ),
         (["check", "bean", "--component", "3"], "component 3"),
         (["check", "bean", "--max-faces", "10"], "--max-faces"),
         (["check", "x" * 300], "x: File name too long"),
@@ -201,6 +280,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
 )
 def test_bad_input_is_one_line_and_exit_code_2(arguments, says, in_folder, capsys, monkeypatch):
     monkeypatch.setattr("parameterize.run.parameterize", lambda *_, **__: pytest.fail("training must not start"))
+    benchmark_volume(3).save("good.npz")
     Path("words.txt").write_text("once upon a time\n")
     Path("seven.json").write_text(json.dumps([[0, 0, 0]] * 7))
     Path("numbers.json").write_text(json.dumps([99999999] * 8))

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -27,11 +28,25 @@ def test_first_run(capsys):
     assert "ARAP" in out and "L2 rate" in out
 
 
-def test_convergence_rates():
-    tables = load("convergence").main(degrees=(2, 3), levels=3)
-    for degree, rows in tables.items():
-        assert rows[-1].rate_l2 == pytest.approx(degree + 1, abs=0.25)
-        assert rows[-1].rate_h1 == pytest.approx(degree, abs=0.25)
+def test_convergence_rates(tmp_path, capsys):
+    studies = load("convergence").main(["--out", str(tmp_path), "--degrees", "2", "3", "--levels", "3"])
+    for degree, rows in studies["h"].items():
+        assert degree + 0.9 < rows[-1].rate_l2 < degree + 1.3
+        assert degree - 0.1 < rows[-1].rate_h1 < degree + 0.3
+    p, k = (studies[name] for name in studies if "refinement" in name)
+    assert p[3][0].report.l2 == pytest.approx(k[3][0].report.l2)  # where both start: one space
+    assert [rows[0].report.dofs for rows in k.values()] == [7**3, 8**3, 9**3, 10**3]  # C^(degree - 1) on 4^3 elements
+    assert [rows[0].report.dofs for rows in p.values()] == [7**3, 11**3, 15**3, 19**3]  # C^2: a knot more each
+    for study in (p, k):
+        errors = [rows[0].report.l2 for rows in study.values()]
+        assert all(b < a / 5 for a, b in pairwise(errors))
+    assert {file.name for file in tmp_path.iterdir()} == {
+        "convergence.csv",
+        "convergence.png",
+        "orders.csv",
+        "orders.png",
+    }
+    assert "degree  elements  dofs" in capsys.readouterr().out
 
 
 def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(formula_training, in_folder, capsys):
@@ -45,4 +60,4 @@ def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(formula_
     assert "| santa4 | ours | model not public |" in text
     assert "| santa4 | paper | 194.23 | 38.71 | 232.93 |" in text
     assert "no measurement" in text
-    assert text.count("| conch | 0 | 343 |") == 1 and "![error](conch/error.png)" in text
+    assert text.count("| conch | 0 | 343 |") == 1 and "![error](conch/figure14.png)" in text

@@ -54,3 +54,14 @@ def test_stops_where_the_matrix_is_not_positive(value):
     assert not result.converged
     assert result.iterations == 0
     assert np.all(result.x == 0.0)
+
+
+def test_starts_where_it_is_told_to():
+    d = np.geomspace(1.0, 1e3, 100)
+    b = np.ones(100)
+    near = b / d * (1.0 + 1e-6)
+    result = conjugate_gradients(lambda p: d * p, b, identity, 1e-10, start=near)
+    assert result.residuals[0] == pytest.approx(1e-6, rel=1e-6)
+    assert result.iterations < conjugate_gradients(lambda p: d * p, b, identity, 1e-10).iterations
+    assert np.allclose(result.x, b / d, rtol=1e-6)
+    assert near[0] == 1.0 + 1e-6

@@ -3,14 +3,14 @@ import pytest
 
 from parameterize.bspline import collocation
 from parameterize.volume import BSplineVolume
-from solve.operators import assemble
+from solve.operators import assemble, free_window
 from solve.quadrature import gauss_rule
 from solve.space import trial_space
 from solve.study import benchmark_volume
 
 
-def assemble_dense(volume, space, rule, source):
-    """Stiffness matrix and load vector from dense tables of every basis function at every point."""
+def assemble_dense(volume, space, rule, source, kappa=lambda x: np.eye(3), reaction=lambda x: 0.0):
+    """Matrix and load vector from dense tables of every basis function at every point; kappa (3, 3), reaction of x."""
     points = np.stack(np.meshgrid(*rule.points, indexing="ij"), axis=-1).reshape(-1, 3)
     weights = np.einsum("i,j,k->ijk", *rule.weights).ravel()
     tables = [
@@ -24,8 +24,13 @@ def assemble_dense(volume, space, rule, source):
     measure = weights * np.linalg.det(jacobian)
     parametric = np.stack([basis(1, 0, 0), basis(0, 1, 0), basis(0, 0, 1)], axis=-1)  # (q, n, 3)
     gradient = np.einsum("qni,qij->qnj", parametric, np.linalg.inv(jacobian))
-    matrix = np.einsum("q,qni,qmi->nm", measure, gradient, gradient, optimize=True)
-    return matrix, basis(0, 0, 0).T @ (measure * source(*volume(points).T))
+    where = volume(points)
+    tensor, c = np.array([kappa(x) for x in where]), np.array([reaction(x) for x in where])
+    flux = np.einsum("qij,qnj->qni", tensor, gradient)
+    matrix = np.einsum("q,qni,qmi->nm", measure, flux, gradient, optimize=True)
+    values = basis(0, 0, 0)
+    matrix += np.einsum("q,qn,qm->nm", measure * c, values, values, optimize=True)
+    return matrix, values.T @ (measure * source(*where.T))
 
 
 @pytest.fixture(
@@ -48,14 +53,14 @@ def case(request):
 
 def test_operator_equals_the_assembled_matrix(case):
     system, matrix, _ = case
-    x = np.random.default_rng(1).standard_normal(system.stiffness.space.shape)
+    x = np.random.default_rng(1).standard_normal(system.operator.space.shape)
     expected = (matrix @ x.ravel()).reshape(x.shape)
-    assert np.allclose(system.stiffness.apply(x), expected, atol=1e-12 * np.abs(expected).max())
+    assert np.allclose(system.operator.apply(x), expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_diagonal_equals_that_of_the_assembled_matrix(case):
     system, matrix, _ = case
-    assert np.allclose(system.stiffness.diagonal().ravel(), np.diag(matrix), rtol=1e-12)
+    assert np.allclose(system.operator.diagonal().ravel(), np.diag(matrix), rtol=1e-12)
 
 
 def test_load_equals_the_assembled_vector(case):
@@ -64,15 +69,15 @@ def test_load_equals_the_assembled_vector(case):
 
 
 def test_interior_product_is_the_full_one_with_zero_boundary():
-    stiffness = assemble(benchmark_volume(3), trial_space(benchmark_volume(3)), lambda x, y, z: 0.0 * x).stiffness
+    stiffness = assemble(benchmark_volume(3), trial_space(benchmark_volume(3)), lambda x, y, z: 0.0 * x).operator
     x = np.zeros(stiffness.space.shape)
     x[1:-1, 1:-1, 1:-1] = np.random.default_rng(2).standard_normal((4, 4, 4))
-    assert np.array_equal(stiffness.apply_inside(x[1:-1, 1:-1, 1:-1]), stiffness.apply(x)[1:-1, 1:-1, 1:-1])
+    assert np.array_equal(stiffness.apply_free(x[1:-1, 1:-1, 1:-1]), stiffness.apply(x)[1:-1, 1:-1, 1:-1])
 
 
 def test_symmetric_positive_and_constants_in_the_kernel():
     volume = benchmark_volume(4)
-    stiffness = assemble(volume, trial_space(volume), lambda x, y, z: 0.0 * x).stiffness
+    stiffness = assemble(volume, trial_space(volume), lambda x, y, z: 0.0 * x).operator
     rng = np.random.default_rng(3)
     a, b = rng.standard_normal((2, *stiffness.space.shape))
     assert np.vdot(a, stiffness.apply(b)) == pytest.approx(np.vdot(b, stiffness.apply(a)), rel=1e-12)
@@ -84,7 +89,7 @@ def test_linear_functions_are_in_balance_inside_a_curved_map_once_the_rule_is_ex
     """The integrand has degree 3 p - 1 per direction: 5 Gauss points for p = 3."""
     volume = benchmark_volume(4)
     space = trial_space(volume)
-    stiffness = assemble(volume, space, lambda x, y, z: 0.0 * x, gauss_rule(space, (5, 5, 5))).stiffness
+    stiffness = assemble(volume, space, lambda x, y, z: 0.0 * x, gauss_rule(space, (5, 5, 5))).operator
     for component in range(3):
         inside = stiffness.apply(volume.control_points[..., component])[1:-1, 1:-1, 1:-1]
         assert np.abs(inside).max() < 1e-13
@@ -99,3 +104,40 @@ def test_folded_points_are_counted_and_a_flat_map_is_refused():
     flat = BSplineVolume(smooth.degrees, smooth.knots, 0.0 * smooth.control_points)
     with pytest.raises(ValueError, match="det J is zero"):
         assemble(flat, trial_space(flat), lambda x, y, z: 0.0 * x)
+
+
+def tensor_kappa(x, y, z):
+    return np.stack([2.0 + x, 0.3 * y, 0.0 * x, 1.5 + z * z, 0.1 + 0.0 * x, 1.0 + y])
+
+
+@pytest.mark.parametrize("kappa", [lambda x, y, z: 1.0 + x * x, tensor_kappa], ids=["scalar", "tensor"])
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_coefficients_equal_the_assembled_matrix(kappa, degree):
+    volume = benchmark_volume(2)
+    space = trial_space(volume, degree=degree)
+
+    def dense_kappa(x):
+        values = kappa(*x)
+        if np.ndim(values) == 0:
+            return values * np.eye(3)
+        xx, xy, xz, yy, yz, zz = values
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def reaction(x, y, z):
+        return 3.0 + x - y
+
+    operator = assemble(volume, space, lambda x, y, z: x, kappa=kappa, reaction=reaction).operator
+    matrix, _ = assemble_dense(volume, space, gauss_rule(space), lambda x, y, z: x, dense_kappa, lambda p: reaction(*p))
+    x = np.random.default_rng(1).standard_normal(space.shape)
+    expected = (matrix @ x.ravel()).reshape(x.shape)
+    assert np.allclose(operator.apply(x), expected, atol=1e-12 * np.abs(expected).max())
+    assert np.allclose(operator.diagonal().ravel(), np.diag(matrix), rtol=1e-12)
+
+
+def test_window_leaves_out_the_faces_with_dirichlet_data():
+    space = trial_space(benchmark_volume(2))
+    assert free_window(space) == (slice(1, 4),) * 3
+    assert free_window(space, ()) == (slice(0, 5),) * 3
+    assert free_window(space, {"u1", "w0"}) == (slice(0, 4), slice(0, 5), slice(1, 5))
+    with pytest.raises(ValueError, match="'top' is no face"):
+        free_window(space, {"top"})

@@ -27,7 +27,7 @@ def test_run_returns_what_it_wrote(formula_training, in_folder):
 
 def test_volume_and_report_outlive_a_failing_solve(formula_training, in_folder, monkeypatch):
     formula_training()
-    monkeypatch.setattr("solve.solve_poisson", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("solve.solve_problem", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         iga_nn.run("poisson", "cube", "out")
     assert (in_folder / "out" / "volume.npz").exists()

@@ -5,6 +5,7 @@ import subprocess
 import numpy as np
 import pytest
 from conftest import formula_parameterization
+from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 import solve
@@ -43,6 +44,23 @@ def test_error_figure_also_where_the_error_is_rounding(tmp_path, drawing):
     problem = solve.Poisson(exact="x")
     plotting.draw_error(tmp_path / "error.png", volume, solve.solve_poisson(volume, problem), problem)
     assert colored_share(tmp_path / "error.png") > 0.05
+
+
+def test_errors_of_two_meshes_and_of_vectors(tmp_path, drawing):
+    volume = benchmark_volume(3)
+    problem = solve.Elasticity(exact=("x*y", "sin(z)", "x"))
+    solutions = [solve.solve_elasticity(volume, problem, refine=level) for level in (0, 1)]
+    plotting.draw_errors(tmp_path / "errors.png", volume, solutions, problem)
+    assert colored_share(tmp_path / "errors.png") > 0.1
+
+
+def test_study_has_a_curve_a_degree(tmp_path):
+    problem = solve.Poisson(exact="x*y*z")
+    study = {degree: solve.convergence(benchmark_volume(2), problem, (0, 1), degree) for degree in (2, 3)}
+    plotting.draw_study(tmp_path / "study.png", study)
+    image = imread(tmp_path / "study.png")[..., :3]
+    for color in plotting.FACE_COLORS[:2]:
+        assert np.count_nonzero(np.abs(image - to_rgb(color)).max(axis=-1) < 0.02) > 100
 
 
 def test_picture_is_framed_whole(drawing):

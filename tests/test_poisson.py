@@ -105,6 +105,10 @@ def test_report_entry_has_the_keys_of_report_json():
     entry = report.as_dict()
     errors = {"l2", "l2_relative", "h1_seminorm"}
     assert set(entry) == errors | {"elements", "dofs", "h", "iterations", "converged", "residual", "seconds"}
+    assert set(solve_poisson(benchmark_volume(3), WAVE, estimate=True).report.as_dict()) - set(entry) == {
+        "error_estimate",
+        "error_estimate_relative",
+    }
     assert set(entry["seconds"]) == {"setup", "solve", "errors"}
     assert entry["elements"] == 27
     assert entry["residual"] <= 1e-10
@@ -203,3 +207,20 @@ def test_arguments_out_of_range_are_named(arguments, name):
 def test_a_space_without_interior_functions_is_refused():
     with pytest.raises(ValueError, match="raise refine or degree"):
         solve_poisson(benchmark_volume(1), WAVE, degree=1)
+
+
+def test_a_coarser_solution_to_start_from_saves_iterations():
+    volume, problem = benchmark_volume(4, amplitude=0.16), Poisson(exact="exp(x+z)*sin(y)")
+    coarse = solve_poisson(volume, problem, refine=1)
+    cold, warm = (solve_poisson(volume, problem, refine=2, start=start) for start in (None, coarse))
+    assert warm.report.iterations <= 0.75 * cold.report.iterations
+    assert np.allclose(warm.coefficients, cold.coefficients, atol=1e-8)
+
+
+def test_the_solution_is_the_same_for_any_number_of_threads():
+    volume, problem = benchmark_volume(9), Poisson(exact="exp(x+z)*sin(y)", reaction="1+x")
+    one, three = (solve_poisson(volume, problem, threads=threads) for threads in (1, 3))
+    assert np.array_equal(one.coefficients, three.coefficients)
+    assert one.report.l2 == three.report.l2
+    with pytest.raises(ValueError, match="threads must be at least 1"):
+        solve_poisson(volume, problem, threads=0)

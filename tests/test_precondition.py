@@ -2,27 +2,28 @@ import numpy as np
 import pytest
 
 from parameterize.bspline import greville, open_uniform_knots
-from parameterize.volume import BSplineVolume
+from parameterize.volume import FACE_NAMES, BSplineVolume
 from solve import Poisson, solve_poisson
 from solve.linear import conjugate_gradients
-from solve.operators import assemble
+from solve.operators import assemble, free_window
 from solve.precondition import fast_diagonalization
 from solve.quadrature import gauss_rule
 from solve.space import trial_space
 from solve.study import benchmark_volume
 
 
-def build(volume):
+def build(volume, dirichlet=FACE_NAMES, reaction=None):
     space = trial_space(volume)
-    stiffness = assemble(volume, space, lambda x, y, z: 0.0 * x).stiffness
-    return stiffness, fast_diagonalization(stiffness, gauss_rule(space))
+    window = free_window(space, dirichlet)
+    operator = assemble(volume, space, lambda x, y, z: 0.0 * x, reaction=reaction, window=window).operator
+    return operator, fast_diagonalization(operator, gauss_rule(space))
 
 
 def iterations(volume):
-    stiffness, preconditioner = build(volume)
-    inner = tuple(n - 2 for n in stiffness.space.shape)
+    operator, preconditioner = build(volume)
+    inner = tuple(n - 2 for n in operator.space.shape)
     b = np.random.default_rng(0).standard_normal(inner)
-    result = conjugate_gradients(stiffness.apply_inside, b, preconditioner)
+    result = conjugate_gradients(operator.apply_free, b, preconditioner)
     assert result.converged
     return result.iterations
 
@@ -37,9 +38,9 @@ def mapped(function, n=8):
 def test_exact_on_boxes_of_any_proportion(sizes):
     """The Gauss rule is exact for the stiffness but not for the mass, in operator and preconditioner alike."""
     volume = mapped(lambda x, y, z: (sizes[0] * x, sizes[1] * y, sizes[2] * z))
-    stiffness, preconditioner = build(volume)
+    operator, preconditioner = build(volume)
     x = np.random.default_rng(1).standard_normal((9, 9, 9))
-    assert np.allclose(preconditioner(stiffness.apply_inside(x)), x, atol=1e-10)
+    assert np.allclose(preconditioner(operator.apply_free(x)), x, atol=1e-10)
     assert iterations(volume) <= 2
 
 
@@ -64,3 +65,48 @@ def test_iterations_hardly_grow_with_the_mesh_for_smooth_data():
         solve_poisson(benchmark_volume(n), Poisson(exact="exp(x+z)*sin(y)")).report.iterations for n in (12, 16, 24)
     ]
     assert max(counts) <= min(counts) + 2
+
+
+@pytest.mark.parametrize("dirichlet", [("u0",), ("v1", "w0", "w1"), ()])
+def test_exact_on_a_box_with_a_reaction_whatever_faces_are_free(dirichlet):
+    """Tensor-product Gauss rules make the mass matrix, too, the Kronecker product of the three of one dimension."""
+    box = mapped(lambda x, y, z: (4.0 * x, y, 0.25 * z))
+    operator, preconditioner = build(box, dirichlet, reaction=lambda x, y, z: 2.0 + 0.0 * x)
+    x = np.random.default_rng(1).standard_normal(tuple(s.stop - s.start for s in operator.window))
+    assert np.allclose(preconditioner(operator.apply_free(x)), x, atol=1e-10)
+
+
+def test_without_any_constraint_the_answer_is_known_up_to_a_constant():
+    operator, preconditioner = build(benchmark_volume(6), ())
+    assert preconditioner.singular
+    x = np.random.default_rng(1).standard_normal(operator.space.shape)
+    result = conjugate_gradients(operator.apply_free, operator.apply_free(x), preconditioner)
+    assert result.converged
+    assert result.iterations < 40
+    difference = result.x - x
+    assert np.allclose(difference, difference.mean(), atol=1e-7)
+
+
+def test_robin_faces_enter_the_preconditioner_exactly_on_the_cube():
+    cube = mapped(lambda x, y, z: (x, y, z), n=4)
+    operator, _ = build(cube, ("v0",))
+    alpha = 5.0
+    end = np.zeros((7, 7, 7))
+    # integral of alpha u v over w = 1: a mass matrix of the face, from the rule of the operator
+    tables, rule = operator.tables, gauss_rule(operator.space)
+    masses = []
+    for a in (0, 1):
+        dense = np.zeros((len(rule.points[a]), 7))
+        np.put_along_axis(dense, tables[a].first[:, None] + np.arange(4), tables[a].values[0], axis=1)
+        masses.append(dense.T @ (rule.weights[a][:, None] * dense))
+
+    def robin(x):
+        end[:] = 0.0
+        end[:, 1:, -1] = alpha * masses[0] @ x[:, :, -1] @ masses[1][1:, 1:]
+        return operator.apply_free(x) + end[:, 1:]
+
+    extra = np.zeros((7, 7, 7))
+    extra[:, :, -1] = alpha * np.multiply.outer(np.diag(masses[0]), np.diag(masses[1]))
+    preconditioner = fast_diagonalization(operator, rule, {"w1": alpha}, extra)
+    x = np.random.default_rng(1).standard_normal((7, 6, 7))
+    assert np.allclose(preconditioner(robin(x)), x, atol=1e-10)

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import greville, open_uniform_knots
+from parameterize.bspline import evaluate_at, greville, open_uniform_knots
 from parameterize.volume import BSplineVolume
-from solve.space import longest_edge, trial_space
+from solve.space import embedded, longest_edge, trial_space
+from solve.study import benchmark_volume
 
 
 def box(sizes, n=4, degree=3):
@@ -62,3 +63,18 @@ def test_h_is_the_longest_edge_over_the_mesh():
 def test_arguments_out_of_range_are_named(arguments):
     with pytest.raises(ValueError, match=next(iter(arguments))):
         trial_space(box((1, 1, 1)), **arguments)
+
+
+def test_a_spline_is_the_same_in_a_finer_space():
+    volume = benchmark_volume(3)
+    coarse, fine = trial_space(volume, 0), trial_space(volume, 2)
+    coefficients = np.random.default_rng(0).standard_normal(coarse.shape)
+    points = np.random.default_rng(1).random((50, 3))
+    same = embedded(coefficients, coarse.degrees, coarse.knots, fine)
+    assert same.shape == fine.shape
+    expected = evaluate_at(coarse.degrees, coarse.knots, coefficients, points)
+    assert np.allclose(evaluate_at(fine.degrees, fine.knots, same, points), expected, atol=1e-13)
+    with pytest.raises(ValueError, match="not contained"):
+        embedded(same, fine.degrees, fine.knots, coarse)
+    with pytest.raises(ValueError, match="not contained"):
+        embedded(coefficients, coarse.degrees, coarse.knots, trial_space(volume, 1, degree=4))

@@ -3,8 +3,9 @@ import pytest
 
 from parameterize.bspline import greville, open_uniform_knots
 from parameterize.volume import BSplineVolume
-from solve import Poisson, SolveReport, benchmark_volume, convergence, rates
+from solve import Poisson, SolveReport, benchmark_volume, convergence, poisson, rates
 from solve.norms import Errors
+from solve.space import TrialSpace
 
 WAVE = Poisson(exact="exp(x+z)*sin(y)")
 
@@ -47,6 +48,26 @@ def test_full_order_on_the_twisted_map(degree, tolerance):
     rows = convergence(benchmark_volume(4), WAVE, refine=(1, 2, 3) if degree < 4 else (1, 2), degree=degree)
     assert rows[-1].rate_l2 == pytest.approx(degree + 1, abs=tolerance)
     assert rows[-1].rate_h1 == pytest.approx(degree, abs=tolerance)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5])
+def test_full_order_on_the_map_of_the_same_degree(degree):
+    """From 8 to 16 elements, on the map that is as smooth as the trial space."""
+    rows = convergence(benchmark_volume(4, degree), WAVE, refine=(1, 2))
+    assert rows[-1].rate_l2 > degree + 0.9
+    assert rows[-1].rate_h1 > degree - 0.1
+
+
+def test_a_map_that_is_less_smooth_caps_the_rate_of_a_smoother_space():
+    """Why raised spaces keep the map's own smoothness: degree 4, C^3 at the knots of the C^2 map, loses its order."""
+    volume = benchmark_volume(4)
+    kept = convergence(volume, WAVE, refine=(1, 2), degree=4)
+    knots = [open_uniform_knots(n + 4, 4) for n in (8, 16)]
+    smoother = [
+        poisson._solve(volume, WAVE, TrialSpace((4, 4, 4), (k, k, k)), 1e-12, 100, None, 1, "cpu").report for k in knots
+    ]
+    assert kept[-1].rate_l2 > 4.9
+    assert rates(smoother)["l2"][-1] < 4.6
 
 
 def test_rows_print_their_rates():

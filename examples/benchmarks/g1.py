@@ -16,7 +16,6 @@ import csv
 import io
 import json
 import os
-import platform
 import signal
 import subprocess
 import sys
@@ -32,6 +31,7 @@ from typing import IO, Any, Literal, NoReturn
 import iga_nn
 from iga_nn import report as reports
 from iga_nn.data import DATA_FOLDER
+from iga_nn.machine import calibrate, processor
 from iga_nn.options import DEFAULT_EXACT, InputError, MapOptions, one_line
 from parameterize.files import save_text
 
@@ -329,24 +329,6 @@ def run_model(name: str, options: Options) -> Row:
         return replace(row, status=one_line(error) or type(error).__name__)
 
 
-def calibrate(share: float = 1.0) -> tuple[float, int]:
-    """Wall seconds of 1e12 floating-point operations in float32 products (8192, 512) @ (512, 512), and the threads.
-
-    share: of these operations that is measured, the rest is taken as equally fast; for quick looks.
-    """
-    import torch
-
-    left, right = torch.ones(8192, 512), torch.full((512, 512), 1.0 / 512.0)
-    operations = 2 * 8192 * 512 * 512  # of one product
-    repeats = max(1, round(share * 1e12 / operations))
-    product = left @ right  # starts the threads
-    start = time.perf_counter()
-    for _ in range(repeats):
-        torch.mm(left, right, out=product)
-    seconds = time.perf_counter() - start
-    return seconds * 1e12 / (repeats * operations), torch.get_num_threads()
-
-
 def _figures(result: iga_nn.Parameterization) -> dict[str, Any]:
     """Quality, foldings and seconds of the stages, by column."""
     quality = result.quality
@@ -508,19 +490,9 @@ def _machine(options: Options) -> str:
     mapping = options.mapping
     versions = ", ".join(f"{name} {number}" for name, number in reports.versions().items())
     return (
-        f"{_processor()}, {cores()} cores, {options.jobs} at a time with {options.threads} threads each; "
+        f"{processor()}, {cores()} cores, {options.jobs} at a time with {options.threads} threads each; "
         f"{versions}; preset {mapping.preset}, seed {mapping.seed}."
     )
-
-
-def _processor() -> str:
-    """The model of the CPU."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(named, platform.processor() or platform.machine())
 
 
 if __name__ == "__main__":

@@ -1,0 +1,51 @@
+"""Convergence studies as tables, CSV and rows of numbers."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from solve import ConvergenceRow
+
+Study = Mapping[int, Sequence["ConvergenceRow"]]  # degree -> its levels
+COLUMNS = (
+    "degree", "elements", "dofs", "h", "l2", "l2_relative", "rate_l2", "h1_seminorm", "rate_h1", "iterations",
+    "converged", "setup", "solve",
+)  # fmt: skip
+
+
+def rows_of(study: Study) -> list[dict[str, Any]]:
+    """One entry a level with the names of COLUMNS; what is not known is None. Seconds are process CPU seconds."""
+    found = []
+    for degree, levels in study.items():
+        for level in levels:
+            given = level.report.as_dict() | level.report.seconds
+            given |= {"degree": degree, "rate_l2": level.rate_l2, "rate_h1": level.rate_h1}
+            found.append({name: given.get(name) for name in COLUMNS})
+    return found
+
+
+def as_csv(study: Study) -> str:
+    """Comma-separated, all digits, first row the names."""
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows_of(study))
+    return stream.getvalue()
+
+
+def as_table(study: Study) -> str:
+    """Columns for a reader."""
+    head = ("degree", "elements", "dofs", "L2 error", "rate", "H1 error", "rate", "iterations", "seconds")
+    lines: list[tuple[str, ...]] = [head]
+    for row in rows_of(study):
+        rates = [f"{row[name]:.2f}" if row[name] is not None else "-" for name in ("rate_l2", "rate_h1")]
+        errors = [f"{row[name]:.3e}" if row[name] is not None else "-" for name in ("l2", "h1_seminorm")]
+        counts = [str(row[name]) for name in ("degree", "elements", "dofs")]
+        seconds = f"{row['setup'] + row['solve']:.2f}"
+        lines.append((*counts, errors[0], rates[0], errors[1], rates[1], str(row["iterations"]), seconds))
+    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+    return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in lines)

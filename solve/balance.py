@@ -1,0 +1,44 @@
+"""Problems that leave the solution's constant open, as pure Neumann data do: data in balance, and the mean."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from parameterize.bspline import Array
+from parameterize.volume import BSplineVolume
+
+from .planes import PlaneField, map_planes
+from .problem import Poisson
+from .quadrature import gauss_rule
+from .space import TrialSpace
+
+LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
+
+
+def balanced(load: Array) -> Array:
+    """The load (n_u, n_v, n_w) less its mean: the functions sum to one, so now it is orthogonal to constants.
+
+    Raises ValueError where the load's sum, the integral of source and fluxes, is not nearly zero.
+    """
+    total, size = float(load.sum()), float(np.abs(load).sum())
+    if abs(total) > LARGEST_IMBALANCE * size:
+        raise ValueError(
+            f"source and Neumann data do not balance: their integrals sum to {total:.4g} and must sum to 0 "
+            "(no face and no reaction holds the solution)"
+        )
+    return load - load.mean()
+
+
+def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Poisson) -> float:
+    """What is to be added to the solution for the mean of `exact`, or for mean zero without one."""
+    rule = gauss_rule(space)
+    spline = PlaneField(coefficients, rule.tabulate(space.degrees, space.knots))
+    plane = np.empty((4, *rule.plane_shape))
+    lack = size = 0.0
+    for q, fields in map_planes(volume, rule):
+        spline.evaluate(q, plane)
+        wanted = 0.0 if problem.exact is None else problem.exact_at(*fields[:, 0])[0]
+        measure = rule.plane_weights(q) * np.abs(np.linalg.det(np.moveaxis(fields[:, 1:], (0, 1), (2, 3))))
+        lack += float(((wanted - plane[0]) * measure).sum())
+        size += float(measure.sum())
+    return lack / size

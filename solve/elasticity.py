@@ -1,0 +1,142 @@
+"""solve_elasticity: from a volume and an elastic problem to displacements with their errors."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from parameterize.bspline import Array
+from parameterize.volume import BSplineVolume
+
+from .boundary import boundary_coefficients
+from .elastic_operator import assemble_elasticity
+from .elastic_problem import Elasticity
+from .failure import announce, check_solver, check_unknowns, solve_notices
+from .linear import conjugate_gradients
+from .norms import Errors, error_norms
+from .operators import free_window
+from .planes import map_planes
+from .precondition import fast_diagonalization
+from .quadrature import gauss_rule
+from .solution import Solution, solution_of, with_estimate
+from .space import TrialSpace, trial_space
+from .surface import face_rule
+from .threads import checked_threads, one_blas_thread
+
+
+def solve_elasticity(
+    volume: BSplineVolume,
+    problem: Elasticity,
+    *,
+    refine: int = 0,
+    degree: int | None = None,
+    tolerance: float = 1e-10,
+    max_iterations: int = 1000,
+    certified: str | None = None,
+    strict: bool = False,
+    estimate: bool | None = None,
+    threads: int | None = None,
+) -> Solution:
+    """Displacements of an elastic body; arguments and errors raised as in `solve_poisson`.
+
+    The solution's coefficients are (m_u, m_v, m_w, 3).
+    """
+    check_solver(tolerance, max_iterations)
+    space = trial_space(volume, refine, degree)
+    check_unknowns(space, problem.dirichlet)
+    _warm_up()
+    with one_blas_thread():
+        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
+        if estimate or (estimate is None and problem.exact is None):
+            solution = with_estimate(solution, space, problem)
+    announce(solution, strict)
+    return solution
+
+
+def check_elastic_data(volume: BSplineVolume, problem: Elasticity) -> None:
+    """Evaluate a problem's data where the coarsest solve needs them. Raises ExpressionError where not finite."""
+    space = trial_space(volume)
+    _displacements(volume, space, problem)
+    _add_tractions(volume, space, problem, np.zeros((3, *space.shape)))
+    for _, fields in map_planes(volume, gauss_rule(space)):
+        problem.force_at(*fields[:, 0])
+        if problem.exact is not None:
+            problem.exact_at(*fields[:, 0])
+
+
+@functools.cache
+def _warm_up() -> None:
+    """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
+    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
+    cube = BSplineVolume.uniform(corners, degree=1)
+    _solve(cube, Elasticity(exact=("x*x", "y", "z")), trial_space(cube, 1), 1e-10, 10, None, 1)
+
+
+def _solve(
+    volume: BSplineVolume,
+    problem: Elasticity,
+    space: TrialSpace,
+    tolerance: float,
+    max_iterations: int,
+    certified: str | None,
+    threads: int,
+) -> Solution:
+    clock = [time.process_time()]
+    rule = gauss_rule(space)
+    window = free_window(space, problem.dirichlet)
+    system = assemble_elasticity(volume, space, problem.force_at, problem.constants, rule, window, threads)
+    _add_tractions(volume, space, problem, system.load)
+    coefficients = _displacements(volume, space, problem)
+    right = (system.load - system.operator.apply(coefficients))[:, *window]
+    blocks = [fast_diagonalization(system.operator.block(c), rule) for c in range(3)]
+
+    def preconditioner(residual: Array) -> Array:
+        return np.stack([block(part) for block, part in zip(blocks, residual, strict=True)])
+
+    clock.append(time.process_time())
+    result = conjugate_gradients(system.operator.apply_free, right, preconditioner, tolerance, max_iterations)
+    coefficients[:, *window] = result.x
+    clock.append(time.process_time())
+    errors = _errors(volume, space, coefficients, problem, threads) if problem.exact is not None else None
+    clock.append(time.process_time())
+    notices = solve_notices(volume, space, system, certified, result)
+    return solution_of(volume, space, np.moveaxis(coefficients, 0, -1), result, clock, errors, notices)
+
+
+def _displacements(volume: BSplineVolume, space: TrialSpace, problem: Elasticity) -> Array:
+    """Coefficients (3, n_u, n_v, n_w) of the displacement data, zero where they are free."""
+
+    def component(c: int) -> Callable[[Array, Array, Array], Array]:
+        return lambda x, y, z: problem.displacement_at(x, y, z)[c]
+
+    return np.stack([boundary_coefficients(volume, space, component(c), problem.dirichlet) for c in range(3)])
+
+
+def _add_tractions(volume: BSplineVolume, space: TrialSpace, problem: Elasticity, load: Array) -> None:
+    """Add the tractions' load to (3, n_u, n_v, n_w), in place."""
+    for name in problem.traction:
+        rule = face_rule(volume, space, name)
+        for component, pull in zip(load, problem.traction_at(name, rule.points, rule.normal), strict=True):
+            component[rule.layer] += rule.integrate(pull)
+
+
+def _errors(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Elasticity, threads: int) -> Errors:
+    """Norms over the three components together."""
+
+    def component(c: int) -> Callable[[Array, Array, Array], tuple[Array, Array | None]]:
+        def exact(x: Array, y: Array, z: Array) -> tuple[Array, Array | None]:
+            value, gradient = problem.exact_at(x, y, z)
+            return value[c], None if gradient is None else gradient[c]
+
+        return exact
+
+    parts = [error_norms(volume, space, coefficients[c], component(c), threads) for c in range(3)]
+    norms = [part.l2 / part.l2_relative for part in parts if part.l2_relative]
+    l2 = float(np.linalg.norm([part.l2 for part in parts]))
+    slopes = [part.h1_seminorm for part in parts if part.h1_seminorm is not None]
+    return Errors(
+        l2, l2 / float(np.linalg.norm(norms)) if norms else None, float(np.linalg.norm(slopes)) if slopes else None
+    )

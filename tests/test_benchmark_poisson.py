@@ -1,0 +1,32 @@
+import csv
+
+import pytest
+from test_examples import load
+
+benchmark = load("benchmarks/poisson")
+
+
+def test_row_is_the_solve_of_the_reference(capsys):
+    """L2 at n = 8: 1.438e-5 with p Gauss points, 1.434e-5 with p + 1."""
+    found = benchmark.run_ours(8, 3, 1)
+    assert found["l2"] == pytest.approx(1.438e-5, rel=1e-3)
+    assert found["dofs"] == 11**3
+    assert found["wall"] > 0.0 and found["solve"] > 0.0
+
+
+def test_table_and_file_hold_the_row_and_its_ratios(tmp_path):
+    row = benchmark.Row(
+        "iga-nn", 8, 3, 2, 1331, setup=0.5, solve=1.5, wall=1.1, iterations=17, l2=1.4e-5, peak_mb=170, t_cal=8.0
+    )
+    assert row.ratio == 0.25
+    assert row.seconds_per_mdof == pytest.approx(1502.63, abs=0.01)
+    benchmark.save([row], tmp_path)
+    text = (tmp_path / "poisson.md").read_text()
+    assert "| iga-nn | 8 | 3 | 2 | 1331 | 0.50 | 1.50 | 1.10 | 0.250 | 1502.6 | 17 | 1.4000e-05 | 170 |" in text
+    with (tmp_path / "poisson.csv").open() as file:
+        assert next(csv.DictReader(file))["iterations"] == "17"
+
+
+def test_mfem_agrees():
+    pytest.importorskip("mfem.ser")
+    assert benchmark.run_mfem(8, 3, 1)["l2"] == pytest.approx(benchmark.run_ours(8, 3, 1)["l2"], rel=0.02)

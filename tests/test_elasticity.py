@@ -1,0 +1,141 @@
+import numpy as np
+import pytest
+
+from parameterize.bspline import greville, open_uniform_knots
+from parameterize.volume import FACE_NAMES, BSplineVolume
+from solve import ConvergenceError, Elasticity, SplineField, benchmark_volume, convergence, solve_elasticity
+from solve.elastic_operator import assemble_elasticity
+from solve.operators import free_window
+from solve.quadrature import gauss_rule
+from solve.space import trial_space
+
+WAVE = ("exp(x)*sin(y)", "cos(x*z)", "x*y*z+sin(z)")
+STEEL = {"young": 210.0, "poisson_ratio": 0.3}
+
+
+def box(n=3, degree=2):
+    """A sheared and stretched box."""
+    points = greville(open_uniform_knots(n + degree, degree), degree)
+    grid = np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1)
+    matrix = np.array([[2.0, 0.3, 0.0], [0.1, 1.0, 0.2], [0.0, -0.2, 0.7]])
+    return BSplineVolume.uniform(grid @ matrix.T + [1.0, -2.0, 0.5], degree)
+
+
+def operator(volume, window_faces=()):
+    space, rule = trial_space(volume), gauss_rule(trial_space(volume))
+    problem = Elasticity(exact=("x", "y", "z"), **STEEL)
+    window = free_window(space, window_faces)
+    return assemble_elasticity(volume, space, problem.force_at, problem.constants, rule, window).operator
+
+
+def test_linear_displacements_are_exact_on_a_box():
+    """The patch test, with displacements on four faces and tractions on two."""
+    exact = ("1+2*x-y+3*z", "x+0.5*y", "2-z+4*y")
+    problem = Elasticity(exact=exact, traction={"u1": None, "w0": None}, **STEEL)
+    report = solve_elasticity(box(), problem, tolerance=1e-13).report
+    assert report.l2_relative < 1e-11
+    assert report.h1_seminorm < 1e-10
+    assert report.dofs == 3 * 5**3
+
+
+@pytest.mark.parametrize("traction", [{}, {"u1": None, "v0": None, "w1": None}], ids=["displacement", "traction"])
+def test_full_order(traction):
+    rows = convergence(
+        benchmark_volume(4, degree=2), Elasticity(exact=WAVE, traction=traction, **STEEL), refine=range(3)
+    )
+    assert rows[-1].rate_l2 > 2.9
+    assert rows[-1].rate_h1 > 1.9
+    assert rows[-1].report.iterations < 100
+
+
+def test_rigid_motions_are_in_the_kernel():
+    """Coefficients of x, y and z are the map's control points; a turn is (-y, x, 0)."""
+    volume = benchmark_volume(3)
+    x, y, z = np.moveaxis(volume.control_points, -1, 0)
+    ones, zeros = np.ones_like(x), np.zeros_like(x)
+    rigid = [(ones, zeros, zeros), (zeros, ones, zeros), (zeros, zeros, ones), (-y, x, zeros), (z, zeros, -x)]
+    matrix = operator(volume)
+    for motion in rigid:
+        assert np.abs(matrix.apply(np.stack(motion))).max() < 1e-10
+    assert np.abs(matrix.apply(np.stack([x, zeros, zeros]))).max() > 1.0  # a stretch is not
+
+
+def test_operator_is_symmetric_positive_and_its_blocks_are_the_diagonal():
+    matrix = operator(benchmark_volume(3, degree=2), ("u0",))
+    a, b = np.random.default_rng(0).standard_normal((2, 3, 4, 5, 5))
+    assert np.vdot(b, matrix.apply_free(a)) == pytest.approx(np.vdot(a, matrix.apply_free(b)), rel=1e-12)
+    assert np.vdot(a, matrix.apply_free(a)) > 0.0
+    for component in range(3):
+        alone = np.zeros_like(a)
+        alone[component] = a[component]
+        block = matrix.block(component).apply_free(a[component])
+        assert np.allclose(matrix.apply_free(alone)[component], block, atol=1e-10)
+
+
+def test_bar_in_tension_by_hand():
+    """E = 2, nu = 1/4, pull 1 along x: the strain is 1/2 along and -1/8 across. Supports let it shrink freely."""
+    points = greville(open_uniform_knots(4, 2), 2)
+    bar = BSplineVolume.uniform(np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1), 2)
+    pull = {"u1": ("1", "0", "0"), **dict.fromkeys(("v0", "v1", "w0", "w1"), ("0", "0", "0"))}
+    problem = Elasticity(
+        force=("0", "0", "0"),
+        displacement=("0", "-y/8", "-z/8"),
+        traction=pull,
+        young=2.0,
+        poisson_ratio=0.25,
+    )
+    solution = solve_elasticity(bar, problem, tolerance=1e-13)
+    assert np.allclose(solution([[1.0, 1.0, 1.0], [0.5, 0.0, 1.0]]), [[0.5, -0.125, -0.125], [0.25, 0.0, -0.125]])
+    assert "l2" not in solution.report.as_dict()
+
+
+def test_lame_constants_by_hand():
+    """lambda = mu = 1: E = 5/2, nu = 1/4."""
+    given = Elasticity.lame(1.0, 1.0)
+    assert given == pytest.approx({"young": 2.5, "poisson_ratio": 0.25})
+    assert Elasticity(exact=WAVE, **given).constants == pytest.approx((1.0, 1.0))
+    with pytest.raises(ValueError, match="mu > 0"):
+        Elasticity.lame(1.0, 0.0)
+
+
+def test_functions_as_data_agree_with_formulas():
+    formulas = Elasticity(force=("x", "0", "1"), displacement=("y", "0", "0"), traction={"u1": ("0", "z", "0")})
+    functions = Elasticity(
+        force=(lambda x, y, z: x, lambda x, y, z: 0, lambda x, y, z: 1.0),
+        displacement=(lambda x, y, z: y, lambda x, y, z: 0, lambda x, y, z: 0),
+        traction={"u1": (lambda x, y, z: 0, lambda x, y, z: z, lambda x, y, z: 0)},
+    )
+    a, b = (solve_elasticity(benchmark_volume(2, degree=2), problem).coefficients for problem in (formulas, functions))
+    assert np.allclose(a, b, atol=1e-14)
+
+
+def test_solution_file_has_three_components(tmp_path):
+    solution = solve_elasticity(benchmark_volume(2), Elasticity(exact=WAVE), degree=2)
+    solution.save(tmp_path / "solution.npz")
+    field = SplineField.load(tmp_path / "solution.npz")
+    assert field.coefficients.shape == (4, 4, 4, 3)
+    assert np.array_equal(field([[0.2, 0.5, 0.9]]), solution([[0.2, 0.5, 0.9]]))
+
+
+def test_no_convergence_is_raised_on_request():
+    with pytest.raises(ConvergenceError, match="after 2 iterations"):
+        solve_elasticity(benchmark_volume(2), Elasticity(exact=WAVE), max_iterations=2, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        ({"exact": WAVE, "young": 0.0}, "young"),
+        ({"exact": WAVE, "poisson_ratio": 0.5}, "between -1 and 1/2"),
+        ({"exact": "x"}, "three entries"),
+        ({"exact": ("x", "y")}, "three entries"),
+        ({"exact": ("x", "y", "q")}, "exact: expression"),
+        ({"displacement": WAVE}, "force has no data"),
+        ({"force": WAVE, "traction": {"u0": None}}, "traction u0 has no data"),
+        ({"exact": WAVE, "traction": {"top": None}}, "no face of the cube"),
+        ({"exact": WAVE, "traction": dict.fromkeys(FACE_NAMES)}, "free to move"),
+    ],
+)
+def test_problems_that_do_not_fit_together_are_refused(data, says):
+    with pytest.raises(ValueError, match=says):
+        Elasticity(**data)

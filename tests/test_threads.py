@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+
+from solve.threads import checked_threads, colours, default_threads, in_parallel
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+@pytest.mark.parametrize("layers", [1, 4, 5, 27])
+def test_pieces_cover_all_layers_and_those_of_one_colour_share_no_function(degree, layers):
+    both = colours(layers, degree)
+    assert np.array_equal(np.sort(np.concatenate([*both[0], *both[1]])), np.arange(layers))
+    for pieces in both:
+        for before, after in zip(pieces, pieces[1:], strict=False):
+            assert after[0] > before[-1] + degree  # function i lives on the spans i - degree to i
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_every_piece_is_done_and_errors_come_through(threads):
+    done = np.zeros(10)
+
+    def mark(i):
+        if i == 7:
+            raise ValueError("seven")
+        done[i] += 1
+
+    in_parallel(mark, range(5), threads)
+    assert done.tolist() == [1.0] * 5 + [0.0] * 5
+    with pytest.raises(ValueError, match="seven"):
+        in_parallel(mark, range(5, 10), threads)
+
+
+def test_number_of_threads_follows_the_environment(monkeypatch):
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "3")
+    assert default_threads() == 3
+    monkeypatch.delenv("NUMBA_NUM_THREADS")
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    assert checked_threads(None) == 2
+    assert checked_threads(5) == 5
+    with pytest.raises(ValueError, match="at least 1"):
+        checked_threads(0)
