@@ -70,9 +70,10 @@ class SplineConfig:
     gauss: int = 3  # Gauss points a direction in the distortion term, on the first and last span
     inner_gauss: int = 1  # likewise on the others
     fairness: float = 1e-3
-    vertex: float = 1e5  # squared distance along the surface normal
+    vertex: float = 1.2e5  # squared distance along the surface normal
     arap_limit: float = 6.0  # distortion above this costs `stiffening` times its squared excess, too
     stiffening: float = 3.0
+    anchors: float = 0.03  # share of `vertex` for the distance along the cube's edges, from F to the surface
     tangential: float = 2e-4  # share of `vertex` for the distance within the tangent plane
     min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved

@@ -69,6 +69,15 @@ def to_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
     return _closest(points, vertices, faces)[0]
 
 
+def nearest_on_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, Array]:
+    """The nearest point of a triangle mesh to each point (m, 3), and the normal of its triangle, of length 1."""
+    _, triangle, weights = _closest(points, vertices, faces)
+    corners = vertices[faces[triangle]]  # (m, 3, 3)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    return np.einsum("mk,mka->ma", weights, corners), normals
+
+
 def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> Array:
     """Distance of each point (m, 3) to the boundary of the spline: (m,)."""
     return foot_points(points, volume, boundary)[2]

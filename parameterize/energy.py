@@ -7,13 +7,16 @@ penalties. The boundary term is quadratic with its parameters held.
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from .anchors import EdgeAnchors
 from .barrier import SpanBarrier
 from .bspline import Array
 from .config import SplineConfig
 from .conjugate import Operator, conjugate_gradients
+from .cutting import IntArray
 from .rotation import closest_rotation, cofactor, cross, least_eigenvalue
 from .surface_fit import SurfaceFit
 from .tensor_grid import FastDiagonalization, SmoothnessOperator, gauss_grid, grams
@@ -112,6 +115,7 @@ class SplineEnergy:
 
     def __init__(self, config: SplineConfig, knots: Knots, surface: SurfaceFit, *, device: torch.device) -> None:
         self.config, self.surface = config, surface
+        self.anchors = EdgeAnchors(surface, config.tangential)
         self.penalty = config.penalties[0]
         self._distortion = Distortion(knots, config, device=device)
         mass, slope, curve = grams(knots, config.degree, device)
@@ -124,9 +128,20 @@ class SplineEnergy:
         self._precondition = FastDiagonalization(rough, mass).to(_ROUGH)
 
     def start_round(self, control: Tensor, penalty: float) -> None:
-        """Take a penalty weight, and the limit of the distortion that suits the control points."""
+        """Take a penalty weight; aim the anchors and limit the distortion as suits the control points."""
         self.penalty = penalty
+        self.anchors.aim(control)
         self._distortion.set_limit(control)
+
+    def give_way(self, spans: IntArray, factor: float) -> None:
+        """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""
+        for fit in (self.surface, self.anchors.fit):
+            fit.give_way(np.where(fit.near_spans(spans), factor, 1.0) * fit.yielding)
+
+    def take_back(self, factor: float) -> None:
+        """Divide by `factor` what such factors have become, up to 1."""
+        for fit in (self.surface, self.anchors.fit):
+            fit.give_way(np.minimum(fit.yielding / factor, 1.0))
 
     def volume_part(self, control: Tensor) -> tuple[float, Tensor, int]:
         """Distortion, fairness and barrier: energy, gradient, folded quadrature points."""
@@ -137,30 +152,31 @@ class SplineEnergy:
         return energy, gradient + bent + self.penalty * push, folded
 
     def surface_part(self, control: Tensor) -> tuple[float, Tensor]:
-        """The boundary term at the present parameters: energy and gradient."""
-        energy, gradient = self.surface.energy_and_gradient(control)
+        """The boundary terms at the present parameters: energy and gradient."""
+        config = self.config
+        off, pull = self.surface.energy_and_gradient(control)
+        off_edges, pull_edges = self.anchors.fit.energy_and_gradient(control)
         turned, push = self.surface.facing_energy_and_gradient(control)
-        return (
-            self.config.vertex * energy + self.penalty * turned,
-            self.config.vertex * gradient + self.penalty * push,
-        )
+        energy = config.vertex * (off + config.anchors * off_edges) + self.penalty * turned
+        return energy, config.vertex * (pull + config.anchors * pull_edges) + self.penalty * push
 
     def newton_direction(self, control: Tensor, right: Tensor) -> Tensor:
         """Approximate solution of Hessian x = right at `control`, the parameters of the surface held."""
-        surface = self.surface.hessian(_ROUGH)
+        config = self.config
+        surface, anchors = self.surface.hessian(_ROUGH), self.anchors.fit.hessian(_ROUGH)
         distortion = self._distortion.curvature(control, self.penalty)
         barrier = self.barrier.curvature(control)
         facing = self.surface.facing_curvature(control, _ROUGH)
 
         def hessian(x: Tensor) -> Tensor:
             inner = distortion(x) + self._rough_bending(x) + self.penalty * (barrier(x) + facing(x))
-            return inner + self.config.vertex * surface(x)
+            return inner + config.vertex * (surface(x) + config.anchors * anchors(x))
 
         direction, _ = conjugate_gradients(
             hessian,
             right.to(_ROUGH),
             self._precondition,
-            tolerance=self.config.tolerance,
-            max_iterations=self.config.iterations,
+            tolerance=config.tolerance,
+            max_iterations=config.iterations,
         )
         return direction.to(right.dtype)

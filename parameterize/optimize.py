@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -91,7 +90,7 @@ def _rounds(
     checkpoints: Checkpoints,
 ) -> Optimized:
     """Descend, certify, watch the spans not proved, until certified or at the end of the penalties."""
-    config, surface = energy.config, energy.surface
+    config = energy.config
     energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
     best = Optimized(control, certify(_as_volume(control, knots, config.degree)))
     first, polished = 0, 0
@@ -104,7 +103,7 @@ def _rounds(
             if polished == config.polish:
                 break
             polished += 1
-            surface.give_way(np.minimum(surface.yielding / _GIVING_WAY, 1.0))
+            energy.take_back(_GIVING_WAY)
         energy.start_round(control, config.penalties[min(number, len(config.penalties) - 1)])
         control = _descend(control, energy, number, history, progress)
         certificate = certify(_as_volume(control, knots, config.degree))
@@ -113,8 +112,7 @@ def _rounds(
             best = Optimized(control, certificate)
         energy.barrier.activate(certificate.unproved)
         if number >= _PATIENT_ROUNDS and not polished and len(certificate.unproved):
-            near = surface.near_spans(certificate.unproved)
-            surface.give_way(np.where(near, _GIVING_WAY, 1.0) * surface.yielding)
+            energy.give_way(certificate.unproved, _GIVING_WAY)
         _save(checkpoints, {"number": number + 1, "polished": polished}, control, best, energy, history)
     return best
 
@@ -133,6 +131,7 @@ def _save(
         "parameters": torch.as_tensor(energy.surface.parameters),
         "cube_faces": torch.as_tensor(energy.surface.cube_faces),
         "yielding": torch.as_tensor(energy.surface.yielding),
+        "anchors_yielding": torch.as_tensor(energy.anchors.fit.yielding),
         "active": torch.as_tensor(energy.barrier.active),
     }
     checkpoints.save(_CHECKPOINT, tensors, state | {"history": history.rows})
@@ -145,6 +144,7 @@ def _restore(
     device = best.control.device
     energy.surface.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
     energy.surface.give_way(tensors["yielding"].numpy())
+    energy.anchors.fit.give_way(tensors["anchors_yielding"].numpy())
     energy.barrier.activate(tensors["active"].numpy())
     control, kept = tensors["control"].to(device), tensors["best"].to(device)
     return int(state["number"]), control, Optimized(kept, certify(_as_volume(kept, knots, energy.config.degree)))

@@ -40,7 +40,7 @@ from .volume import BSplineVolume
 _log = logging.getLogger(__name__)
 _BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit
 _FEW_FLIPS = 1e-2  # share of the triangles that sliding may sort out
-_LAST_SLIDES = 10
+_LAST_SLIDES = 20
 _LAST_SWEEPS = 600
 
 

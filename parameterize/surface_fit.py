@@ -47,15 +47,13 @@ class SurfaceFit:
         device: torch.device,
     ) -> None:
         self.knots, self.degree, self.device = knots, degree, device
-        self.points = points
         self.triangles = triangles
-        self._quadrics, self._weights = quadrics, weights
-        self._points = torch.as_tensor(points, device=device)
+        self._weights = weights
         self._normals = vertex_normals(points, triangles)
         self._facing: FacingPenalty | None = None
         self.yielding = np.ones(len(points))
         self.place(parameters, cube_faces)
-        self.give_way(self.yielding)
+        self.aim(points, quadrics)
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
         """Take these parameters (N, 3) on these cube faces (N,)."""
@@ -66,6 +64,12 @@ class SurfaceFit:
         rows = csr_array((values.ravel(), indices.ravel(), starts), shape=(len(values), count))
         columns = csr_array(rows.T)
         self._matrix, self._transposed = (to_torch(m, self.device) for m in (rows, columns))
+
+    def aim(self, points: Array, quadrics: Array) -> None:
+        """Take other points (N, 3) and quadrics (N, 3, 3)."""
+        self.points, self._quadrics = points, quadrics
+        self._points = torch.as_tensor(points, device=self.device)
+        self.give_way(self.yielding)
 
     def give_way(self, yielding: Array) -> None:
         """Multiply the points' weights by `yielding` (N,), in place of earlier such factors."""

@@ -152,6 +152,15 @@ def test_a_folded_start_is_unfolded():
     assert mean_arap(as_volume(found.control)) < mean_arap(as_volume(start))
 
 
+def test_what_gave_way_counts_again_once_the_map_is_certified():
+    start, fit, history = wavy_control(0.08), surface_fit(), History()
+    fit.give_way(np.full(len(fit.points), 0.05))
+    found = optimize(start, KNOTS, fit, replace(CONFIG, rounds=10), history=history)
+    assert found.certificate.verdict == "certified"
+    assert np.median(fit.yielding) == 1.0
+    assert history.arrays()["step"].max() >= CONFIG.polish * CONFIG.steps  # rounds after the certificate
+
+
 def test_interrupted_between_rounds_goes_on_to_the_same_result(tmp_path):
     start = wavy_control(0.15, seed=1)
     config = replace(CONFIG, steps=2, rounds=3)

@@ -1,0 +1,58 @@
+"""Points on the 12 edges of the cube that draw F towards the surface.
+
+No vertex of the mesh need have its parameter there, and F, which keeps a small crease along those edges, could stick
+out unseen, most of all at the eight corners.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from torch import Tensor
+
+from .bspline import Array, breakpoints
+from .distances import nearest_on_mesh
+from .layout import sides
+from .surface_fit import SurfaceFit
+
+_A_SPAN = 2
+
+
+def edge_points(knots: tuple[Array, Array, Array]) -> Array:
+    """Parameters (k, 3): the corners of the cube, the ends of the spans along its edges and their middles."""
+    points = []
+    for axis in range(3):
+        breaks = breakpoints(knots[axis])
+        along = np.interp(np.arange(_A_SPAN * (len(breaks) - 1) + 1) / _A_SPAN, np.arange(len(breaks)), breaks)
+        for side in product((0.0, 1.0), repeat=2):
+            rows: list[Array | float] = [*side]
+            rows.insert(axis, along)
+            points.append(np.stack(np.broadcast_arrays(*rows), axis=1))
+    return np.unique(np.concatenate(points), axis=0)
+
+
+class EdgeAnchors:
+    """The anchors as a SurfaceFit whose parameters stay and whose points are the nearest ones of the surface."""
+
+    def __init__(self, surface: SurfaceFit, tangential: float) -> None:
+        self._surface, self._tangential = surface, tangential
+        places = edge_points(surface.knots)
+        count = len(places)
+        self.fit = SurfaceFit(
+            surface.knots,
+            surface.degree,
+            places,
+            np.zeros((count, 3, 3)),
+            np.full(count, 1.0 / count),
+            places,
+            sides(places),
+            np.zeros((0, 3), dtype=np.int64),
+            device=surface.device,
+        )
+
+    def aim(self, control: Tensor) -> None:
+        """Take the points of the surface nearest to F as it is, each with the normal of its triangle."""
+        here = self.fit.residuals(control) + self.fit.points
+        points, normals = nearest_on_mesh(here, self._surface.points, self._surface.triangles)
+        self.fit.aim(points, normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3))

@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+import torch
+from shapes import ball
+
+from parameterize.anchors import EdgeAnchors, edge_points
+from parameterize.bspline import greville, open_uniform_knots
+from parameterize.corners import CORNERS
+from parameterize.layout import sides, snap
+from parameterize.surface_fit import SurfaceFit, vertex_quadrics, vertex_weights
+
+KNOTS = (open_uniform_knots(6, 3),) * 3  # three spans a direction
+TANGENTIAL = 1e-3
+
+
+def anchors_on_a_ball(radius=0.5):
+    points, faces = ball(2000)
+    points = 0.5 + radius * points
+    fit = SurfaceFit(
+        KNOTS,
+        3,
+        points,
+        vertex_quadrics(points, faces, TANGENTIAL),
+        vertex_weights(points, faces, len(points)),
+        snap(points),
+        sides(points),
+        faces,
+        device=torch.device("cpu"),
+    )
+    return EdgeAnchors(fit, TANGENTIAL)
+
+
+def unit_cube():
+    row = greville(KNOTS[0], 3)
+    return torch.as_tensor(np.stack(np.meshgrid(row, row, row, indexing="ij")))
+
+
+def test_edge_points_are_the_corners_and_two_a_span():
+    points = edge_points(KNOTS)
+    assert len(points) == 8 + 12 * (2 * 3 - 1)
+    assert (((points == 0.0) | (points == 1.0)).sum(axis=1) >= 2).all()
+    assert {tuple(c) for c in CORNERS} <= {tuple(p) for p in points}
+
+
+def test_anchors_measure_how_far_the_edges_are_from_the_surface():
+    anchors, control = anchors_on_a_ball(), unit_cube()
+    anchors.aim(control)
+    energy, _ = anchors.fit.energy_and_gradient(control)
+    # F is the identity, the surface a ball of radius 1/2: nearly all of the distance is along the ball's normal
+    distance = np.linalg.norm(edge_points(KNOTS) - 0.5, axis=1) - 0.5
+    assert energy == pytest.approx((distance**2).mean(), rel=0.02)
+
+
+def test_what_they_pull_on_comes_closer():
+    anchors, control = anchors_on_a_ball(), unit_cube()
+    anchors.aim(control)
+    before, gradient = anchors.fit.energy_and_gradient(control)
+    after, _ = anchors.fit.energy_and_gradient(control - gradient)
+    assert after < before
+    inward = (gradient * (control - 0.5)).sum(0)  # downhill leads towards the centre, at all eight corners
+    assert (inward[[0, 0, 0, 0, -1, -1, -1, -1], [0, 0, -1, -1] * 2, [0, -1] * 4] > 0.0).all()
