@@ -200,7 +200,7 @@ def _descend(
 ) -> Tensor:
     """One round of Newton steps with sliding boundary parameters."""
     steps = energy.config.steps
-    total_steps = steps * energy.config.rounds
+    usual = steps * (len(energy.config.penalties) + energy.config.polish)  # hard shapes take more
     started = time.perf_counter()
     energy.surface.watch_facing(control, energy.config.min_facing)
     point = _evaluate(control, energy)
@@ -218,8 +218,9 @@ def _descend(
         point = replace(found, outer=energy.surface_part(found.control))
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
-        left = (time.perf_counter() - started) / (step + 1) * (total_steps - done)
-        progress(Progress("spline", done, total_steps, point.total, point.folded, left))
+        total = max(usual, (number + 1) * steps)
+        left = (time.perf_counter() - started) / (step + 1) * (total - done)
+        progress(Progress("spline", done, total, point.total, point.folded, left))
         enough = energy.config.gain if number else energy.config.first_gain
         waited = 0 if point.total < (1.0 - enough) * lowest else waited + 1
         lowest = min(lowest, point.total)
