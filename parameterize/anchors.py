@@ -1,7 +1,8 @@
 """Points on the 12 edges of the cube that draw F towards the surface.
 
 No vertex of the mesh need have its parameter there, and F, which keeps a small crease along those edges, could stick
-out unseen, most of all at the eight corners.
+out unseen, most of all at the eight corners. They are for a map that is nearly there: on a rough one the nearest points
+are those of another part of the surface, and it would be held there.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def edge_points(knots: tuple[Array, Array, Array]) -> Array:
 
 
 class EdgeAnchors:
-    """The anchors as a SurfaceFit whose parameters stay and whose points are the nearest ones of the surface."""
+    """The anchors as a SurfaceFit whose parameters stay; they pull on nothing until they are aimed."""
 
     def __init__(self, surface: SurfaceFit, tangential: float) -> None:
         self._surface, self._tangential = surface, tangential

@@ -128,9 +128,8 @@ class SplineEnergy:
         self._precondition = FastDiagonalization(rough, mass).to(_ROUGH)
 
     def start_round(self, control: Tensor, penalty: float) -> None:
-        """Take a penalty weight; aim the anchors and limit the distortion as suits the control points."""
+        """Take a penalty weight, and the limit of the distortion that suits the control points."""
         self.penalty = penalty
-        self.anchors.aim(control)
         self._distortion.set_limit(control)
 
     def give_way(self, spans: IntArray, factor: float) -> None:

@@ -60,8 +60,8 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the surface data near them loses weight. Once the map is certified,
-    a few more rounds take that back as far as they can. The result is the last certified map, else the one with the
-    fewest unproved spans.
+    a few more rounds take that back as far as they can, with anchors along the cube's edges. The result is the last
+    certified map, else the one with the fewest unproved spans.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
@@ -104,6 +104,7 @@ def _rounds(
                 break
             polished += 1
             energy.take_back(_GIVING_WAY)
+            energy.anchors.aim(control)
         energy.start_round(control, config.penalties[min(number, len(config.penalties) - 1)])
         control = _descend(control, energy, number, history, progress)
         certificate = certify(_as_volume(control, knots, config.degree))
