@@ -11,10 +11,21 @@ from numpy.typing import NDArray
 
 from parameterize.bspline import Array
 from parameterize.files import replacing
-from parameterize.quality import arap
-from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
+from parameterize.volume import BSplineVolume
 
 from .rendering import Patch, can_draw, draw, widest_view
+from .sampling import (
+    FACE_COLORS,
+    MAP,
+    SECTIONS,
+    distortion_on,
+    error_norm,
+    face_grid,
+    face_labels,
+    points_on,
+    sampled_error,
+    section_grid,
+)
 from .studies import Study
 
 if TYPE_CHECKING:
@@ -26,9 +37,6 @@ if TYPE_CHECKING:
 
 SAMPLES = 141  # a direction and patch
 PANEL = (900, 700)  # pixels of one view
-FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # distinct for the colour-blind, too
-SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
-MAP = "viridis"  # perceptually uniform
 
 
 def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
@@ -58,13 +66,11 @@ def draw_faces(path: Path, volume: BSplineVolume) -> None:
 
     patches = []
     for face, color in enumerate(FACE_COLORS):
-        points = volume.grid(*_face_grid(face)).reshape(SAMPLES, SAMPLES, 3)
+        points = points_on(volume, face_grid(face, SAMPLES))
         patches.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape)))
     figure, (panels,) = _panels(1, 2)
     _show_around(panels, patches)
-    swatches = [
-        Swatch(color=color, label=_face_label(name)) for name, color in zip(FACE_NAMES, FACE_COLORS, strict=True)
-    ]
+    swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
     figure.legend(
         handles=swatches,
         loc="outside lower center",
@@ -85,10 +91,9 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
     norm = Normalize(0.0, 1.0)
     figure, (panels,) = _panels(1, 3)
     for axis, panel in enumerate(panels):
-        grid = _section_grid(axis)
-        points = volume.grid(*grid).reshape(SAMPLES, SAMPLES, 3)
-        energy = arap(volume.grid_jacobian(*grid)).reshape(SAMPLES, SAMPLES)
-        patch = Patch(points, _colors(np.tanh(np.sqrt(energy) / 2.0), norm), lit=False)
+        grid = section_grid(axis, SAMPLES)
+        points = points_on(volume, grid)
+        patch = Patch(points, _colors(distortion_on(volume, grid), norm), lit=False)
         panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
         panel.set_title(SECTIONS[axis], fontsize=13)
     _color_bar(figure, panels, norm, "tanh(√ARAP / 2), scale as given")
@@ -98,8 +103,8 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
 
 def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
     """|u - u_h| on the boundary and on the three mid-sections, logarithmic colours; the error norms beside it."""
-    points, errors = _sampled_error(volume, solution, problem)
-    norm = _error_norm([errors])
+    points, errors = sampled_error(volume, solution, problem, SAMPLES)
+    norm = error_norm([errors])
     figure, rows = _panels(2, 3)
     boundary = [Patch(p, _colors(e, norm)) for p, e in zip(points[:6], errors[:6], strict=True)]
     _show_around(rows[0][:2], boundary)
@@ -118,8 +123,8 @@ def draw_errors(path: Path, volume: BSplineVolume, solutions: Sequence[Solution]
 
     The layout of the paper's Fig. 14, with the L2 error marked.
     """
-    samples = [_sampled_error(volume, solution, problem) for solution in solutions]
-    norm = _error_norm([errors for _, errors in samples])
+    samples = [sampled_error(volume, solution, problem, SAMPLES) for solution in solutions]
+    norm = error_norm([errors for _, errors in samples])
     figure, rows = _panels(len(solutions), 4)
     for row, (points, errors), solution in zip(rows, samples, solutions, strict=True):
         for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
@@ -186,52 +191,11 @@ def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
     _save(figure, path)
 
 
-def _face_grid(face: int) -> tuple[Array, Array, Array]:
-    """Parameters of SAMPLES x SAMPLES points on a face of the cube, in the order of FACE_NAMES."""
-    return _grid(face // 2, float(face % 2))
-
-
-def _section_grid(axis: int) -> tuple[Array, Array, Array]:
-    return _grid(axis, 0.5)
-
-
-def _grid(axis: int, value: float) -> tuple[Array, Array, Array]:
-    u, v, w = (np.array([value]) if a == axis else np.linspace(0.0, 1.0, SAMPLES) for a in range(3))
-    return u, v, w
-
-
-def _error(solution: Solution, problem: Problem, grid: tuple[Array, Array, Array], points: Array) -> Array:
-    """|u - u_h| at the samples of a grid whose images are `points` (SAMPLES, SAMPLES, 3); of vectors, the length."""
-    exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
-    found = solution.grid(*grid).reshape(SAMPLES, SAMPLES, -1)
-    wanted = np.moveaxis(exact.reshape(-1, SAMPLES, SAMPLES), 0, -1)  # (SAMPLES, SAMPLES, 1 or 3)
-    return np.linalg.norm(found - wanted, axis=-1)
-
-
-def _sampled_error(volume: BSplineVolume, solution: Solution, problem: Problem) -> tuple[list[Array], list[Array]]:
-    """Points (SAMPLES, SAMPLES, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
-    grids = [_face_grid(face) for face in range(6)] + [_section_grid(axis) for axis in range(3)]
-    points = [volume.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
-    return points, [_error(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
-
-
-def _error_norm(meshes: Sequence[Sequence[Array]]) -> Any:
-    """Logarithmic colours from the largest error of all meshes to four decades below that of the best one."""
-    from matplotlib.colors import LogNorm
-
-    tops = [max(float(error.max()) for error in errors) or 1.0 for errors in meshes]
-    return LogNorm(1e-4 * min(tops), max(tops), clip=True)
-
-
 def _colors(values: Array, norm: Any) -> Array:
     """Red, green, blue (m, n, 3) of values (m, n)."""
     from matplotlib import colormaps
 
     return np.asarray(colormaps[MAP](norm(values)))[..., :3]
-
-
-def _face_label(name: str) -> str:
-    return f"{name}: {name[0]} = {name[1]}"
 
 
 def _positive(values: NDArray[Any]) -> Array:
