@@ -18,6 +18,7 @@ from .sampling import (
     FACE_COLORS,
     MAP,
     SECTIONS,
+    all_grids,
     distortion_on,
     error_norm,
     face_grid,
@@ -25,6 +26,7 @@ from .sampling import (
     points_on,
     sampled_error,
     section_grid,
+    solution_on,
 )
 from .studies import Study
 
@@ -59,8 +61,11 @@ def draw_map(folder: Path, volume: BSplineVolume, history: dict[str, NDArray[Any
         draw_distortion(folder / "distortion.png", volume)
 
 
-def draw_faces(path: Path, volume: BSplineVolume) -> None:
-    """The images of the six faces of the cube, each in its colour, from the front and from behind."""
+def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) -> None:
+    """The images of the six faces of the cube, each in its colour, from the front and from behind.
+
+    marks: points (k, 3) shown as black balls, such as the corners that were given (the paper's Fig. 13).
+    """
     from matplotlib.colors import to_rgb
     from matplotlib.patches import Patch as Swatch
 
@@ -69,7 +74,7 @@ def draw_faces(path: Path, volume: BSplineVolume) -> None:
         points = points_on(volume, face_grid(face, SAMPLES))
         patches.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape)))
     figure, (panels,) = _panels(1, 2)
-    _show_around(panels, patches)
+    _show_around(panels, patches, marks)
     swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
     figure.legend(
         handles=swatches,
@@ -115,6 +120,28 @@ def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: P
         panel.set_title(SECTIONS[axis], fontsize=13)
     _color_bar(figure, rows, norm, r"$|u - u_h|$")
     figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
+    _save(figure, path)
+
+
+def draw_values(
+    path: Path, volume: BSplineVolume, solution: Solution, title: str, *, exaggerate: float | None = None
+) -> None:
+    """u_h on the boundary, of vectors the length, from the front and from behind.
+
+    exaggerate: draw the body displaced by that many times u_h, a vector.
+    """
+    from matplotlib.colors import Normalize
+
+    grids = all_grids(SAMPLES)[:6]
+    values = [solution_on(solution, grid) for grid in grids]
+    points = [points_on(volume, grid) for grid in grids]
+    if exaggerate is not None:
+        moved = [solution.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
+        points = [where + exaggerate * by for where, by in zip(points, moved, strict=True)]
+    norm = Normalize(float(np.min(values)), float(np.max(values)))
+    figure, (panels,) = _panels(1, 2)
+    _show_around(panels, [Patch(p, _colors(v, norm)) for p, v in zip(points, values, strict=True)])
+    _color_bar(figure, panels, norm, title)
     _save(figure, path)
 
 
@@ -223,11 +250,11 @@ def _panels(rows: int, columns: int) -> tuple[Figure, Any]:
     return figure, axes
 
 
-def _show_around(panels: Any, patches: list[Patch]) -> None:
+def _show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -> None:
     """The same patches from the front and from behind."""
     view = widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
-        panel.imshow(draw(patches, direction, PANEL))
+        panel.imshow(draw(patches, direction, PANEL, marks))
         panel.set_title(title, fontsize=13)
 
 
