@@ -1,12 +1,16 @@
-"""A sample surface, parameterized and solved: the package in ten lines of Python."""
+"""A sample surface, parameterized and solved: the package in ten lines of Python, and a picture."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import iga_nn
+from iga_nn.plotting import draw_faces
+from iga_nn.rendering import can_draw
 
 
-def main(name: str = "bean", config: object = None, levels: int = 2) -> None:
-    """Print quality, errors and convergence; `config` (see iga_nn.preset) shortens the run."""
+def main(name: str = "bean", config: object = None, levels: int = 2, out: str | Path = "out/first_run") -> Path:
+    """Print quality, errors and convergence; `config` (see iga_nn.preset) shortens the run. Returns the picture."""
     surface = iga_nn.sample(name)  # or iga_nn.load_surface("conch.obj")
     result = iga_nn.parameterize(surface, config, seed=0)
     print(result.quality)
@@ -15,6 +19,12 @@ def main(name: str = "bean", config: object = None, levels: int = 2) -> None:
     print(solution.report)
     for row in iga_nn.convergence(result.volume, problem, refine=range(levels)):
         print(row)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    result.volume.save(folder / "volume.npz")
+    if can_draw():
+        draw_faces(folder / "faces.png", result.volume)
+    return folder / "faces.png"
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from .folder import Outcome
 from .formats import export, is_volume
 from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
 
-FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--force", "--displacement")
+FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--body-force", "--displacement")
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
 
 app = App(

@@ -43,7 +43,7 @@ class RunFolder:
 
     def begin(self, *replaced: str) -> None:
         """The input is good: from here on nothing in the folder counts as finished; files of an older run go."""
-        for name in (reports.FILE_NAME, *replaced):
+        for name in (reports.FILE_NAME, reports.PAGE_NAME, *replaced):
             (self.folder / name).unlink(missing_ok=True)
 
     def write(self, **sections: Any) -> None:

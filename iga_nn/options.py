@@ -158,7 +158,7 @@ class ElasticityOptions:
     Attributes:
         exact: displacement as a vector; gives force and boundary data, and errors are reported. One that starts with
             a minus is written --exact="-x;0;0".
-        force: force per volume, a vector.
+        body_force: force per volume, a vector.
         displacement: its values on the faces without traction, a vector; zero without it and without exact.
         traction: faces that are pulled, each as "FACE=VECTOR", or FACE alone for the traction of the exact solution.
         young: Young's modulus E.
@@ -168,7 +168,7 @@ class ElasticityOptions:
     """
 
     exact: str | None = None
-    force: str | None = None
+    body_force: str | None = None
     displacement: str | None = None
     traction: tuple[str, ...] = ()
     young: float = 1.0
@@ -186,7 +186,7 @@ class ElasticityOptions:
         with input_errors():
             return Elasticity(
                 exact=_vector(self.exact),
-                force=_vector(self.force),
+                force=_vector(self.body_force),
                 displacement=_vector(self.displacement),
                 traction={face: _vector(text) for face, text in _faces("traction", self.traction).items()},
                 young=self.young,

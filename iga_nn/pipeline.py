@@ -20,6 +20,7 @@ from parameterize.volume import BSplineVolume
 
 from . import report as reports
 from . import studies
+from .command import command_line
 from .folder import CHECKPOINT, Outcome, RunFolder, has_checkpoint, open_folder
 from .formats import load_volume
 from .options import (
@@ -75,9 +76,10 @@ def run(
             )
         if finished:
             return finished
-        result = _parameterize(state, mesh, mapping, progress, equation)
-        _solve(state, result.volume, equation, poisson)
-        return state.finish()
+        command = command_line("run poisson", mesh, mapping, poisson, out=out)
+        result = _parameterize(state, mesh, mapping, progress, command, equation)
+        solution = _solve(state, result.volume, equation, poisson)
+        return _finish(state, result.volume, solution, equation)
 
 
 def parameterize_to(
@@ -93,8 +95,9 @@ def parameterize_to(
     with open_folder(mesh, out, force, mapping.resume) as (state, finished):
         if finished:
             return finished
-        _parameterize(state, mesh, mapping, progress)
-        return state.finish()
+        command = command_line("parameterize", mesh, mapping, out=out)
+        result = _parameterize(state, mesh, mapping, progress, command)
+        return _finish(state, result.volume)
 
 
 def solve_to(
@@ -122,11 +125,13 @@ def solve_to(
             check_device(device, equation)
     with open_folder(path, out, force) as (state, _):
         state.begin(*SOLUTION_FILES)
-        _write_certificate(state, path, loaded)
-        _solve(state, loaded, equation, options, **({"device": device} if device != "cpu" else {}))
+        elsewhere = {"device": device} if device != "cpu" else {}
+        command = command_line(f"solve {options.section}", path, options, **elsewhere, out=out)
+        _write_certificate(state, path, loaded, command)
+        solution = _solve(state, loaded, equation, options, **elsewhere)
         if len(equation.dirichlet) < 6:  # the user names faces: show which is which
             _draw(state, lambda plotting: plotting.draw_face_names(state.folder, loaded))
-        return state.finish()
+        return _finish(state, loaded, solution, equation)
 
 
 def study_to(
@@ -145,7 +150,7 @@ def study_to(
         check_problem(loaded, equation)
     with open_folder(path, out or f"{path.name.split('.')[0]}-study", force) as (state, _):
         state.begin(*STUDY_FILES)
-        _write_certificate(state, path, loaded)
+        _write_certificate(state, path, loaded, command_line("study", path, options, out=out))
         verdict = state.report["parameterization"]["bijective"]
         study = {}
         with state.timed("solve"), input_errors():
@@ -155,7 +160,7 @@ def study_to(
         save_text(state.folder / "study.csv", studies.as_csv(study))
         state.write(study={"exact": equation.exact, "levels": studies.rows_of(study)})
         _draw(state, lambda plotting: plotting.draw_study(state.folder / "study.png", study))
-        return state.finish(), studies.as_table(study)
+        return _finish(state, loaded), studies.as_table(study)
 
 
 def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str, Any]:
@@ -168,12 +173,13 @@ def check_volume(path: str | Path) -> dict[str, Any]:
     return _certify(load_volume(path))
 
 
-def _write_certificate(state: RunFolder, path: Path, volume: BSplineVolume) -> None:
+def _write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, command: str) -> None:
     """Certify a saved volume, and write the sections of report.json that say what was given."""
     with state.timed("certify"):
         certificate = _certify(volume)
     log.info("certificate: %s", certificate["bijective"])
     state.write(
+        command=command,
         input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
         versions=reports.versions(),
         parameterization=certificate,
@@ -185,6 +191,7 @@ def _parameterize(
     mesh: str | Path,
     options: MapOptions,
     progress: ProgressCallback | None,
+    command: str,
     equation: Poisson | None = None,
 ) -> Parameterization:
     config = options.config()
@@ -232,6 +239,7 @@ def _parameterize(
     result.boundary.save(state.folder / "boundary.npz")
     save_arrays(state.folder / "history.npz", **result.history)
     state.write(
+        command=command,
         input=surface.summary(),
         config=asdict(config),
         seed=options.seed,
@@ -251,7 +259,8 @@ def _solve(
     equation: Poisson | Elasticity,
     options: ProblemOptions,
     **solver: Any,
-) -> None:
+) -> Solution:
+    """Solve on every level, write what is known of all and the finest solution, and return that."""
     from solve import Poisson, rates, solve_problem
 
     verdict = state.report["parameterization"]["bijective"]
@@ -278,6 +287,24 @@ def _solve(
     state.write(**{options.section: section})
     if equation.exact is not None:
         _draw(state, lambda plotting: plotting.draw_solution(state.folder, volume, solutions[-1], equation))
+    return solutions[-1]
+
+
+def _finish(
+    state: RunFolder,
+    volume: BSplineVolume,
+    solution: Solution | None = None,
+    equation: Poisson | Elasticity | None = None,
+) -> Outcome:
+    """Close the report, and write the page that shows it."""
+    from . import page
+    from .scene import scene_of
+
+    with state.timed("report"):
+        scene = scene_of(volume, solution, equation)
+    outcome = state.finish()
+    page.write(outcome.folder, outcome.report, scene)
+    return outcome
 
 
 def _check_size(volume: BSplineVolume, options: ProblemOptions) -> None:

@@ -11,10 +11,23 @@ from numpy.typing import NDArray
 
 from parameterize.bspline import Array
 from parameterize.files import replacing
-from parameterize.quality import arap
-from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
+from parameterize.volume import BSplineVolume
 
 from .rendering import Patch, can_draw, draw, widest_view
+from .sampling import (
+    FACE_COLORS,
+    MAP,
+    SECTIONS,
+    all_grids,
+    distortion_on,
+    error_norm,
+    face_grid,
+    face_labels,
+    points_on,
+    sampled_error,
+    section_grid,
+    solution_on,
+)
 from .studies import Study
 
 if TYPE_CHECKING:
@@ -26,9 +39,6 @@ if TYPE_CHECKING:
 
 SAMPLES = 141  # a direction and patch
 PANEL = (900, 700)  # pixels of one view
-FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # distinct for the colour-blind, too
-SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
-MAP = "viridis"  # perceptually uniform
 
 
 def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
@@ -51,20 +61,21 @@ def draw_map(folder: Path, volume: BSplineVolume, history: dict[str, NDArray[Any
         draw_distortion(folder / "distortion.png", volume)
 
 
-def draw_faces(path: Path, volume: BSplineVolume) -> None:
-    """The images of the six faces of the cube, each in its colour, from the front and from behind."""
+def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) -> None:
+    """The images of the six faces of the cube, each in its colour, from the front and from behind.
+
+    marks: points (k, 3) shown as black balls, such as the corners that were given (the paper's Fig. 13).
+    """
     from matplotlib.colors import to_rgb
     from matplotlib.patches import Patch as Swatch
 
     patches = []
     for face, color in enumerate(FACE_COLORS):
-        points = volume.grid(*_face_grid(face)).reshape(SAMPLES, SAMPLES, 3)
+        points = points_on(volume, face_grid(face, SAMPLES))
         patches.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape)))
     figure, (panels,) = _panels(1, 2)
-    _show_around(panels, patches)
-    swatches = [
-        Swatch(color=color, label=_face_label(name)) for name, color in zip(FACE_NAMES, FACE_COLORS, strict=True)
-    ]
+    _show_around(panels, patches, marks)
+    swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
     figure.legend(
         handles=swatches,
         loc="outside lower center",
@@ -85,10 +96,9 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
     norm = Normalize(0.0, 1.0)
     figure, (panels,) = _panels(1, 3)
     for axis, panel in enumerate(panels):
-        grid = _section_grid(axis)
-        points = volume.grid(*grid).reshape(SAMPLES, SAMPLES, 3)
-        energy = arap(volume.grid_jacobian(*grid)).reshape(SAMPLES, SAMPLES)
-        patch = Patch(points, _colors(np.tanh(np.sqrt(energy) / 2.0), norm), lit=False)
+        grid = section_grid(axis, SAMPLES)
+        points = points_on(volume, grid)
+        patch = Patch(points, _colors(distortion_on(volume, grid), norm), lit=False)
         panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
         panel.set_title(SECTIONS[axis], fontsize=13)
     _color_bar(figure, panels, norm, "tanh(√ARAP / 2), scale as given")
@@ -98,8 +108,8 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
 
 def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
     """|u - u_h| on the boundary and on the three mid-sections, logarithmic colours; the error norms beside it."""
-    points, errors = _sampled_error(volume, solution, problem)
-    norm = _error_norm([errors])
+    points, errors = sampled_error(volume, solution, problem, SAMPLES)
+    norm = error_norm([errors])
     figure, rows = _panels(2, 3)
     boundary = [Patch(p, _colors(e, norm)) for p, e in zip(points[:6], errors[:6], strict=True)]
     _show_around(rows[0][:2], boundary)
@@ -113,13 +123,35 @@ def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: P
     _save(figure, path)
 
 
+def draw_values(
+    path: Path, volume: BSplineVolume, solution: Solution, title: str, *, exaggerate: float | None = None
+) -> None:
+    """u_h on the boundary, of vectors the length, from the front and from behind.
+
+    exaggerate: draw the body displaced by that many times u_h, a vector.
+    """
+    from matplotlib.colors import Normalize
+
+    grids = all_grids(SAMPLES)[:6]
+    values = [solution_on(solution, grid) for grid in grids]
+    points = [points_on(volume, grid) for grid in grids]
+    if exaggerate is not None:
+        moved = [solution.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
+        points = [where + exaggerate * by for where, by in zip(points, moved, strict=True)]
+    norm = Normalize(float(np.min(values)), float(np.max(values)))
+    figure, (panels,) = _panels(1, 2)
+    _show_around(panels, [Patch(p, _colors(v, norm)) for p, v in zip(points, values, strict=True)])
+    _color_bar(figure, panels, norm, title)
+    _save(figure, path)
+
+
 def draw_errors(path: Path, volume: BSplineVolume, solutions: Sequence[Solution], problem: Problem) -> None:
     """|u - u_h| of several meshes in one range of colours, a row a mesh: the boundary and the three mid-sections.
 
     The layout of the paper's Fig. 14, with the L2 error marked.
     """
-    samples = [_sampled_error(volume, solution, problem) for solution in solutions]
-    norm = _error_norm([errors for _, errors in samples])
+    samples = [sampled_error(volume, solution, problem, SAMPLES) for solution in solutions]
+    norm = error_norm([errors for _, errors in samples])
     figure, rows = _panels(len(solutions), 4)
     for row, (points, errors), solution in zip(rows, samples, solutions, strict=True):
         for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
@@ -186,52 +218,11 @@ def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
     _save(figure, path)
 
 
-def _face_grid(face: int) -> tuple[Array, Array, Array]:
-    """Parameters of SAMPLES x SAMPLES points on a face of the cube, in the order of FACE_NAMES."""
-    return _grid(face // 2, float(face % 2))
-
-
-def _section_grid(axis: int) -> tuple[Array, Array, Array]:
-    return _grid(axis, 0.5)
-
-
-def _grid(axis: int, value: float) -> tuple[Array, Array, Array]:
-    u, v, w = (np.array([value]) if a == axis else np.linspace(0.0, 1.0, SAMPLES) for a in range(3))
-    return u, v, w
-
-
-def _error(solution: Solution, problem: Problem, grid: tuple[Array, Array, Array], points: Array) -> Array:
-    """|u - u_h| at the samples of a grid whose images are `points` (SAMPLES, SAMPLES, 3); of vectors, the length."""
-    exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
-    found = solution.grid(*grid).reshape(SAMPLES, SAMPLES, -1)
-    wanted = np.moveaxis(exact.reshape(-1, SAMPLES, SAMPLES), 0, -1)  # (SAMPLES, SAMPLES, 1 or 3)
-    return np.linalg.norm(found - wanted, axis=-1)
-
-
-def _sampled_error(volume: BSplineVolume, solution: Solution, problem: Problem) -> tuple[list[Array], list[Array]]:
-    """Points (SAMPLES, SAMPLES, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
-    grids = [_face_grid(face) for face in range(6)] + [_section_grid(axis) for axis in range(3)]
-    points = [volume.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
-    return points, [_error(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
-
-
-def _error_norm(meshes: Sequence[Sequence[Array]]) -> Any:
-    """Logarithmic colours from the largest error of all meshes to four decades below that of the best one."""
-    from matplotlib.colors import LogNorm
-
-    tops = [max(float(error.max()) for error in errors) or 1.0 for errors in meshes]
-    return LogNorm(1e-4 * min(tops), max(tops), clip=True)
-
-
 def _colors(values: Array, norm: Any) -> Array:
     """Red, green, blue (m, n, 3) of values (m, n)."""
     from matplotlib import colormaps
 
     return np.asarray(colormaps[MAP](norm(values)))[..., :3]
-
-
-def _face_label(name: str) -> str:
-    return f"{name}: {name[0]} = {name[1]}"
 
 
 def _positive(values: NDArray[Any]) -> Array:
@@ -259,11 +250,11 @@ def _panels(rows: int, columns: int) -> tuple[Figure, Any]:
     return figure, axes
 
 
-def _show_around(panels: Any, patches: list[Patch]) -> None:
+def _show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -> None:
     """The same patches from the front and from behind."""
     view = widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
-        panel.imshow(draw(patches, direction, PANEL))
+        panel.imshow(draw(patches, direction, PANEL, marks))
         panel.set_title(title, fontsize=13)
 
 

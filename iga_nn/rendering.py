@@ -90,8 +90,13 @@ def widest_view(points: Array, tilt: float = 0.0) -> View:
     return View(right, np.cross(towards, right), towards)
 
 
-def draw(patches: Sequence[Patch], view: View, pixels: tuple[int, int]) -> NDArray[np.uint8]:
-    """Picture (height, width, 3) of the patches, parallel projection, framed to fill `pixels` = (width, height)."""
+def draw(
+    patches: Sequence[Patch], view: View, pixels: tuple[int, int], marks: Array | None = None
+) -> NDArray[np.uint8]:
+    """Picture (height, width, 3) of the patches, parallel projection, framed to fill `pixels` = (width, height).
+
+    marks: points (k, 3), drawn as black balls.
+    """
     import pyvista
 
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=list(pixels), lighting="none")
@@ -107,6 +112,8 @@ def draw(patches: Sequence[Patch], view: View, pixels: tuple[int, int]) -> NDArr
             ambient=0.5,
             diffuse=0.55,
         )
+    if marks is not None:
+        plotter.add_points(marks, color="black", point_size=18, render_points_as_spheres=True)
     _aim(plotter, np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), view, pixels)
     plotter.add_light(pyvista.Light(light_type="headlight", intensity=0.9))
     image: NDArray[np.uint8] = plotter.screenshot(return_img=True)

@@ -18,6 +18,7 @@ from . import __version__
 
 SCHEMA = 1
 FILE_NAME = "report.json"
+PAGE_NAME = "report.html"
 
 Report = dict[str, Any]
 

@@ -20,7 +20,7 @@ from parameterize.checkpoint import CheckpointError
 from parameterize.volume import FACE_NAMES
 from solve.study import benchmark_volume
 
-FILES = ("volume.npz", "boundary.npz", "history.npz", "solution.npz", "report.json", "history.png")
+FILES = ("volume.npz", "boundary.npz", "history.npz", "solution.npz", "report.json", "report.html", "history.png")
 
 
 def one_line(text: str) -> str:
@@ -47,7 +47,7 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
     assert not [file for file in folder.iterdir() if file.name.startswith(".")]  # no temporary file left
     report = json.loads((folder / "report.json").read_text())
     assert list(report) == [
-        "schema", "input", "config", "seed", "device", "versions", "parameterization", "poisson", "seconds",
+        "schema", "command", "input", "config", "seed", "device", "versions", "parameterization", "poisson", "seconds",
     ]  # fmt: skip
     assert report["poisson"]["exact"] == "x*y"
     assert [level["elements"] for level in report["poisson"]["levels"]] == [4**3, 8**3]
@@ -162,12 +162,24 @@ def test_elasticity_on_a_saved_volume(in_folder, capsys):
         assert data["coefficients"].shape == (9, 9, 9, 3)
 
 
+def test_elasticity_under_a_body_force(in_folder):
+    benchmark_volume(2).save("map.npz")
+    assert main(["solve", "elasticity", "map.npz", "--refine", "0", "--body-force", "0;0;-1", "--quiet"]) == 0
+    assert json.loads(Path("map/report.json").read_text())["elasticity"]["body_force"] == "0;0;-1"
+    assert "--body-force" in Path("map/report.html").read_text()
+
+
 def test_study_writes_table_csv_and_plot(in_folder, capsys):
     benchmark_volume(2).save("map.npz")
     assert main(["study", "map.npz", "--degree", "3", "2", "--refine", "0..2"]) == 0
     table = capsys.readouterr().out.splitlines()
     assert table[0].split()[:3] == ["degree", "elements", "dofs"] and len(table) == 8
-    assert {file.name for file in Path("map-study").iterdir()} == {"report.json", "study.csv", "study.png"}
+    assert {file.name for file in Path("map-study").iterdir()} == {
+        "report.html",
+        "report.json",
+        "study.csv",
+        "study.png",
+    }
     with Path("map-study/study.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [(row["degree"], row["elements"]) for row in rows[:4]] == [("2", "8"), ("2", "64"), ("2", "512"), ("3", "8")]

@@ -1,0 +1,49 @@
+"""Files for ParaView, MFEM and G+Smo, with the solution where the format carries one; the view, cut open.
+
+On the command line: `iga-nn export volume.npz --to view --solution solution.npz`. MFEM and G+Smo need the extra
+`interop`: `pip install iga-nn[interop]`.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import iga_nn
+from iga_nn.rendering import can_draw
+from solve.study import benchmark_volume
+
+
+def main(volume: str | Path | None = None, out: str | Path = "out/export_files") -> Path:
+    """Write one file a format and print their names; returns the picture."""
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    if volume is None:
+        volume = folder / "volume.npz"
+        benchmark_volume(5).save(volume)
+    solution = iga_nn.solve(iga_nn.load_volume(volume), iga_nn.Poisson(exact="sin(3*x)*sin(3*y)*sin(3*z)"))
+    solution.save(folder / "solution.npz")
+    for to, name in {"vtk": "exact_bezier.vtu", "view": "samples_view.vtu", "mfem": "mfem.mesh"}.items():
+        print(iga_nn.export(volume, to, folder / name, solution=folder / "solution.npz", force=True))
+    print(iga_nn.export(volume, "gismo", folder / "gismo.xml", force=True))
+    if can_draw():
+        draw_cut(folder / "samples_view.vtu", folder / "cut.png")
+    return folder / "cut.png"
+
+
+def draw_cut(view: Path, picture: Path) -> None:
+    """The solution inside: slices and clips are right on the view's linear cells alone, not on the exact ones."""
+    import pyvista
+
+    whole = pyvista.read(view)
+    plotter = pyvista.Plotter(off_screen=True, window_size=[900, 700])
+    plotter.set_background("white")
+    plotter.add_mesh(whole.clip("-x"), scalars="u", cmap="viridis", scalar_bar_args={"color": "black"})
+    plotter.add_mesh(whole.outline(), color="grey")
+    plotter.view_vector((-1.0, -0.7, 0.5))
+    plotter.screenshot(picture)
+    plotter.close()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:2])

@@ -1,0 +1,34 @@
+"""The command that repeats a result, from the options it was made with."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+SILENT = ("resume",)  # changes how a result is reached, not what it is
+
+
+def command_line(command: str, source: str | Path, *options: Any, **given: Any) -> str:
+    """One line for a shell: the command, its input, every option that is not the default.
+
+    options: frozen dataclasses of `iga_nn.options`. given: further options by name, left out where None.
+    """
+    words = ["iga-nn", *command.split(), str(source)]
+    for chosen in options:
+        for field in fields(chosen):
+            value = getattr(chosen, field.name)
+            if value != field.default and field.name not in SILENT:
+                words += _words(field.name, value)
+    for name, value in given.items():
+        if value is not None:
+            words += _words(name, value)
+    return shlex.join(words)
+
+
+def _words(name: str, value: Any) -> list[str]:
+    flag = "--" + name.replace("_", "-")
+    if isinstance(value, tuple):
+        return [flag, *map(str, value)]
+    return [f"{flag}={value}"] if str(value).startswith("-") else [flag, str(value)]

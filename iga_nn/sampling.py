@@ -1,0 +1,100 @@
+"""What pictures show: points of a volume on the cube's faces and sections, and the values there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from parameterize.bspline import Array
+from parameterize.quality import arap
+from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
+
+if TYPE_CHECKING:
+    from solve import Elasticity, Poisson, Solution
+
+    Problem = Poisson | Elasticity
+
+Grid = tuple[Array, Array, Array]  # parameters of a tensor grid, one direction with a single value
+
+SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
+MAP = "viridis"  # of colours; perceptually uniform
+FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # distinct for the colour-blind, too
+
+
+def face_grid(face: int, samples: int) -> Grid:
+    """Parameters of samples x samples points on a face of the cube, in the order of FACE_NAMES."""
+    return _grid(face // 2, float(face % 2), samples)
+
+
+def section_grid(axis: int, samples: int) -> Grid:
+    """The same on the section through the middle of the cube, across an axis."""
+    return _grid(axis, 0.5, samples)
+
+
+def all_grids(samples: int) -> list[Grid]:
+    """The six faces, then the three mid-sections."""
+    return [face_grid(face, samples) for face in range(6)] + [section_grid(axis, samples) for axis in range(3)]
+
+
+def _grid(axis: int, value: float, samples: int) -> Grid:
+    u, v, w = (np.array([value]) if a == axis else np.linspace(0.0, 1.0, samples) for a in range(3))
+    return u, v, w
+
+
+def points_on(volume: BSplineVolume, grid: Grid) -> Array:
+    """Points (samples, samples, 3) of a grid of faces or sections."""
+    return _flat(volume.grid(*grid))
+
+
+def distortion_on(volume: BSplineVolume, grid: Grid) -> Array:
+    """tanh(sqrt(ARAP) / 2), as the paper colours it, in the units given: (samples, samples)."""
+    return np.asarray(np.tanh(np.sqrt(_flat(arap(volume.grid_jacobian(*grid)))) / 2.0))
+
+
+def solution_on(solution: Solution, grid: Grid) -> Array:
+    """u_h, of vectors the length: (samples, samples)."""
+    values = _flat(solution.grid(*grid))
+    return values if values.ndim == 2 else _length(values)
+
+
+def error_on(solution: Solution, problem: Problem, grid: Grid, points: Array) -> Array:
+    """|u - u_h|, of vectors the length, where the images of a grid are `points`: (samples, samples)."""
+    exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
+    found = _flat(solution.grid(*grid))
+    wanted = exact if found.ndim == 2 else np.moveaxis(exact, 0, -1)
+    return _length(found - wanted)
+
+
+def sampled_error(
+    volume: BSplineVolume, solution: Solution, problem: Problem, samples: int
+) -> tuple[list[Array], list[Array]]:
+    """Points (samples, samples, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
+    grids = all_grids(samples)
+    points = [points_on(volume, grid) for grid in grids]
+    return points, [error_on(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
+
+
+def error_norm(meshes: Sequence[Sequence[Array]]) -> Any:
+    """Logarithmic colours from the largest error of all meshes to four decades below that of the best one."""
+    from matplotlib.colors import LogNorm
+
+    tops = [max(float(error.max()) for error in errors) or 1.0 for errors in meshes]
+    return LogNorm(1e-4 * min(tops), max(tops), clip=True)
+
+
+def face_labels() -> list[str]:
+    """What the six colours stand for."""
+    return [f"{name}: {name[0]} = {name[1]}" for name in FACE_NAMES]
+
+
+def _length(values: Array) -> Array:
+    """Absolute values of numbers (m, n), lengths of vectors (m, n, 3)."""
+    return np.abs(values) if values.ndim == 2 else np.asarray(np.linalg.norm(values, axis=-1))
+
+
+def _flat(values: Array) -> Array:
+    """A grid's values without the direction that has a single parameter."""
+    axis = next(a for a in range(3) if values.shape[a] == 1)
+    return np.asarray(values.squeeze(axis))

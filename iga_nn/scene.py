@@ -1,0 +1,98 @@
+"""The interactive scene of report.html: faces and mid-sections of a volume as compact arrays, for viewer.js.
+
+Nine patches (the six faces, u = 1/2, v = 1/2, w = 1/2), each sampled on the same lattice of SAMPLES x SAMPLES points.
+Places are 16-bit numbers between the scene's two corners, values 8-bit numbers of a colour map, both in Base64: some
+0.8 MB for a volume with all its fields.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from parameterize.bspline import Array
+from parameterize.volume import BSplineVolume
+
+from .rendering import widest_view
+from .sampling import (
+    FACE_COLORS,
+    MAP,
+    all_grids,
+    distortion_on,
+    error_norm,
+    error_on,
+    face_labels,
+    points_on,
+    solution_on,
+)
+
+if TYPE_CHECKING:
+    from solve import Solution
+
+    from .sampling import Problem
+
+SAMPLES = 81  # a direction and patch
+TILT = 0.45  # radians: more than one side is seen
+
+Scene = dict[str, Any]
+
+
+def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: Problem | None = None) -> Scene:
+    """What viewer.js draws, in JSON's own types; solution and error are there where they are known and finite."""
+    grids = all_grids(SAMPLES)
+    points = [points_on(volume, grid) for grid in grids]
+    fields = [_field("distortion", "tanh(√ARAP / 2)", [distortion_on(volume, grid) for grid in grids], (0.0, 1.0))]
+    if solution is not None and np.all(np.isfinite(solution.coefficients)):
+        name = "u" if solution.coefficients.ndim == 3 else "|u|"
+        values = [solution_on(solution, grid) for grid in grids]
+        fields.append(_field("solution", name, values, (float(np.min(values)), float(np.max(values)))))
+        if problem is not None and problem.exact is not None:
+            errors = [error_on(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
+            fields.append(_error_field(errors))
+    cloud = np.concatenate([where.reshape(-1, 3) for where in points])
+    low, high = cloud.min(axis=0), cloud.max(axis=0)
+    view = widest_view(cloud[: 6 * SAMPLES**2], tilt=TILT)
+    frame = np.stack([view.right, view.up, view.towards])
+    half = np.abs((cloud - (low + high) / 2.0) @ frame[:2].T).max(axis=0)  # width and height as first seen
+    return {
+        "samples": SAMPLES,
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "view": frame.tolist(),
+        "half": half.tolist(),
+        "places": _packed((cloud - low) / np.where(high > low, high - low, 1.0), np.uint16),
+        "colors": list(FACE_COLORS),
+        "labels": face_labels(),
+        "map": _color_map(),
+        "fields": fields,
+    }
+
+
+def _field(name: str, title: str, patches: Sequence[Array], limits: tuple[float, float]) -> dict[str, str]:
+    """Values on the nine patches, evenly coloured between the limits."""
+    low, high = limits
+    shares = (np.stack(patches) - low) / (high - low if high > low else 1.0)
+    return {"name": name, "title": title, "low": f"{low:.3g}", "high": f"{high:.3g}", "values": _packed(shares)}
+
+
+def _error_field(patches: Sequence[Array]) -> dict[str, str]:
+    norm = error_norm([patches])
+    shares = np.asarray(norm(np.concatenate(patches).ravel()))
+    limits = {"low": f"{norm.vmin:.1e}", "high": f"{norm.vmax:.1e}"}
+    return {"name": "error", "title": "|u − uₕ|, logarithmic", **limits, "values": _packed(shares)}
+
+
+def _color_map() -> str:
+    from matplotlib import colormaps
+
+    return _packed(colormaps[MAP](np.arange(256))[:, :3])  # (256, 3)
+
+
+def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint8) -> str:
+    """Numbers 0..1 as whole numbers over the range of `kind`, little-endian, in Base64."""
+    numbers = np.rint(np.clip(shares, 0.0, 1.0) * np.iinfo(kind).max).astype(np.dtype(kind).newbyteorder("<"))
+    return base64.b64encode(numbers.tobytes()).decode("ascii")

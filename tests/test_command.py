@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+from iga_nn.cli import app
+from iga_nn.command import command_line
+from iga_nn.options import ElasticityOptions, MapOptions, PoissonOptions, StudyOptions
+
+
+def options_of(line: str) -> tuple[object, ...]:
+    """The options dataclasses that the command line makes of such a line."""
+    program, *words = shlex.split(line)
+    assert program == "iga-nn"
+    _, bound, _ = app.parse_args(words, exit_on_error=False, print_error=False)
+    return tuple(bound.arguments.values())
+
+
+@pytest.mark.parametrize(
+    ("command", "chosen"),
+    [
+        ("run poisson", (MapOptions(seed=3, corners=Path("a b.json"), steps_factor=0.5), PoissonOptions())),
+        ("solve poisson", (PoissonOptions(exact="-x*y", neumann=("u1=-y", "w0"), robin=("v0=1+x*x:2",)),)),
+        ("solve poisson", (PoissonOptions(source="1", boundary="0", kappa="2,0,0,1,0,1", refine=(1, 2), degree=4),)),
+        ("solve elasticity", (ElasticityOptions(body_force="0;0;-1", traction=("u1=1;0;0",), young=2.5),)),
+        ("study", (StudyOptions(degree=(2, 3), refine=("0..3",)),)),
+    ],
+)
+def test_the_line_gives_the_options_back(command, chosen):
+    line = command_line(command, "my file.npz", *chosen, out="here")
+    given = options_of(line)
+    for options in chosen:
+        assert options in given or options == type(options)()  # defaults are not written, nor bound
+
+
+def test_defaults_and_resuming_are_left_out():
+    assert command_line("parameterize", "bean", MapOptions(resume=True), out=None) == "iga-nn parameterize bean"
+    assert command_line("solve poisson", "v.npz", device="cuda").endswith("v.npz --device cuda")

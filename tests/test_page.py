@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import rgb_to_hsv, to_rgb
+from matplotlib.image import imread
+
+import solve
+from iga_nn import page, scene
+from iga_nn.cli import main
+from iga_nn.sampling import FACE_COLORS
+from solve.study import benchmark_volume
+
+QUIET = (
+    "--headless", "--no-sandbox", "--hide-scrollbars", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--enable-logging=stderr", "--no-first-run", "--disable-background-networking", "--disable-component-update",
+    "--disable-sync", "--disable-default-apps", "--disable-extensions",
+)  # fmt: skip
+
+OWN = "not an origin"
+
+
+@pytest.fixture
+def chromium() -> str:
+    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    if found is None:
+        pytest.skip("no chromium on this machine; remedy: apt-get install --no-install-recommends chromium")
+    return found
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """report.json and report.html of a small solve, and their folder."""
+    folder = tmp_path_factory.mktemp("page")
+    benchmark_volume(3).save(folder / "map <b>.npz")
+    arguments = ["--refine", "0", "1", "--exact", "x*y*z", "--quiet", "--out", str(folder / "out")]
+    assert main(["solve", "poisson", str(folder / "map <b>.npz"), *arguments]) == 0
+    return folder / "out"
+
+
+def browse(chromium: str, folder: Path, url: str, width: int) -> tuple[np.ndarray, str, list[str]]:
+    """Picture (height, width, 3) of a page, what its console said, and the addresses that were asked for."""
+    shot, log = folder / "shot.png", folder / "net.json"
+    places = (f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}", f"--screenshot={shot}")
+    done = subprocess.run(
+        [chromium, *QUIET, *places, f"--window-size={width},1000", url], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    console = "\n".join(line for line in done.stderr.splitlines() if "CONSOLE" in line)
+    return imread(shot)[..., :3], console, addresses(log)
+
+
+def addresses(log: Path) -> list[str]:
+    """What the page asked for; the browser's own errands have no initiator."""
+    events = [event.get("params", {}) for event in json.loads(log.read_text(encoding="utf-8"))["events"]]
+    return [event["url"] for event in events if "url" in event and event.get("initiator", OWN) != OWN]
+
+
+def drawn(image: np.ndarray) -> np.ndarray:
+    """Hue, saturation and value (k, 3) of the strongly coloured pixels, the page's own faint tints left out."""
+    pixels = rgb_to_hsv(image.reshape(-1, 3))
+    return pixels[(pixels[:, 1] > 0.35) & (pixels[:, 2] > 0.2)]
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_browser_draws_the_scene_and_fetches_nothing(chromium, result, tmp_path, width):
+    image, console, asked = browse(chromium, tmp_path, f"{(result / 'report.html').as_uri()}", width)
+    assert console == "" and asked == []
+    hues = drawn(image)[:, 0]
+    wanted = rgb_to_hsv(np.array([to_rgb(color) for color in FACE_COLORS]))[:, 0]
+    seen = [np.count_nonzero(np.abs(hues - hue) < 0.02) for hue in wanted]
+    assert sum(count > 1000 for count in seen) >= 3  # three faces of a twisted cube
+
+
+def test_address_chooses_what_is_coloured(chromium, result, tmp_path):
+    faces, *_ = browse(chromium, tmp_path, (result / "report.html").as_uri(), 700)
+    error, console, _ = browse(chromium, tmp_path, (result / "report.html").as_uri() + "#error", 700)
+    assert console == "" and len(drawn(error)) > 5000
+    assert np.mean(np.abs(faces - error).max(axis=-1) > 0.1) > 0.05
+
+
+def test_browser_log_would_show_an_address_and_an_error(chromium, tmp_path):
+    (tmp_path / "page.html").write_text('<img src="http://127.0.0.1:9/x.png"><script>unknown()</script>')
+    _, console, asked = browse(chromium, tmp_path, (tmp_path / "page.html").as_uri(), 500)
+    assert "unknown" in console and "http://127.0.0.1:9/x.png" in asked
+
+
+def test_page_says_the_verdict_the_numbers_and_the_command(result):
+    report = json.loads((result / "report.json").read_text())
+    text = (result / "report.html").read_text(encoding="utf-8")
+    finest = report["poisson"]["levels"][-1]
+    for expected in ("Certified", f"{finest['l2']:.3e}", f"{report['poisson']['rates']['l2'][0]:.2f}", "x*y*z"):
+        assert expected in text
+    assert text.index("Certified") < text.index("Convergence") < text.index("--exact")
+    assert "map &lt;b&gt;" in text and "<b>" not in text
+    assert re.search(r"""(?:src|href)=["'](?!data:)|url\(|@import""", text) is None
+
+
+def test_verdicts_of_what_went_wrong(result):
+    report = json.loads((result / "report.json").read_text())
+    picture = scene.scene_of(benchmark_volume(1))
+    report["parameterization"] |= {"bijective": "folded", "witness": [0.25, 0.5, 1.0]}
+    report["poisson"]["levels"][0]["converged"] = False
+    text = page.page(report, picture, result)
+    assert "the map folds" in text and "0.25, 0.5, 1" in text and "did not converge" in text
+
+
+def test_scene_holds_places_and_values(result):
+    volume = benchmark_volume(2)
+    problem = solve.Poisson(exact="x+2*y")
+    drawing = scene.scene_of(volume, solve.solve_poisson(volume, problem), problem)
+    n = drawing["samples"]
+    shares = np.frombuffer(base64.b64decode(drawing["places"]), "<u2").reshape(9, n, n, 3) / 65535
+    low, high = np.array(drawing["low"]), np.array(drawing["high"])
+    middle, last = (n - 1) // 2, n - 1
+    for patch, (i, j), at in ((1, (0, last), (1, 0, 1)), (4, (middle, last), (0.5, 1, 0)), (7, (0, 0), (0, 0.5, 0))):
+        assert np.abs(low + shares[patch, i, j] * (high - low) - volume([at])).max() < 1e-4
+    assert [field["name"] for field in drawing["fields"]] == ["distortion", "solution", "error"]
+    values = np.frombuffer(base64.b64decode(drawing["fields"][1]["values"]), "u1").reshape(9, n, n)
+    x, y, _ = volume([(1, 0, 1)])[0]
+    low_u, high_u = float(drawing["fields"][1]["low"]), float(drawing["fields"][1]["high"])
+    assert values[1, 0, last] / 255 == pytest.approx((x + 2 * y - low_u) / (high_u - low_u), abs=0.01)
+
+
+def test_scene_of_a_body_has_lengths(result):
+    volume = benchmark_volume(1)
+    body = solve.Elasticity(force=("0", "0", "-1"))
+    drawing = scene.scene_of(volume, solve.solve_elasticity(volume, body), body)
+    assert [field["title"] for field in drawing["fields"]] == ["tanh(√ARAP / 2)", "|u|"]
