@@ -170,7 +170,8 @@ def check(path: str, /, *, component: int | None = None, max_faces: int = MAX_FA
         _say(json.dumps(reports.plain(verdict), indent=2))
     else:
         _say("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
-    return NOT_CERTIFIED if as_volume and verdict["bijective"] != "certified" else DONE
+    injective = not as_volume or (verdict["bijective"] == "certified" and verdict["boundary_injective"] is not False)
+    return DONE if injective else NOT_CERTIFIED
 
 
 @app.command(name="sample")
@@ -294,6 +295,8 @@ def _lines(verdict: dict[str, Any]) -> list[str]:
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
+    if isinstance(value, dict):
+        return "; ".join(f"{key} {_text(item)}" for key, item in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(_text(item) for item in value) or "none"
     return str(value)

@@ -173,6 +173,7 @@ def _write_certificate(state: RunFolder, path: Path, volume: BSplineVolume) -> N
     with state.timed("certify"):
         certificate = _certify(volume)
     log.info("certificate: %s", certificate["bijective"])
+    _warn_of_meeting(certificate)
     state.write(
         input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
         versions=reports.versions(),
@@ -240,6 +241,7 @@ def _parameterize(
         parameterization=result.quality.as_dict(),
     )
     log.info("certificate: %s", result.certificate.verdict)
+    _warn_of_meeting(state.report["parameterization"])
     shutil.rmtree(checkpoint, ignore_errors=True)  # the files above replace it
     _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history))
     return result
@@ -293,15 +295,24 @@ def _load(mesh: str | Path, component: int | None, max_faces: int) -> Surface:
 def _certify(volume: BSplineVolume) -> dict[str, Any]:
     """What the section `parameterization` of report.json says of a volume alone."""
     from parameterize.certificate import certify
+    from parameterize.injective import check_boundary
 
     certificate = certify(volume)
     return {
         "control_points": list(volume.shape),
         "degrees": list(volume.degrees),
         "bijective": certificate.verdict,
+        **check_boundary(volume).as_dict(),
         "det_lower_bound": certificate.lower_bound,
         "witness": certificate.witness,
     }
+
+
+def _warn_of_meeting(quality: dict[str, Any]) -> None:
+    """Say where the boundary meets itself: the map is not one-to-one although nowhere folded."""
+    if meeting := quality["boundary_meeting"]:
+        place = ", ".join(f"{x:.6g}" for x in meeting["point"])
+        log.warning("the volume overlaps itself: its boundary passes twice through (%s)", place)
 
 
 def _draw(state: RunFolder, draw: Callable[[Any], None]) -> None:
