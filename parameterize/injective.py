@@ -31,7 +31,7 @@ Point = tuple[float, float, float]
 
 _TANGENTS = np.array([[1, 2], [0, 2], [0, 1]])  # the axes that vary on a face whose constant axis is given
 _CHUNK = 4096  # pairs at a time
-_MOST_PAIRS = 200_000  # more than this are not looked at: undecided
+_MOST_PAIRS = 50_000, 10  # in all, and for each patch in addition: more are not looked at
 _PLANES = 64  # steps towards a separating plane
 _TRIED = 64  # pairs a level from which a common point is searched for
 _NEWTON_STEPS = 12
@@ -79,14 +79,16 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryChe
     own = np.repeat(np.arange(len(pieces.nets))[:, None], 2, axis=1)
     points = _as_rows(pieces.nets)
     pairs = np.concatenate([own, overlapping_boxes(points.min(axis=1) - error, points.max(axis=1) + error)])
+    most = _MOST_PAIRS[0] + _MOST_PAIRS[1] * len(own)
     for depth in range(max_depth + 1):
-        pairs = pairs[~_settled(pieces, pairs, error)]
+        hopeless = len(pairs) > most  # then only a common point is searched for
+        pairs = pairs if hopeless else pairs[~_settled(pieces, pairs, error)]
         if not len(pairs):
             return BoundaryCheck(True, None, 0)
         meeting = _search(volume, pieces, pairs)
         if meeting is not None:
             return BoundaryCheck(False, meeting, len(pairs))
-        if depth == max_depth or 16 * len(pairs) > _MOST_PAIRS:
+        if hopeless or depth == max_depth:
             break
         pieces, pairs = _halved(pieces, pairs)
     return BoundaryCheck(None, None, len(pairs))
