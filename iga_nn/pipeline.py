@@ -158,9 +158,15 @@ def study_to(
         return state.finish(), studies.as_table(study)
 
 
-def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str, Any]:
-    """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not."""
-    return _load(mesh, component, max_faces).summary()
+def check_surface(mesh: str, component: int | None, max_faces: int, strict: bool = False) -> dict[str, Any]:
+    """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not.
+
+    strict: refuse a surface that intersects itself, too.
+    """
+    surface = _load(mesh, component, max_faces)
+    if strict:
+        surface.refuse_crossings()
+    return surface.summary()
 
 
 def check_volume(path: str | Path) -> dict[str, Any]:
