@@ -155,22 +155,32 @@ def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = 
 
 
 @app.command(name="check")
-def check(path: str, /, *, component: int | None = None, max_faces: int = MAX_FACES, as_json: Json = False) -> int:
+def check(
+    path: str,
+    /,
+    *,
+    component: int | None = None,
+    max_faces: int = MAX_FACES,
+    strict: bool = False,
+    as_json: Json = False,
+) -> int:
     """Say whether a surface is accepted, or whether a volume is certified; writes nothing.
 
     Args:
         path: surface, sample's or model's name, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
         component: which connected piece of the file to take, counted from 0.
         max_faces: refuse larger surfaces.
+        strict: refuse a surface that intersects itself; without this it is a notice.
         as_json: the verdict as JSON on stdout.
     """
     as_volume = is_volume(path)
-    verdict = pipeline.check_volume(path) if as_volume else pipeline.check_surface(path, component, max_faces)
+    verdict = pipeline.check_volume(path) if as_volume else pipeline.check_surface(path, component, max_faces, strict)
     if as_json:
         _say(json.dumps(reports.plain(verdict), indent=2))
     else:
         _say("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
-    return NOT_CERTIFIED if as_volume and verdict["bijective"] != "certified" else DONE
+    injective = not as_volume or (verdict["bijective"] == "certified" and verdict["boundary_injective"] is not False)
+    return DONE if injective else NOT_CERTIFIED
 
 
 @app.command(name="sample")
@@ -294,6 +304,8 @@ def _lines(verdict: dict[str, Any]) -> list[str]:
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
+    if isinstance(value, dict):
+        return "; ".join(f"{key} {_text(item)}" for key, item in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(_text(item) for item in value) or "none"
     return str(value)

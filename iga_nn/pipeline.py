@@ -163,9 +163,15 @@ def study_to(
         return _finish(state, loaded), studies.as_table(study)
 
 
-def check_surface(mesh: str, component: int | None, max_faces: int) -> dict[str, Any]:
-    """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not."""
-    return _load(mesh, component, max_faces).summary()
+def check_surface(mesh: str, component: int | None, max_faces: int, strict: bool = False) -> dict[str, Any]:
+    """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not.
+
+    strict: refuse a surface that intersects itself, too.
+    """
+    surface = _load(mesh, component, max_faces)
+    if strict:
+        surface.refuse_crossings()
+    return surface.summary()
 
 
 def check_volume(path: str | Path) -> dict[str, Any]:
@@ -178,6 +184,7 @@ def _write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, comm
     with state.timed("certify"):
         certificate = _certify(volume)
     log.info("certificate: %s", certificate["bijective"])
+    _warn_of_meeting(certificate)
     state.write(
         command=command,
         input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
@@ -248,6 +255,7 @@ def _parameterize(
         parameterization=result.quality.as_dict(),
     )
     log.info("certificate: %s", result.certificate.verdict)
+    _warn_of_meeting(state.report["parameterization"])
     shutil.rmtree(checkpoint, ignore_errors=True)  # the files above replace it
     _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history))
     return result
@@ -320,15 +328,24 @@ def _load(mesh: str | Path, component: int | None, max_faces: int) -> Surface:
 def _certify(volume: BSplineVolume) -> dict[str, Any]:
     """What the section `parameterization` of report.json says of a volume alone."""
     from parameterize.certificate import certify
+    from parameterize.injective import check_boundary
 
     certificate = certify(volume)
     return {
         "control_points": list(volume.shape),
         "degrees": list(volume.degrees),
         "bijective": certificate.verdict,
+        **check_boundary(volume).as_dict(),
         "det_lower_bound": certificate.lower_bound,
         "witness": certificate.witness,
     }
+
+
+def _warn_of_meeting(quality: dict[str, Any]) -> None:
+    """Say where the boundary meets itself: the map is not one-to-one although nowhere folded."""
+    if meeting := quality["boundary_meeting"]:
+        place = ", ".join(f"{x:.6g}" for x in meeting["point"])
+        log.warning("the volume overlaps itself: its boundary passes twice through (%s)", place)
 
 
 def _draw(state: RunFolder, draw: Callable[[Any], None]) -> None:

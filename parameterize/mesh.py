@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from .mesh_check import check_genus, check_manifold, check_volume, choose_component, slivers
 from .mesh_clean import orient, signed_volume, weld_and_drop
 from .mesh_common import Array, IntArray, MeshError
+from .mesh_cross import SHOWN, crossing_faces, crossing_places, describe_crossings
 from .mesh_headers import check_face_count
 from .mesh_place import deepest_point
 from .mesh_read import LARGEST, check_finite, check_indices, read_mesh
@@ -33,7 +34,7 @@ class Surface:
     name: the input's stem. vertices: (n, 3), user's units. faces: (m, 3) vertex numbers. source: path as given, "" for
     arrays. sha256: of the file's bytes, or of the arrays. notices: what was mended or is doubtful, one line each.
     scale, center: to_unit(x) = scale * (x - center) + 1/2 gives volume 1 and puts the deepest interior point at
-    (1/2, 1/2, 1/2).
+    (1/2, 1/2, 1/2). crossings: (k, 2) pairs of faces that intersect.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Surface:
     notices: tuple[str, ...]
     scale: float
     center: Array
+    crossings: IntArray
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Points (..., 3) in the user's units -> placed."""
@@ -72,6 +74,7 @@ class Surface:
 
     def summary(self) -> dict[str, Any]:
         """The section `input` of report.json."""
+        first = self.crossings[:SHOWN]
         return {
             "file": self.source or self.name,
             "sha256": self.sha256,
@@ -79,8 +82,25 @@ class Surface:
             "faces": len(self.faces),
             "volume": self.volume,
             "bbox": [corner.tolist() for corner in self.bbox],
+            "self_intersections": {
+                "pairs": len(self.crossings),
+                "first": [
+                    {"faces": pair, "near": place}
+                    for pair, place in zip(first.tolist(), self._places(first).tolist(), strict=True)
+                ],
+            },
             "notices": list(self.notices),
         }
+
+    def refuse_crossings(self) -> None:
+        """Raise MeshError where faces intersect."""
+        if len(self.crossings):
+            found = describe_crossings(self.vertices, self.faces, self.crossings)
+            name = self.source or self.name
+            raise MeshError(f"{name}: {found}: pull the sheets apart there, or check without --strict")
+
+    def _places(self, pairs: IntArray) -> Array:
+        return crossing_places(self.vertices, self.faces, pairs)
 
 
 def load_surface(path: str | Path, *, component: int | None = None, max_faces: int = MAX_FACES) -> Surface:
@@ -161,6 +181,9 @@ def _gate(
     triangles, turned = _wind_outward(points, triangles)
     check_genus(triangles)
     doubts = slivers(points, triangles, where)
+    crossings = crossing_faces(points, triangles)
+    if len(crossings):
+        doubts.append(describe_crossings(vertices[kept], triangles, crossings))
     deepest, _ = deepest_point(points, triangles)
     return Surface(
         name=name,
@@ -171,6 +194,7 @@ def _gate(
         notices=(*notices, *remarks, *mended, *chosen, *turned, *doubts),
         scale=signed_volume(points, triangles) ** (-1.0 / 3.0) / size,
         center=deepest * size + middle,
+        crossings=crossings,
     )
 
 

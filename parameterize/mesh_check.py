@@ -46,10 +46,13 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
 
 
 def _inside(vertices: Array, faces: IntArray, groups: list[IntArray]) -> list[int]:
-    inner = groups[1 : LISTED + 1]
-    points = np.array([vertices[faces[group[0], 0]] for group in inner])
-    winding = igl.fast_winding_number(vertices, faces[groups[0]], points)
-    return [int(i) + 1 for i in np.flatnonzero(np.abs(winding) > 0.5)]
+    """Numbers of the components that lie inside the largest with every vertex: one that only overlaps it does not."""
+    nested = []
+    for i, group in enumerate(groups[1 : LISTED + 1], start=1):
+        winding = igl.fast_winding_number(vertices, faces[groups[0]], vertices[np.unique(faces[group])])
+        if np.all(np.abs(winding) > 0.5):
+            nested.append(i)
+    return nested
 
 
 def check_manifold(faces: IntArray, where: Where) -> None:

@@ -14,6 +14,7 @@ from .boundary import BoundaryMap
 from .bspline import Array, gauss_points
 from .certificate import Certificate
 from .distances import SAMPLES, Distances, SampledBoundary, to_boundary, to_mesh
+from .injective import BoundaryCheck, check_boundary
 from .volume import BSplineVolume
 
 _SLAB_POINTS = 100_000
@@ -44,7 +45,7 @@ class QualityReport:
 
     control_points, degrees: per direction.
     certificate: whether det J > 0 on the whole cube, its lower bound, the witness of a fold.
-    boundary_injective: whether the six boundary surfaces do not meet but at their common edges; None where untested.
+    boundary_check: whether the six boundary surfaces do not meet but at their common edges, and where they do.
     arap: sum of (sigma_i - 1)^2, the smallest sigma signed with det J, over `arap_points` Gauss points.
     boundary: ||F(v_p) - v|| over the mesh's own `mesh_vertices` vertices; cuts and subdivisions do not count.
     mesh_to_spline: from each of `mesh_vertices` vertices to the spline's boundary (foot point refined on the spline).
@@ -60,8 +61,8 @@ class QualityReport:
     mesh_to_spline: BothScales[Distances]
     mesh_vertices: int
     spline_to_mesh: BothScales[Distances]
+    boundary_check: BoundaryCheck
     samples_per_face: int = SAMPLES
-    boundary_injective: bool | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The section in plain Python types, ready for JSON; a bound that is not finite is None."""
@@ -70,7 +71,7 @@ class QualityReport:
             "control_points": list(self.control_points),
             "degrees": list(self.degrees),
             "bijective": self.certificate.verdict,
-            "boundary_injective": self.boundary_injective,
+            **self.boundary_check.as_dict(),
             "det_lower_bound": bound if isfinite(bound) else None,
             "witness": None if self.certificate.witness is None else list(self.certificate.witness),
             "arap": asdict(self.arap),
@@ -92,6 +93,8 @@ class QualityReport:
         verdict = f"{certificate.verdict}, det J >= {certificate.lower_bound:.3g} of its mean"
         if certificate.witness is not None:
             verdict = "folded at ({:.6g}, {:.6g}, {:.6g})".format(*certificate.witness)
+        if self.boundary_check.meeting is not None:
+            verdict += f"; the boundary {self.boundary_check.meeting}"
         size = " x ".join(str(n) for n in self.control_points)
         lines = [
             f"{size} control points of degree {', '.join(str(p) for p in self.degrees)}: {verdict}",
@@ -144,6 +147,7 @@ def measure(
         mesh_to_spline=_both(to_boundary(vertices, volume, sampled), scale),
         mesh_vertices=len(vertices),
         spline_to_mesh=_both(to_mesh(sampled.points, vertices, faces), scale),
+        boundary_check=check_boundary(volume),
     )
 
 
