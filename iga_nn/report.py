@@ -66,8 +66,9 @@ def is_finished(report: Report | None) -> bool:
 
 
 def is_certified(report: Report) -> bool:
-    """Whether the spline's Jacobian determinant was proved positive on the whole cube."""
-    return bool(report["parameterization"]["bijective"] == "certified")
+    """Whether det J was proved positive on the whole cube, and the boundary was not found to meet itself."""
+    section = report["parameterization"]
+    return section["bijective"] == "certified" and section.get("boundary_injective") is not False
 
 
 def is_converged(report: Report) -> bool:
