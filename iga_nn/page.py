@@ -36,6 +36,11 @@ VERDICTS = {
         "det J is negative somewhere; do not trust what is solved on it.",
     ),
     "undecided": ("unsure", "Not certified", "Neither det J > 0 on the whole cube nor a fold could be proved."),
+    "overlapping": (
+        "bad",
+        "Nowhere folded, yet it meets itself",
+        "det J > 0 is proved, but two parts of the boundary meet",
+    ),
 }
 COLUMNS = {
     "degree": "degree",
@@ -84,7 +89,12 @@ def _heading(report: Report) -> str:
 
 def _verdict(report: Report) -> str:
     quality = report["parameterization"]
-    kind, heading, meaning = VERDICTS[quality["bijective"]]
+    overlapping = quality["bijective"] == "certified" and not reports.is_certified(report)
+    kind, heading, meaning = VERDICTS["overlapping" if overlapping else quality["bijective"]]
+    if overlapping:
+        meaning += " at x, y, z = " + ", ".join(f"{value:.4g}" for value in quality["boundary_meeting"]["point"]) + "."
+    elif quality["bijective"] == "certified" and quality.get("boundary_injective"):
+        meaning += " Nor do its faces meet themselves: the map is one-to-one."
     if quality.get("witness"):
         meaning += " The worst place: u, v, w = " + ", ".join(f"{value:.4g}" for value in quality["witness"]) + "."
     found = f'<div class="verdict {kind}"><strong>{heading}</strong>{escape(meaning)}</div>'
