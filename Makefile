@@ -20,7 +20,7 @@ demo: $(STAMP)
 	@echo "Look at out/demo/faces.png, distortion.png and error.png; the numbers are in out/demo/report.json."
 
 test: lint
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: $(STAMP)
 	$(BIN)/ruff check

@@ -37,7 +37,7 @@ class MfemPoisson:
 
     def __init__(self, volume, folder):
         self.volume = volume
-        self.mesh = mfem.Mesh(str(export(volume, "mfem", folder / "volume", force=True)), 1, 0)
+        self.mesh = mfem.Mesh(str(export(volume, "mfem", folder / "volume.mesh", force=True)), 1, 0)
         self.space = mfem.FiniteElementSpace(self.mesh, self.mesh.GetNodes().OwnFEC())
         self.form, self.load = mfem.BilinearForm(self.space), mfem.LinearForm(self.space)
         self.form.AddDomainIntegrator(mfem.DiffusionIntegrator())

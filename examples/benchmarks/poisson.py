@@ -114,7 +114,7 @@ def run_mfem(n: int, degree: int, _: int) -> dict[str, Any]:
     exact = mfem.jit.scalar()(lambda x: np.exp(x[0] + x[2]) * np.sin(x[1]))
     source = mfem.jit.scalar()(lambda x: -np.exp(x[0] + x[2]) * np.sin(x[1]))
     with TemporaryDirectory() as folder:
-        mesh = mfem.Mesh(str(export(benchmark_volume(n, degree), "mfem", Path(folder) / "map")), 1, 0)
+        mesh = mfem.Mesh(str(export(benchmark_volume(n, degree), "mfem", Path(folder) / "map.mesh")), 1, 0)
     start, wall = time.process_time(), time.perf_counter()
     collection = mfem.NURBSFECollection(degree)
     space = mfem.FiniteElementSpace(mesh, collection)
