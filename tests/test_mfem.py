@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_formats import spans_at
 
-from iga_nn.formats import export
+from iga_nn.spline_files import write_mfem
 from parameterize.volume import FACE_NAMES
 from solve import Poisson, benchmark_volume, solve_poisson
 
@@ -37,7 +37,8 @@ class MfemPoisson:
 
     def __init__(self, volume, folder):
         self.volume = volume
-        self.mesh = mfem.Mesh(str(export(volume, "mfem", folder / "volume.mesh", force=True)), 1, 0)
+        write_mfem(folder / "volume.mesh", volume)
+        self.mesh = mfem.Mesh(str(folder / "volume.mesh"), 1, 0)
         self.space = mfem.FiniteElementSpace(self.mesh, self.mesh.GetNodes().OwnFEC())
         self.form, self.load = mfem.BilinearForm(self.space), mfem.LinearForm(self.space)
         self.form.AddDomainIntegrator(mfem.DiffusionIntegrator())
