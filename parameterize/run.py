@@ -212,7 +212,7 @@ def _attempt(
 
 
 def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> SurfaceFit:
-    """Boundary parameters by the layout of the six patches, the counterpart of section 4.3.2, step 1."""
+    """Where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
     spline = task.config.spline
     mapped = map_points(network, task.vertices, task.device, task.dtype)
     layout = _layout(mapped, corners, task)

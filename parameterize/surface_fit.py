@@ -108,16 +108,15 @@ class SurfaceFit:
 
     def watch_facing(self, control: Tensor, floor: float) -> None:
         """Penalise from now on where F's boundary, at the present parameters, hardly faces the way the mesh does."""
-        net = np.asarray(control.cpu()).reshape(3, -1).T
-        indices, _, d_a, d_b = self._rows(derivatives=True)
-        local = net[indices]
-        ta, tb = np.einsum("nk,nkc->nc", d_a, local), np.einsum("nk,nkc->nc", d_b, local)
+        rows = self._rows(derivatives=True)
+        indices, _, d_a, d_b = rows
+        _, ta, tb = _contracted(rows, control)
         normals = np.where(self.cube_faces % 2 == 1, 1.0, -1.0)[:, None] * self._normals
         low = np.einsum("nc,nc->n", np.cross(ta, tb), normals) < _WATCHED * floor
         self._facing = facing_penalty(
             indices[low],
             (d_a[low], d_b[low]),
-            len(net),
+            control[0].numel(),
             normals[low],
             (self.yielding * self._weights)[low],
             floor,
@@ -145,11 +144,8 @@ class SurfaceFit:
         that would end up farther away stay where they are; with `keep_layout` steps that would turn a triangle are
         shortened.
         """
-        net = np.asarray(control.cpu()).reshape(3, -1).T  # (n, 3)
-        indices, values, d_a, d_b = self._rows(derivatives=True)
-        local = net[indices]  # (N, 16, 3)
-        residual = np.einsum("nk,nkc->nc", values, local) - self.points
-        ta, tb = np.einsum("nk,nkc->nc", d_a, local), np.einsum("nk,nkc->nc", d_b, local)
+        values, ta, tb = _contracted(self._rows(derivatives=True), control)
+        residual = values - self.points
         step = -_solve_2x2(ta, tb, residual)
         step *= np.minimum(1.0, max_step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
         a, b = _face_axes(self.cube_faces)
@@ -216,6 +212,14 @@ class SurfaceFit:
         d_a = (values[a, 1, rows][:, :, None] * vb[:, None, :]).reshape(flat)
         d_b = (va[:, :, None] * values[b, 1, rows][:, None, :]).reshape(flat)
         return indices.reshape(flat), plain, d_a, d_b
+
+
+def _contracted(rows: tuple[IntArray, Array, Array, Array], control: Tensor) -> tuple[Array, Array, Array]:
+    """F and its tangents t_a, t_b at the points of `rows`: (N, 3) each."""
+    indices, *weights = rows
+    local = np.asarray(control.cpu()).reshape(3, -1).T[indices]  # (N, k, 3)
+    value, along_a, along_b = (np.einsum("nk,nkc->nc", w, local) for w in weights)
+    return value, along_a, along_b
 
 
 def _face_axes(cube_faces: IntArray) -> tuple[IntArray, IntArray]:
