@@ -1,8 +1,8 @@
 """Points on the 12 edges of the cube that draw F towards the surface.
 
 No vertex of the mesh need have its parameter there, and F, which keeps a small crease along those edges, could stick
-out unseen, most of all at the eight corners. They are for a map that is nearly there: on a rough one the nearest points
-are those of another part of the surface, and it would be held there.
+out unseen, most of all at the eight corners, and blow up the elements there. They are for a map that is nearly there:
+on a rough one the nearest points are those of another part of the surface, and it would be held there.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from .layout import sides
 from .surface_fit import SurfaceFit
 
 _A_SPAN = 2
+_NEAR = 0.5  # of a span's length at volume 1
+_NEARLY_ALL = 0.95
 
 
 def edge_points(knots: tuple[Array, Array, Array]) -> Array:
@@ -52,8 +54,18 @@ class EdgeAnchors:
             device=surface.device,
         )
 
+    def near(self, control: Tensor) -> bool:
+        """Whether F is so close to the surface along nearly all edges that the nearest points are the right ones."""
+        here, points, _ = self._nearest(control)
+        longest = _NEAR / (min(control.shape[1:]) - self.fit.degree)
+        return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= _NEARLY_ALL
+
     def aim(self, control: Tensor) -> None:
         """Take the points of the surface nearest to F as it is, each with the normal of its triangle."""
-        here = self.fit.residuals(control) + self.fit.points
-        points, normals = nearest_on_mesh(here, self._surface.points, self._surface.triangles)
+        _, points, normals = self._nearest(control)
         self.fit.aim(points, normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3))
+
+    def _nearest(self, control: Tensor) -> tuple[Array, Array, Array]:
+        """F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""
+        here = self.fit.residuals(control) + self.fit.points
+        return here, *nearest_on_mesh(here, self._surface.points, self._surface.triangles)

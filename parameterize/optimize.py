@@ -60,8 +60,9 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the surface data near them loses weight. Once the map is certified,
-    a few more rounds take that back as far as they can, with anchors along the cube's edges. The result is the last
-    certified map, else the one with the fewest unproved spans.
+    a few more rounds take that back as far as they can. Anchors along the cube's edges hold F where it was close to the
+    surface there from the start, else in those last rounds. The result is the last certified map, else the one with the
+    fewest unproved spans.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
@@ -93,6 +94,7 @@ def _rounds(
     config = energy.config
     energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
     best = Optimized(control, certify(_as_volume(control, knots, config.degree)))
+    anchored = energy.anchors.near(control)
     first, polished = 0, 0
     if (saved := checkpoints.load(_CHECKPOINT)) is not None:
         first, control, best = _restore(*saved, energy, best, knots)
@@ -104,6 +106,7 @@ def _rounds(
                 break
             polished += 1
             energy.take_back(_GIVING_WAY)
+        if anchored or polished:
             energy.anchors.aim(control)
         energy.start_round(control, config.penalties[min(number, len(config.penalties) - 1)])
         control = _descend(control, energy, number, history, progress)

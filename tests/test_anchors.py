@@ -59,3 +59,9 @@ def test_what_they_pull_on_comes_closer():
     assert after < before
     inward = (gradient * (control - 0.5)).sum(0)  # downhill leads towards the centre, at all eight corners
     assert (inward[[0, 0, 0, 0, -1, -1, -1, -1], [0, 0, -1, -1] * 2, [0, -1] * 4] > 0.0).all()
+
+
+def test_near_is_told_from_far_by_half_a_span():
+    """Edges of the unit cube are 0.707 to 0.866 from its centre; half a span is 0.167."""
+    assert anchors_on_a_ball(radius=0.75).near(unit_cube())
+    assert not anchors_on_a_ball(radius=0.5).near(unit_cube())
