@@ -47,12 +47,14 @@ class OutputOptions:
     Args:
         out: output folder; the input's stem in the current folder by default.
         force: replace a finished result in that folder.
+        vector: the plots of curves (loss history, errors over the mesh size) as PDF, too.
         quiet: no progress.
         as_json: the verdict as JSON on stdout.
     """
 
     out: str | None = None
     force: bool = False
+    vector: bool = False
     quiet: bool = False
     as_json: Json = False
 
@@ -78,7 +80,14 @@ def run_poisson(
     """
     with console.progress_line(output.quiet) as progress:
         outcome = pipeline.run(
-            "poisson", mesh, output.out, mapping=mapping, poisson=poisson, force=output.force, progress=progress
+            "poisson",
+            mesh,
+            output.out,
+            mapping=mapping,
+            poisson=poisson,
+            force=output.force,
+            vector=output.vector,
+            progress=progress,
         )
     return _tell(outcome, output)
 
@@ -91,7 +100,9 @@ def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapp
         mesh: path of a closed surface, or the name of a sample or a model.
     """
     with console.progress_line(output.quiet) as progress:
-        outcome = pipeline.parameterize_to(mesh, output.out, mapping=mapping, force=output.force, progress=progress)
+        outcome = pipeline.parameterize_to(
+            mesh, output.out, mapping=mapping, force=output.force, vector=output.vector, progress=progress
+        )
     return _tell(outcome, output)
 
 
@@ -114,7 +125,9 @@ def solve_poisson(
         device: where the linear system is solved.
     """
     with console.progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, problem=poisson, force=output.force, device=device)
+        outcome = pipeline.solve_to(
+            volume, output.out, problem=poisson, force=output.force, vector=output.vector, device=device
+        )
     return _tell(outcome, output)
 
 
@@ -130,7 +143,7 @@ def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body 
         volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
     with console.progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force)
+        outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force, vector=output.vector)
     return _tell(outcome, output)
 
 
@@ -144,7 +157,7 @@ def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = 
         volume: a file written by `iga-nn parameterize` or `iga-nn run`.
     """
     with console.progress_line(output.quiet):
-        outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force)
+        outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force, vector=output.vector)
     if output.as_json:
         _say(json.dumps(outcome.report["study"], indent=2))
     else:
