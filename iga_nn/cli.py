@@ -250,7 +250,8 @@ def export_volume(
         to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
             json (splinepy's).
         out: file to write; the volume's stem with the format's ending in the current folder by default.
-        solution: solution.npz to go with it (vtk, view, mfem).
+        solution: solution.npz to go with it: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
+            NAME_u.json).
         force: replace that file where it exists.
     """
     _say(str(export(volume, to, out, solution=solution, force=force)))

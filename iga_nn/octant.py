@@ -37,7 +37,7 @@ def best_cut(faces: Sequence[Array]) -> tuple[Octant, View]:
     counted with sign, is turned to the viewer. The latter is known from the faces alone.
     """
     view = widest_view(np.concatenate([points.reshape(-1, 3) for points in faces]), tilt=TILT)
-    choices = [(octant, side) for octant in product((0, 1), repeat=3) for side in (view, view.turned())]
+    choices = [(octant, side) for octant in product((0, 1), (0, 1), (0, 1)) for side in (view, view.turned())]
     return max(choices, key=lambda choice: float(_outside(faces, choice[0]) @ choice[1].towards))
 
 
@@ -50,7 +50,7 @@ def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
     for axis in range(3):
         cut, section = patches[2 * axis + octant[axis]], patches[6 + axis]
         inside = _sides(axis, octant)
-        shown += [_quarter(cut, sides) for sides in product((0, 1), repeat=2) if sides != inside]
+        shown += [_quarter(cut, sides) for sides in product((0, 1), (0, 1)) if sides != inside]
         shown.append(_quarter(section, inside))
     return shown
 
