@@ -1,8 +1,27 @@
 """Volumes in the files of other programs: which formats there are, what they are called, where a solution goes.
 
-A solution, a number or a displacement of three, goes with its volume into every format: `vtk` and `view` hold it as the
-point data `u`; of the others it becomes a second file beside the volume's. `spline_files` explains G+Smo XML, MFEM
-meshes and splinepy's JSON, which are read, too; `vtk_files` those for ParaView.
+Our own files are NumPy archives without pickles. volume.npz holds, in the units of the input,
+
+    F(u, v, w) = sum_ijk control_points[i, j, k] N_i(u) N_j(v) N_k(w),    0 <= u, v, w <= 1:
+
+`degrees` (3,), open knot vectors `knots_u`, `knots_v`, `knots_w` of n + degree + 1 numbers from 0 to 1, and
+`control_points` (n_u, n_v, n_w, 3). solution.npz holds u_h in the same way, on knots of its own: `coefficients`
+(m_u, m_v, m_w), of displacements (m_u, m_v, m_w, 3). boundary.npz holds the surface's `vertices` (n, 3), their
+`parameters` (n, 3) on the cube's faces and the triangles `faces` (m, 3). Whatever knows splines can read them:
+
+>>> import numpy as np
+>>> from scipy.interpolate import NdBSpline
+>>> from solve import benchmark_volume
+>>> benchmark_volume(2).save("volume.npz")
+>>> data = np.load("volume.npz")
+>>> knots = data["knots_u"], data["knots_v"], data["knots_w"]
+>>> map_by_scipy = NdBSpline(knots, data["control_points"], tuple(data["degrees"].tolist()))
+>>> np.allclose(map_by_scipy([0.1, 0.5, 0.9]), benchmark_volume(2)([[0.1, 0.5, 0.9]]), atol=1e-14)
+True
+
+A solution, a number or a displacement of three, goes with its volume into every foreign format: `vtk` and `view` hold
+it as the point data `u`; of the others it becomes a second file beside the volume's. `spline_files` explains G+Smo XML,
+MFEM meshes and splinepy's JSON, which are read, too; `vtk_files` those for ParaView.
 IGES and STEP know no trivariate splines, so they are not among them.
 """
 
