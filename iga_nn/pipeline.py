@@ -227,8 +227,7 @@ def _parameterize(
 
     with input_errors():
         choose_device(options.device)
-        if corners is not None:
-            corner_vertices(surface, corners)
+        marks = None if corners is None else surface.vertices[corner_vertices(surface, corners)]
     if equation is not None:  # what can be known of its data before there are points inside
         x, y, z = surface.vertices.T
         equation.boundary_at(x, y, z)
@@ -270,7 +269,7 @@ def _parameterize(
     log.info("certificate: %s", result.certificate.verdict)
     _warn_of_meeting(state.report["parameterization"])
     shutil.rmtree(checkpoint, ignore_errors=True)  # the files above replace it
-    _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history, state.endings))
+    _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history, state.endings, marks))
     return result
 
 

@@ -80,13 +80,20 @@ def draw_face_names(folder: Path, volume: BSplineVolume) -> None:
 
 
 def draw_map(
-    folder: Path, volume: BSplineVolume, history: dict[str, NDArray[Any]], endings: Sequence[str] = PNG
+    folder: Path,
+    volume: BSplineVolume,
+    history: dict[str, NDArray[Any]],
+    endings: Sequence[str] = PNG,
+    marks: Array | None = None,
 ) -> None:
-    """Write the loss history with each of the endings, and where VTK can draw faces, lines, cut and distortion."""
+    """Write the loss history with each of the endings, and where VTK can draw faces, lines, cut and distortion.
+
+    marks: as in draw_faces.
+    """
     for ending in endings:
         draw_history(folder / f"history{ending}", history)
     if can_draw():
-        draw_faces(folder / "faces.png", volume)
+        draw_faces(folder / "faces.png", volume, marks)
         draw_lines(folder / "lines.png", volume)
         draw_cut(folder / "cut.png", volume)
         draw_distortion(folder / "distortion.png", volume)

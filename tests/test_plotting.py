@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,13 +70,14 @@ def test_cut_shows_the_inside(tmp_path, drawing):
 
 
 def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
-    volume = benchmark_volume(1, amplitude=0.0)
+    cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
+    volume = replace(cube, control_points=cube.control_points * size)
     patches = octant.face_patches(volume, 9) + octant.section_patches(volume, 9)
     corner, view = octant.best_cut([patch.points for patch in patches[:6]])
     outward = 2.0 * np.array(corner) - 1.0
     assert np.all(np.sign(view.towards) == outward)
     shown = octant.without_octant(patches, corner)
-    offsets = [(patch.points.reshape(-1, 3) - 0.5) * outward for patch in shown]
+    offsets = [(patch.points.reshape(-1, 3) / size - 0.5) * outward for patch in shown]
     assert not np.any(np.all(np.concatenate(offsets) > 1e-9, axis=1))  # nothing of the octant's outside
     planes = [np.flatnonzero(np.all(np.abs(offset) < 1e-12, axis=0)) for offset in offsets]
     assert sorted(np.concatenate(planes)) == [0, 1, 2]
@@ -131,6 +133,14 @@ def test_picture_is_framed_whole(drawing):
     height, width = np.ptp(drawn, axis=0) + 1
     assert abs(width - 400 / 1.08) < 6 and abs(height - 200 / 1.08) < 6  # the longer side fills the frame, 4 % margin
     assert np.all(image[200, 200] == [255, 0, 0])  # colours as given
+
+
+def test_marks_on_a_surface_are_seen(drawing):
+    square = np.stack(np.meshgrid([0.0, 2.0], [0.0, 1.0], [0.0], indexing="ij"), axis=-1)[:, :, 0]
+    patch = rendering.Patch(square, np.broadcast_to([1.0, 0.0, 0.0], square.shape), lit=False)
+    view = rendering.widest_view(square.reshape(-1, 3))
+    image = rendering.draw([patch], view, (400, 400), marks=np.array([[1.0, 0.5, 0.0]]))
+    assert np.all(image[200, 200] < 60) and np.all(image[200, 240] == [255, 0, 0])
 
 
 def test_widest_view_is_a_right_handed_frame_along_the_thin_axis():
