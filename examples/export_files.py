@@ -38,7 +38,9 @@ def draw_cut(view: Path, picture: Path) -> None:
     whole = pyvista.read(view)
     plotter = pyvista.Plotter(off_screen=True, window_size=[900, 700])
     plotter.set_background("white")
-    plotter.add_mesh(whole.clip("-x"), scalars="u", cmap="viridis", scalar_bar_args={"color": "black"})
+    bar = {"title": "u\n", "vertical": True, "position_x": 0.87, "position_y": 0.2, "height": 0.6, "fmt": "%.2f"}
+    shown = {"scalars": "u", "cmap": "viridis", "ambient": 0.5, "diffuse": 0.5}
+    plotter.add_mesh(whole.clip("-x"), **shown, scalar_bar_args={**bar, "color": "black"})
     plotter.add_mesh(whole.outline(), color="grey")
     plotter.view_vector((-1.0, -0.7, 0.5))
     plotter.screenshot(picture)

@@ -38,7 +38,8 @@ def main(name: str = "ellipsoid", config: object = None, out: str | Path = "out/
     (folder / "corners.json").write_text(json.dumps(corners.tolist(), indent=1), encoding="utf-8")
     result.volume.save(folder / "volume.npz")
     if can_draw():
-        draw_faces(folder / "faces.png", result.volume, marks=corners)
+        nearest = [np.linalg.norm(surface.vertices - corner, axis=1).argmin() for corner in corners]
+        draw_faces(folder / "faces.png", result.volume, marks=surface.vertices[nearest])
     return folder / "faces.png"
 
 

@@ -1,5 +1,8 @@
 """From a closed surface mesh to a solved PDE on a certified trivariate B-spline.
 
+The docstrings of these modules explain what is done, with formulas: `parameterize` the method and the certificate,
+`solve` the discretisation and its preconditioner, `iga_nn.formats` the files.
+
 The public names below are loaded on first use: importing the package brings in neither torch nor VTK.
 """
 

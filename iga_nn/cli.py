@@ -47,12 +47,14 @@ class OutputOptions:
     Args:
         out: output folder; the input's stem in the current folder by default.
         force: replace a finished result in that folder.
+        vector: the plots of curves (loss history, errors over the mesh size) as PDF, too.
         quiet: no progress.
         as_json: the verdict as JSON on stdout.
     """
 
     out: str | None = None
     force: bool = False
+    vector: bool = False
     quiet: bool = False
     as_json: Json = False
 
@@ -78,7 +80,14 @@ def run_poisson(
     """
     with console.progress_line(output.quiet) as progress:
         outcome = pipeline.run(
-            "poisson", mesh, output.out, mapping=mapping, poisson=poisson, force=output.force, progress=progress
+            "poisson",
+            mesh,
+            output.out,
+            mapping=mapping,
+            poisson=poisson,
+            force=output.force,
+            vector=output.vector,
+            progress=progress,
         )
     return _tell(outcome, output)
 
@@ -91,7 +100,9 @@ def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapp
         mesh: path of a closed surface, or the name of a sample or a model.
     """
     with console.progress_line(output.quiet) as progress:
-        outcome = pipeline.parameterize_to(mesh, output.out, mapping=mapping, force=output.force, progress=progress)
+        outcome = pipeline.parameterize_to(
+            mesh, output.out, mapping=mapping, force=output.force, vector=output.vector, progress=progress
+        )
     return _tell(outcome, output)
 
 
@@ -114,7 +125,9 @@ def solve_poisson(
         device: where the linear system is solved.
     """
     with console.progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, problem=poisson, force=output.force, device=device)
+        outcome = pipeline.solve_to(
+            volume, output.out, problem=poisson, force=output.force, vector=output.vector, device=device
+        )
     return _tell(outcome, output)
 
 
@@ -130,7 +143,7 @@ def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body 
         volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
     with console.progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force)
+        outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force, vector=output.vector)
     return _tell(outcome, output)
 
 
@@ -144,7 +157,7 @@ def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = 
         volume: a file written by `iga-nn parameterize` or `iga-nn run`.
     """
     with console.progress_line(output.quiet):
-        outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force)
+        outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force, vector=output.vector)
     if output.as_json:
         _say(json.dumps(outcome.report["study"], indent=2))
     else:
@@ -237,7 +250,8 @@ def export_volume(
         to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
             json (splinepy's).
         out: file to write; the volume's stem with the format's ending in the current folder by default.
-        solution: solution.npz to go with it (vtk, view, mfem).
+        solution: solution.npz to go with it: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
+            NAME_u.json).
         force: replace that file where it exists.
     """
     _say(str(export(volume, to, out, solution=solution, force=force)))

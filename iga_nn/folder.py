@@ -27,12 +27,21 @@ class Outcome:
 
 @dataclass
 class RunFolder:
-    """One output folder being filled: its report so far, and the clock."""
+    """One output folder being filled: its report so far, and the clock.
+
+    vector: write plots of curves as PDF, too.
+    """
 
     folder: Path
+    vector: bool = False
     report: reports.Report = field(default_factory=lambda: {"schema": reports.SCHEMA})
     seconds: dict[str, float] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """Of the files a plot of curves is written to."""
+        return (".png", ".pdf") if self.vector else (".png",)
 
     @contextmanager
     def timed(self, step: str) -> Iterator[None]:
@@ -60,7 +69,7 @@ class RunFolder:
 
 @contextmanager
 def open_folder(
-    source: str | Path, out: str | Path | None, force: bool, resume: bool = False
+    source: str | Path, out: str | Path | None, force: bool, resume: bool = False, vector: bool = False
 ) -> Iterator[tuple[RunFolder, Outcome | None]]:
     """Make the output folder and hold it, tried before anything costly; on --resume a finished one is the answer."""
     if out == "":
@@ -78,7 +87,7 @@ def open_folder(
             with _writable(folder):
                 if not finished:
                     TemporaryFile(dir=folder).close()
-            yield RunFolder(folder), finished
+            yield RunFolder(folder, vector), finished
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {_way_on(folder)}") from None
     finally:

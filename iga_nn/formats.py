@@ -1,6 +1,27 @@
-"""Volumes in the files of other programs: which formats there are, what they are called, what they can carry.
+"""Volumes in the files of other programs: which formats there are, what they are called, where a solution goes.
 
-`spline_files` explains G+Smo XML, MFEM meshes and splinepy's JSON, which are read, too; `vtk_files` those for ParaView.
+Our own files are NumPy archives without pickles. volume.npz holds, in the units of the input,
+
+    F(u, v, w) = sum_ijk control_points[i, j, k] N_i(u) N_j(v) N_k(w),    0 <= u, v, w <= 1:
+
+`degrees` (3,), open knot vectors `knots_u`, `knots_v`, `knots_w` of n + degree + 1 numbers from 0 to 1, and
+`control_points` (n_u, n_v, n_w, 3). solution.npz holds u_h in the same way, on knots of its own: `coefficients`
+(m_u, m_v, m_w), of displacements (m_u, m_v, m_w, 3). boundary.npz holds the surface's `vertices` (n, 3), their
+`parameters` (n, 3) on the cube's faces and the triangles `faces` (m, 3). Whatever knows splines can read them:
+
+>>> import numpy as np
+>>> from scipy.interpolate import NdBSpline
+>>> from solve import benchmark_volume
+>>> benchmark_volume(2).save("volume.npz")
+>>> data = np.load("volume.npz")
+>>> knots = data["knots_u"], data["knots_v"], data["knots_w"]
+>>> map_by_scipy = NdBSpline(knots, data["control_points"], tuple(data["degrees"].tolist()))
+>>> np.allclose(map_by_scipy([0.1, 0.5, 0.9]), benchmark_volume(2)([[0.1, 0.5, 0.9]]), atol=1e-14)
+True
+
+A solution, a number or a displacement of three, goes with its volume into every foreign format: `vtk` and `view` hold
+it as the point data `u`; of the others it becomes a second file beside the volume's. `spline_files` explains G+Smo XML,
+MFEM meshes and splinepy's JSON, which are read, too; `vtk_files` those for ParaView.
 IGES and STEP know no trivariate splines, so they are not among them.
 """
 
@@ -20,8 +41,9 @@ from .options import InputError, input_errors
 from .spline_gate import kind_of
 
 if TYPE_CHECKING:
-    from solve import Poisson
     from solve.field import SplineField
+
+    from .sampling import Problem
 
 ENDINGS = {
     "gismo": ".xml",
@@ -30,7 +52,7 @@ ENDINGS = {
     "view": "_view.vtu",
     "json": ".json",
 }
-CARRY_FIELDS = ("vtk", "view", "mfem")  # mfem: a second file beside the mesh
+BESIDE = {"gismo": "_u.xml", "mfem": ".gf", "json": "_u.json"}  # the file of a solution, after the volume's stem
 
 
 def is_volume(path: str | Path) -> bool:
@@ -65,26 +87,25 @@ def export(
 
     out: default is the volume's stem with the format's ending, in the current folder.
     solution: solution.npz of a solve on this volume. The view shows its error where the report.json beside it knows
-    the exact solution; of an MFEM mesh it becomes the grid function NAME.gf.
+    the exact solution; with G+Smo, MFEM and splinepy's JSON it is a file of its own, NAME_u.xml, NAME.gf, NAME_u.json.
     Raises InputError where a file cannot be read or written, exists (unless `force`), or a package is missing.
     """
     if to not in ENDINGS:
         raise InputError(f"format {to!r}: choose one of {', '.join(ENDINGS)}; IGES and STEP know no trivariate splines")
-    if solution is not None and to not in CARRY_FIELDS:
-        raise InputError(f"{to} files carry no solution here: export it --to {', '.join(CARRY_FIELDS)}")
     target = _target(volume, to, out)
-    grid_function = target.with_suffix(".gf") if to == "mfem" and solution is not None else None
-    for file in filter(None, (target, grid_function)):
+    beside = target.with_name(target.stem + BESIDE[to]) if solution is not None and to in BESIDE else None
+    for file in filter(None, (target, beside)):
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
     loaded = load_volume(volume)
     field = None if solution is None else _load_solution(Path(solution), loaded)
     try:
-        if field is not None and grid_function is not None:
-            with input_errors():
-                loaded = spline_files.on_knots_of(field, loaded)
-            with replacing(grid_function) as temporary:
-                spline_files.write_mfem_field(temporary, field)
+        if field is not None and beside is not None:
+            if to == "mfem":
+                with input_errors():
+                    loaded = spline_files.on_knots_of(field, loaded)
+            with replacing(beside) as temporary:
+                _FIELD_WRITERS[to](temporary, field)
         with replacing(target) as temporary:
             _write(temporary, to, loaded, field, _problem_beside(solution))
     except OSError as error:
@@ -92,7 +113,7 @@ def export(
     return target
 
 
-def _write(path: Path, to: str, volume: BSplineVolume, field: SplineField | None, problem: Poisson | None) -> None:
+def _write(path: Path, to: str, volume: BSplineVolume, field: SplineField | None, problem: Problem | None) -> None:
     from . import vtk_files
 
     match to:
@@ -106,6 +127,13 @@ def _write(path: Path, to: str, volume: BSplineVolume, field: SplineField | None
             vtk_files.write_bezier(path, volume, field)
         case "view":
             vtk_files.write_view(path, volume, field, problem)
+
+
+_FIELD_WRITERS = {
+    "gismo": spline_files.write_gismo,
+    "mfem": spline_files.write_mfem_field,
+    "json": spline_files.write_json,
+}
 
 
 def _target(volume: str | Path, to: str, out: str | Path | None) -> Path:
@@ -131,14 +159,14 @@ def _load_solution(path: Path, volume: BSplineVolume) -> SplineField:
     return field
 
 
-def _problem_beside(solution: str | Path | None) -> Poisson | None:
-    """The problem whose exact solution the report beside solution.npz names."""
-    report = None if solution is None else reports.read(Path(solution).parent)
-    section = (report or {}).get("poisson")
-    exact = section.get("exact") if isinstance(section, dict) else None
+def _problem_beside(solution: str | Path | None) -> Problem | None:
+    """A problem with the exact solution that the report beside solution.npz names."""
+    report = (None if solution is None else reports.read(Path(solution).parent)) or {}
+    name = next((name for name in ("poisson", "elasticity") if isinstance(report.get(name), dict)), None)
+    exact = report[name].get("exact") if name else None
     if not isinstance(exact, str):
         return None
-    from solve import Poisson
+    from solve import Elasticity, Poisson
 
     with input_errors():
-        return Poisson(exact=exact)
+        return Poisson(exact=exact) if name == "poisson" else Elasticity(exact=exact.split(";"))

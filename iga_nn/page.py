@@ -17,11 +17,18 @@ from . import report as reports
 from .report import Report
 from .scene import Scene
 
-MAP_FIGURES = {"faces.png": "Images of the cube's faces", "distortion.png": "Distortion", "history.png": "Loss history"}
+MAP_FIGURES = {
+    "faces.png": "Images of the cube's faces",
+    "lines.png": "Parameter lines",
+    "cut.png": "Cut open",
+    "distortion.png": "Distortion",
+    "history.png": "Loss history",
+}
+SOLUTION_FIGURES = {"convergence.png": "Errors over the mesh size", "error.png": "Error"}
 FIGURES = {  # by the section of the report they belong to
     "config": MAP_FIGURES,
-    "poisson": {"error.png": "Error"},
-    "elasticity": {"error.png": "Error"},
+    "poisson": SOLUTION_FIGURES,
+    "elasticity": SOLUTION_FIGURES,
     "study": {"study.png": "Errors over the mesh size"},
 }
 VERDICTS = {

@@ -42,9 +42,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-MAP_FILES = ("volume.npz", "boundary.npz", "history.npz", "history.png", "faces.png", "distortion.png")
-SOLUTION_FILES = ("solution.npz", "error.png")
-STUDY_FILES = ("study.csv", "study.png")
+MAP_DATA, MAP_PICTURES = ("volume.npz", "boundary.npz", "history.npz"), ("faces", "lines", "cut", "distortion")
+MAP_FILES = (*MAP_DATA, "history.png", "history.pdf", *(f"{name}.png" for name in MAP_PICTURES))
+SOLUTION_FILES = ("solution.npz", "convergence.png", "convergence.pdf", "error.png")
+STUDY_FILES = ("study.csv", "study.png", "study.pdf")
 
 
 def run(
@@ -55,11 +56,13 @@ def run(
     mapping: MapOptions | None = None,
     poisson: PoissonOptions | None = None,
     force: bool = False,
+    vector: bool = False,
     progress: ProgressCallback | None = None,
 ) -> Outcome:
     """From a surface to a solved problem, all files of design in `out` (default: the input's stem).
 
     mesh: path of a closed surface, or a sample's or model's name.
+    vector: write the plots of curves as PDF, too.
     Raises MeshError for a surface that cannot be taken, solve.ExpressionError for a formula, InputError for other
     options and for an output folder that is finished (unless `force`) or cannot be written.
     """
@@ -68,7 +71,7 @@ def run(
     mapping, poisson = mapping or MapOptions(), poisson or PoissonOptions()
     equation, spline = poisson.problem(), mapping.config().spline
     _check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree), poisson)
-    with open_folder(mesh, out, force, mapping.resume) as (state, finished):
+    with open_folder(mesh, out, force, mapping.resume, vector) as (state, finished):
         if finished and "poisson" not in finished.report:
             volume = finished.folder / "volume.npz"
             raise InputError(
@@ -88,11 +91,12 @@ def parameterize_to(
     *,
     mapping: MapOptions | None = None,
     force: bool = False,
+    vector: bool = False,
     progress: ProgressCallback | None = None,
 ) -> Outcome:
     """From a surface to volume.npz, boundary.npz, history.npz, report.json and figures; raises as `run` does."""
     mapping = mapping or MapOptions()
-    with open_folder(mesh, out, force, mapping.resume) as (state, finished):
+    with open_folder(mesh, out, force, mapping.resume, vector) as (state, finished):
         if finished:
             return finished
         command = command_line("parameterize", mesh, mapping, out=out)
@@ -106,9 +110,10 @@ def solve_to(
     *,
     problem: ProblemOptions | None = None,
     force: bool = False,
+    vector: bool = False,
     device: str = "cpu",
 ) -> Outcome:
-    """Solve on a saved volume: solution.npz, report.json, error.png; raises as `run` does. On the CPU without torch.
+    """Solve on a saved volume: solution.npz, report.json, figures; raises as `run` does. On the CPU without torch.
 
     device: where Poisson's linear system is solved, "cpu" or "cuda".
     """
@@ -123,7 +128,7 @@ def solve_to(
         check_problem(loaded, equation)
         if isinstance(equation, Poisson):
             check_device(device, equation)
-    with open_folder(path, out, force) as (state, _):
+    with open_folder(path, out, force, vector=vector) as (state, _):
         state.begin(*SOLUTION_FILES)
         elsewhere = {"device": device} if device != "cpu" else {}
         command = command_line(f"solve {options.section}", path, options, **elsewhere, out=out)
@@ -135,9 +140,17 @@ def solve_to(
 
 
 def study_to(
-    volume: str | Path, out: str | Path | None = None, *, options: StudyOptions | None = None, force: bool = False
+    volume: str | Path,
+    out: str | Path | None = None,
+    *,
+    options: StudyOptions | None = None,
+    force: bool = False,
+    vector: bool = False,
 ) -> tuple[Outcome, str]:
-    """A convergence study on a saved volume: study.csv, study.png, report.json, and the table; raises as `run` does."""
+    """A convergence study on a saved volume: study.csv, study.png, report.json, and the table.
+
+    Takes and raises what `run` does.
+    """
     from solve import check_problem, convergence
 
     options = options or StudyOptions()
@@ -148,7 +161,7 @@ def study_to(
         check_size(loaded, levels[-1], degree)
     with input_errors():
         check_problem(loaded, equation)
-    with open_folder(path, out or f"{path.name.split('.')[0]}-study", force) as (state, _):
+    with open_folder(path, out or f"{path.name.split('.')[0]}-study", force, vector=vector) as (state, _):
         state.begin(*STUDY_FILES)
         _write_certificate(state, path, loaded, command_line("study", path, options, out=out))
         verdict = state.report["parameterization"]["bijective"]
@@ -159,7 +172,7 @@ def study_to(
                 log.info("degree %d: done", degree)
         save_text(state.folder / "study.csv", studies.as_csv(study))
         state.write(study={"exact": equation.exact, "levels": studies.rows_of(study)})
-        _draw(state, lambda plotting: plotting.draw_study(state.folder / "study.png", study))
+        _draw(state, lambda plotting: plotting.draw_levels(state.folder, "study", study, state.endings))
         return _finish(state, loaded), studies.as_table(study)
 
 
@@ -214,8 +227,7 @@ def _parameterize(
 
     with input_errors():
         choose_device(options.device)
-        if corners is not None:
-            corner_vertices(surface, corners)
+        marks = None if corners is None else surface.vertices[corner_vertices(surface, corners)]
     if equation is not None:  # what can be known of its data before there are points inside
         x, y, z = surface.vertices.T
         equation.boundary_at(x, y, z)
@@ -257,7 +269,7 @@ def _parameterize(
     log.info("certificate: %s", result.certificate.verdict)
     _warn_of_meeting(state.report["parameterization"])
     shutil.rmtree(checkpoint, ignore_errors=True)  # the files above replace it
-    _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history))
+    _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history, state.endings, marks))
     return result
 
 
@@ -294,7 +306,7 @@ def _solve(
     }
     state.write(**{options.section: section})
     if equation.exact is not None:
-        _draw(state, lambda plotting: plotting.draw_solution(state.folder, volume, solutions[-1], equation))
+        _draw(state, lambda plotting: plotting.draw_solution(state.folder, volume, solutions, equation, state.endings))
     return solutions[-1]
 
 

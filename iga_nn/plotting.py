@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from parameterize.bspline import Array
 from parameterize.files import replacing
 from parameterize.volume import BSplineVolume
 
+from .octant import best_cut, face_patches, octant_label, section_patches, without_octant
 from .rendering import Patch, can_draw, draw, widest_view
 from .sampling import (
     FACE_COLORS,
@@ -21,7 +23,6 @@ from .sampling import (
     all_grids,
     distortion_on,
     error_norm,
-    face_grid,
     face_labels,
     points_on,
     sampled_error,
@@ -38,13 +39,38 @@ if TYPE_CHECKING:
     Problem = Poisson | Elasticity
 
 SAMPLES = 141  # a direction and patch
+EVERY = 14  # samples between two parameter lines: a tenth of the cube
+DISTORTION = "tanh(√ARAP / 2), scale as given"
 PANEL = (900, 700)  # pixels of one view
+PNG = (".png",)
 
 
-def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
-    """Write error.png, where VTK can draw and the solver did not break down."""
-    if can_draw() and np.all(np.isfinite(solution.coefficients)):
-        draw_error(folder / "error.png", volume, solution, problem)
+def draw_solution(
+    folder: Path,
+    volume: BSplineVolume,
+    solutions: Sequence[Solution],
+    problem: Problem,
+    endings: Sequence[str] = PNG,
+) -> None:
+    """Write convergence (with each of the endings) where there are several levels, and where VTK can draw error.png.
+
+    solutions: coarsest first, of a problem with an exact solution. Where the solver broke down there are no figures.
+    """
+    from solve import ConvergenceRow
+
+    if not all(np.all(np.isfinite(solution.coefficients)) for solution in solutions):
+        return
+    if len(solutions) > 1:
+        levels = [ConvergenceRow(solution.report, None, None) for solution in solutions]
+        draw_levels(folder, "convergence", {max(solutions[-1].degrees): levels}, endings)
+    if can_draw():
+        draw_error(folder / "error.png", volume, solutions[-1], problem)
+
+
+def draw_levels(folder: Path, name: str, study: Study, endings: Sequence[str] = PNG) -> None:
+    """Write the errors over the mesh size to NAME with each of the endings."""
+    for ending in endings:
+        draw_study(folder / f"{name}{ending}", study)
 
 
 def draw_face_names(folder: Path, volume: BSplineVolume) -> None:
@@ -53,11 +79,23 @@ def draw_face_names(folder: Path, volume: BSplineVolume) -> None:
         draw_faces(folder / "faces.png", volume)
 
 
-def draw_map(folder: Path, volume: BSplineVolume, history: dict[str, NDArray[Any]]) -> None:
-    """Write faces.png, distortion.png (where VTK can draw) and history.png."""
-    draw_history(folder / "history.png", history)
+def draw_map(
+    folder: Path,
+    volume: BSplineVolume,
+    history: dict[str, NDArray[Any]],
+    endings: Sequence[str] = PNG,
+    marks: Array | None = None,
+) -> None:
+    """Write the loss history with each of the endings, and where VTK can draw faces, lines, cut and distortion.
+
+    marks: as in draw_faces.
+    """
+    for ending in endings:
+        draw_history(folder / f"history{ending}", history)
     if can_draw():
-        draw_faces(folder / "faces.png", volume)
+        draw_faces(folder / "faces.png", volume, marks)
+        draw_lines(folder / "lines.png", volume)
+        draw_cut(folder / "cut.png", volume)
         draw_distortion(folder / "distortion.png", volume)
 
 
@@ -66,26 +104,43 @@ def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) ->
 
     marks: points (k, 3) shown as black balls, such as the corners that were given (the paper's Fig. 13).
     """
-    from matplotlib.colors import to_rgb
-    from matplotlib.patches import Patch as Swatch
-
-    patches = []
-    for face, color in enumerate(FACE_COLORS):
-        points = points_on(volume, face_grid(face, SAMPLES))
-        patches.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape)))
     figure, (panels,) = _panels(1, 2)
-    _show_around(panels, patches, marks)
-    swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
-    figure.legend(
-        handles=swatches,
-        loc="outside lower center",
-        ncols=6,
-        frameon=False,
-        fontsize=12,
-        columnspacing=1.2,
-        handlelength=1.4,
-    )
+    _show_around(panels, face_patches(volume, SAMPLES), marks)
+    _name_faces(figure)
     figure.suptitle("Images of the six faces of the unit cube", fontsize=14)
+    _save(figure, path)
+
+
+def draw_lines(path: Path, volume: BSplineVolume) -> None:
+    """Lines of constant parameters, a tenth apart, on the images of the six faces, from the front and from behind."""
+    figure, (panels,) = _panels(1, 2)
+    _show_around(panels, face_patches(volume, SAMPLES, EVERY))
+    _name_faces(figure)
+    figure.suptitle("Lines of constant u, v, w, a tenth apart", fontsize=14)
+    _save(figure, path)
+
+
+def draw_cut(path: Path, volume: BSplineVolume) -> None:
+    """The volume without an eighth of the cube (the paper's Fig. 9): parameter lines inside, and the distortion there.
+
+    The eighth and the side it is seen from are those that show most of the cut.
+    """
+    from matplotlib.colors import Normalize
+
+    norm = Normalize(0.0, 1.0)
+    faces = face_patches(volume, SAMPLES, EVERY)
+    octant, view = best_cut([patch.points for patch in faces])
+    named = faces + section_patches(volume, SAMPLES, EVERY)
+    distorted = [
+        replace(patch, colors=_colors(distortion_on(volume, grid), norm))
+        for patch, grid in zip(named, all_grids(SAMPLES), strict=True)
+    ]
+    figure, (panels,) = _panels(1, 2)
+    for panel, patches in zip(panels, (named, distorted), strict=True):
+        panel.imshow(draw(without_octant(patches, octant), view, PANEL))
+    _name_faces(figure)
+    _color_bar(figure, panels, norm, DISTORTION)
+    figure.suptitle(f"Cut open: the part {octant_label(octant)} is left out", fontsize=14)
     _save(figure, path)
 
 
@@ -101,7 +156,7 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
         patch = Patch(points, _colors(distortion_on(volume, grid), norm), lit=False)
         panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
         panel.set_title(SECTIONS[axis], fontsize=13)
-    _color_bar(figure, panels, norm, "tanh(√ARAP / 2), scale as given")
+    _color_bar(figure, panels, norm, DISTORTION)
     figure.suptitle("Distortion on the mid-sections", fontsize=14)
     _save(figure, path)
 
@@ -212,9 +267,8 @@ def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
     for start in np.flatnonzero(np.r_[True, stages[1:] != stages[:-1]]):
         for axes in (upper, lower):
             axes.axvline(start, color="grey", linewidth=0.7, linestyle=":")
-        upper.annotate(
-            str(stages[start]), (start, 1.0), (3, 3), xycoords=upper.get_xaxis_transform(), textcoords="offset points"
-        )
+        label = {"textcoords": "offset points", "rotation": 35, "fontsize": 9}  # slanted: short stages lie close
+        upper.annotate(str(stages[start]), (start, 1.0), (0, 3), xycoords=upper.get_xaxis_transform(), **label)
     _save(figure, path)
 
 
@@ -250,6 +304,22 @@ def _panels(rows: int, columns: int) -> tuple[Figure, Any]:
     return figure, axes
 
 
+def _name_faces(figure: Figure) -> None:
+    """The six colours below the panels."""
+    from matplotlib.patches import Patch as Swatch
+
+    swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
+    figure.legend(
+        handles=swatches,
+        loc="outside lower center",
+        ncols=6,
+        frameon=False,
+        fontsize=12,
+        columnspacing=1.2,
+        handlelength=1.4,
+    )
+
+
 def _show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -> None:
     """The same patches from the front and from behind."""
     view = widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
@@ -261,7 +331,7 @@ def _show_around(panels: Any, patches: list[Patch], marks: Array | None = None) 
 def _write_numbers(panel: Any, solution: Solution) -> None:
     report = solution.report
     norms = [("L2 error", report.l2), ("relative", report.l2_relative), ("H1 seminorm", report.h1_seminorm)]
-    lines = [f"{report.dofs:,} unknowns".replace(",", " ")]
+    lines = [f"{report.dofs:,} unknowns"]
     lines += [f"{name} {value:.3e}" for name, value in norms if value is not None]
     if not report.converged:
         lines.append("NOT CONVERGED")
@@ -276,6 +346,6 @@ def _color_bar(figure: Figure, panels: Any, norm: Any, title: str) -> None:
 
 
 def _save(figure: Figure, path: Path) -> None:
-    """Write the PNG under a temporary name, then rename it."""
+    """Write it, PNG or PDF by the ending, under a temporary name, then rename it."""
     with replacing(path) as temporary:
         figure.savefig(temporary)

@@ -18,6 +18,8 @@ from parameterize.bspline import Array
 
 log = logging.getLogger(__name__)
 
+LINE_WIDTH = 1.6  # pixels
+NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: what lies on a surface is seen
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
 PROBE = """
 import pyvista
@@ -33,11 +35,13 @@ class Patch:
     """A surface patch given by samples on a tensor grid.
 
     points: (m, n, 3). colors: (m, n, 3) red, green, blue in 0..1, shown as they are where `lit` is false.
+    every: a parameter line is drawn every so many samples, in both directions; 0 for none.
     """
 
     points: Array
     colors: Array
     lit: bool = True
+    every: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +116,12 @@ def draw(
             ambient=0.5,
             diffuse=0.55,
         )
+    cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
+    nearer = float(np.linalg.norm(np.ptp(cloud, axis=0))) * view.towards
+    _add_lines(plotter, patches, NEARER_LINES * nearer)
     if marks is not None:
-        plotter.add_points(marks, color="black", point_size=18, render_points_as_spheres=True)
-    _aim(plotter, np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), view, pixels)
+        plotter.add_points(marks + NEARER_MARKS * nearer, color="black", point_size=32, render_points_as_spheres=True)
+    _aim(plotter, cloud, view, pixels)
     plotter.add_light(pyvista.Light(light_type="headlight", intensity=0.9))
     image: NDArray[np.uint8] = plotter.screenshot(return_img=True)
     plotter.close()
@@ -129,6 +136,24 @@ def _mesh(patch: Patch) -> Any:
     flat = patch.colors.transpose(1, 0, 2).reshape(-1, 3)  # VTK counts the first index fastest
     grid["rgb"] = np.round(255.0 * flat).astype(np.uint8)
     return grid.extract_surface(algorithm="dataset_surface") if patch.lit else grid
+
+
+def _add_lines(plotter: Any, patches: Sequence[Patch], shift: Array) -> None:
+    """The patches' parameter lines, moved by `shift`."""
+    import pyvista
+
+    drawn = [row for patch in patches if patch.every for row in _parameter_lines(patch)]
+    if not drawn:
+        return
+    starts = np.cumsum([0, *map(len, drawn)])
+    cells = [np.r_[len(row), np.arange(start, start + len(row))] for row, start in zip(drawn, starts, strict=False)]
+    lines = pyvista.PolyData(np.concatenate(drawn) + shift, lines=np.concatenate(cells))
+    plotter.add_mesh(lines, color="black", line_width=LINE_WIDTH, lighting=False)
+
+
+def _parameter_lines(patch: Patch) -> list[Array]:
+    """Lines (k, 3) of constant first, then of constant second parameter."""
+    return [*patch.points[:: patch.every], *patch.points.transpose(1, 0, 2)[:: patch.every]]
 
 
 def _aim(plotter: Any, points: Array, view: View, pixels: tuple[int, int]) -> None:

@@ -56,15 +56,20 @@ def distortion_on(volume: BSplineVolume, grid: Grid) -> Array:
 def solution_on(solution: Solution, grid: Grid) -> Array:
     """u_h, of vectors the length: (samples, samples)."""
     values = _flat(solution.grid(*grid))
-    return values if values.ndim == 2 else _length(values)
+    return values if values.ndim == 2 else np.asarray(np.linalg.norm(values, axis=-1))
 
 
 def error_on(solution: Solution, problem: Problem, grid: Grid, points: Array) -> Array:
     """|u - u_h|, of vectors the length, where the images of a grid are `points`: (samples, samples)."""
+    return error_at(_flat(solution.grid(*grid)), problem, points)
+
+
+def error_at(found: Array, problem: Problem, points: Array) -> Array:
+    """|u - u_h| at points (..., 3), u_h being `found` (...) or, for vectors, of which the length is taken, (..., 3)."""
     exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
-    found = _flat(solution.grid(*grid))
-    wanted = exact if found.ndim == 2 else np.moveaxis(exact, 0, -1)
-    return _length(found - wanted)
+    if found.ndim < points.ndim:
+        return np.abs(found - exact)
+    return np.asarray(np.linalg.norm(found - np.moveaxis(exact, 0, -1), axis=-1))
 
 
 def sampled_error(
@@ -87,11 +92,6 @@ def error_norm(meshes: Sequence[Sequence[Array]]) -> Any:
 def face_labels() -> list[str]:
     """What the six colours stand for."""
     return [f"{name}: {name[0]} = {name[1]}" for name in FACE_NAMES]
-
-
-def _length(values: Array) -> Array:
-    """Absolute values of numbers (m, n), lengths of vectors (m, n, 3)."""
-    return np.abs(values) if values.ndim == 2 else np.asarray(np.linalg.norm(values, axis=-1))
 
 
 def _flat(values: Array) -> Array:

@@ -7,8 +7,12 @@ double. All three count the control points with u fastest (volume.npz: w fastest
 - MFEM: "MFEM NURBS mesh v1.0", one patch, weights 1. The control points stand in MFEM's order of a patch: 8 vertices,
   12 edges, 6 faces, then the inside. Elements are the non-empty knot spans, u fastest, each with the reference
   coordinates (0, 1)^3 of its span. Boundary attributes 1 to 6 are w0, w1, v0, u1, v1, u0. With a solution the map is
-  written on the solution's knots, and the solution's coefficients in the same order in a grid function beside it.
+  written on the solution's knots, and the solution's coefficients in the same order in a grid function beside it: one
+  a row, of displacements three (VDim: 3, Ordering: 1).
 - JSON: splinepy's own list of splines, here one `BSpline`.
+
+A solution u_h(u, v, w) has a file of its own in G+Smo's and splinepy's formats, on its own degrees and knots: a spline
+of one coordinate, or of three for displacements (`geoDim`, `dim`).
 """
 
 from __future__ import annotations
@@ -34,24 +38,27 @@ INSTALL = "pip install 'iga-nn[interop]'"
 WEIGHTS_ALIKE = 1e-12  # relative
 
 
-def write_gismo(path: Path, volume: BSplineVolume) -> None:
-    """Write G+Smo XML."""
+def write_gismo(path: Path, spline: BSplineVolume | SplineField) -> None:
+    """Write G+Smo XML: a volume, or a solution alone."""
     splinepy = _splinepy()
-    splinepy.io.gismo.export(str(path), splinepy.Multipatch([_to_splinepy(volume, volume.control_points)]))
+    patches = splinepy.Multipatch([_to_splinepy(spline)])
+    patches.interfaces = np.full((1, 6), -1)  # no neighbours: splinepy cannot look for those of scalar splines
+    splinepy.io.gismo.export(str(path), patches)
 
 
 def write_mfem(path: Path, volume: BSplineVolume) -> None:
     """Write an MFEM NURBS mesh."""
-    _splinepy().io.mfem.export(str(path), _to_splinepy(volume, volume.control_points).nurbs)
+    _splinepy().io.mfem.export(str(path), _to_splinepy(volume).nurbs)
 
 
 def write_mfem_field(path: Path, field: SplineField) -> None:
     """Write a solution as an MFEM grid function on the mesh of a volume with the same degrees and knots."""
-    spline = _to_splinepy(field, field.coefficients[..., None])
+    spline = _to_splinepy(field)
     order, _ = _splinepy().io.mfem.dof_mapping(spline)
-    values = np.asarray(spline.control_points)[order, 0]
-    head = ["FiniteElementSpace", "FiniteElementCollection: NURBS", "VDim: 1", "Ordering: 0", ""]
-    path.write_text("\n".join([*head, *map(repr, values.tolist())]) + "\n", encoding="utf-8")
+    values = np.asarray(spline.control_points)[order]  # (m, 1) or (m, 3)
+    head = ["FiniteElementSpace", "FiniteElementCollection: NURBS", f"VDim: {values.shape[1]}", "Ordering: 1", ""]
+    rows = (" ".join(map(repr, row)) for row in values.tolist())
+    path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
 
 
 def on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
@@ -70,9 +77,9 @@ def on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
     return BSplineVolume(volume.degrees, (knots[0], knots[1], knots[2]), points)
 
 
-def write_json(path: Path, volume: BSplineVolume) -> None:
-    """Write splinepy's JSON."""
-    _splinepy().io.json.export(str(path), [_to_splinepy(volume, volume.control_points)])
+def write_json(path: Path, spline: BSplineVolume | SplineField) -> None:
+    """Write splinepy's JSON: a volume, or a solution alone."""
+    _splinepy().io.json.export(str(path), [_to_splinepy(spline)])
 
 
 def read(path: Path, kind: str) -> BSplineVolume:
@@ -132,7 +139,7 @@ def _splinepy() -> Any:
     return splinepy
 
 
-def _to_splinepy(spline: BSplineVolume | SplineField, net: Array) -> Any:
-    """net: control points or coefficients (n_u, n_v, n_w, c)."""
-    rows = net.transpose(2, 1, 0, 3).reshape(-1, net.shape[3])  # u fastest
+def _to_splinepy(spline: BSplineVolume | SplineField) -> Any:
+    net = spline.control_points if isinstance(spline, BSplineVolume) else spline.coefficients
+    rows = net.transpose(2, 1, 0, *range(3, net.ndim)).reshape(np.prod(net.shape[:3]), -1)  # u fastest
     return _splinepy().BSpline(list(spline.degrees), [knots.tolist() for knots in spline.knots], rows)

@@ -10,7 +10,8 @@ higher degree on all spans, exactly.
 VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
 tessellations are right. For slicing and clipping there are the samples (`_view.vtu`): linear hexahedra whose nodes lie
 on the spline, SAMPLES a span and direction, with the values there of `arap` (distortion, scale as given), `det J`, and,
-with a solution, `u` and (the exact solution being known) `error` = |u - u_h|.
+with a solution, `u` and (the exact solution being known) `error` = |u - u_h|. Displacements are vectors `u`, and their
+`error` is a length.
 """
 
 from __future__ import annotations
@@ -28,9 +29,12 @@ from parameterize.bspline import Array, apply_along, breakpoints, insert_knots
 from parameterize.quality import arap
 from parameterize.volume import BSplineVolume
 
+from .sampling import error_at
+
 if TYPE_CHECKING:
-    from solve import Poisson
     from solve.field import SplineField
+
+    from .sampling import Problem
 
 SAMPLES = 3  # intervals of the view a span and direction
 BEZIER_HEXAHEDRON = 79
@@ -51,12 +55,12 @@ def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None
     _mark_active(grid.GetPointData().SetRationalWeights, "RationalWeights", np.ones(len(points)))
     if solution is not None:
         values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)
-        grid.point_data["u"] = values.ravel()
+        grid.point_data["u"] = values.reshape(-1, *values.shape[3:])
     _write(path, grid)
 
 
 def write_view(
-    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Poisson | None = None
+    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Problem | None = None
 ) -> None:
     """Write samples of the map and of what is known on it; `problem` knows the exact solution."""
     import pyvista
@@ -68,11 +72,10 @@ def write_view(
     if solution is not None:
         fields["u"] = solution.grid(u, v, w)
         if problem is not None:
-            exact, _ = problem.exact_at(*np.moveaxis(points, -1, 0))
-            fields["error"] = np.abs(fields["u"] - exact)
+            fields["error"] = error_at(fields["u"], problem, points)
     grid = pyvista.StructuredGrid(*np.moveaxis(points, -1, 0)).cast_to_unstructured_grid()
     for name, values in fields.items():
-        grid.point_data[name] = values.ravel(order="F")  # VTK counts the first index fastest
+        grid.point_data[name] = values.reshape((-1, *values.shape[3:]), order="F")  # VTK counts the first index fastest
     _write(path, grid)
 
 

@@ -1,6 +1,9 @@
 import hashlib
 import os
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import ClassVar
 
 import meshio
 import numpy as np
@@ -8,7 +11,8 @@ import pooch
 import pytest
 
 from iga_nn import data
-from iga_nn.data import MODELS, fetch, fetch_all, resolve
+from iga_nn.cli import main
+from iga_nn.data import MODELS, Model, fetch, fetch_all, resolve
 from iga_nn.samples import sample, write_obj
 from parameterize.mesh import MeshError
 
@@ -129,6 +133,52 @@ def test_fetch_without_a_network_says_where_to_put_the_file(monkeypatch):
     ):
         fetch("bunny")
     assert not Path("bunny.obj").exists()
+
+
+class PublishedFiles(BaseHTTPRequestHandler):
+    """A repository's files on this machine; it remembers what was asked for."""
+
+    content: ClassVar[dict[str, bytes]] = {}
+    asked: ClassVar[list[str]] = []
+
+    def do_GET(self):
+        self.asked.append(self.path)
+        content = self.content.get(self.path)
+        self.send_response(404 if content is None else 200)
+        self.end_headers()
+        self.wfile.write(content or b"")
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def repository(an_empty_folder, monkeypatch):
+    """Downloads go to a server on this machine, which has nothing at first; the cache is empty."""
+    PublishedFiles.content, PublishedFiles.asked = {}, []
+    server = ThreadingHTTPServer(("127.0.0.1", 0), PublishedFiles)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    monkeypatch.setattr(data, "RAW", f"http://127.0.0.1:{server.server_port}")
+    monkeypatch.setattr(pooch, "os_cache", lambda name: an_empty_folder / "cache")
+    yield PublishedFiles
+    server.shutdown()
+    server.server_close()
+
+
+def test_fetch_downloads_once_and_then_needs_no_network(repository, an_empty_folder, monkeypatch):
+    write_obj(sample("cube"), an_empty_folder / "published.obj")
+    content = (an_empty_folder / "published.obj").read_bytes()
+    model = Model("some/repository/HEAD/conch.obj", hashlib.sha256(content).hexdigest())
+    monkeypatch.setitem(MODELS, "conch", model)
+    with pytest.raises(MeshError, match=r"conch: cannot be downloaded from http://127\.0\.0\.1:\d+/\S+ \(404"):
+        fetch("conch")
+    repository.content["/" + model.path] = content
+    assert main(["fetch", "conch"]) == 0
+    assert Path("conch.obj").read_bytes() == content
+    assert repository.asked == ["/" + model.path] * 2
+    Path("conch.obj").unlink()
+    assert main(["fetch", "conch"]) == 0 and Path("conch.obj").read_bytes() == content
+    assert len(repository.asked) == 2  # the second time from the cache
 
 
 def test_a_download_with_another_checksum_is_refused(an_empty_folder, monkeypatch):

@@ -121,7 +121,9 @@ def test_gallery_names_every_example_and_its_pictures_are_small():
     text = (EXAMPLES / "README.md").read_text(encoding="utf-8")
     for name in load("gallery").runs(full=False):
         assert f"({name}.py)" in text and (EXAMPLES / f"{name}.py").exists()
-    for picture in re.findall(r"\((pictures/\w+\.png)\)", text):
+    pictures = re.findall(r"\((pictures/\w+\.png)\)", text)
+    assert len(pictures) == len(load("gallery").runs(full=False))
+    for picture in pictures:
         assert (EXAMPLES / picture).stat().st_size < 60_000
 
 

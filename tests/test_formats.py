@@ -85,16 +85,15 @@ def read_vtu(path):
 
 
 def cell_values(grid, volume, points, name=None):
-    """VTK's own evaluation of its cells: places (m, 3), or the point data of that name (m,)."""
+    """VTK's own evaluation of its cells: places (m, 3), or the point data of that name (m, 1) or (m, 3)."""
     found = []
     for number, local in zip(*spans_at(volume, points), strict=True):
         cell = grid.GetCell(int(number))
         place, weights = [0.0] * 3, [0.0] * cell.GetNumberOfPoints()
         cell.EvaluateLocation(sys.modules["vtkmodules.vtkCommonCore"].reference(0), local.tolist(), place, weights)
         nodes = [cell.GetPointId(i) for i in range(len(weights))]
-        found.append(
-            place if name is None else np.dot(weights, [grid.GetPointData().GetArray(name).GetValue(i) for i in nodes])
-        )
+        held = None if name is None else [grid.GetPointData().GetArray(name).GetTuple(i) for i in nodes]
+        found.append(place if held is None else np.dot(weights, held))
     return np.array(found)
 
 
@@ -148,6 +147,69 @@ def test_mfem_reads_a_solution_on_its_mesh(volume):
     assert largest(np.array(read)[:, 3] - solution(POINTS)) < 1e-12
 
 
+def field_on(volume, components=()):
+    """A solution on finer spans than the map's, saved as solution.npz: coefficients that no order repeats."""
+    finer = volume.refined()
+    coefficients = np.random.default_rng(5).normal(size=finer.shape + components)
+    found = SplineField(finer.degrees, finer.knots, coefficients)
+    found.save("solution.npz")
+    return found
+
+
+@pytest.fixture(params=["number", "displacement"])
+def field(request, volume):
+    return field_on(volume, (3,) if request.param == "displacement" else ())
+
+
+def test_gismo_reads_a_solution_beside_the_volume(volume, field):
+    pytest.importorskip("splinepy")
+    pygismo = pytest.importorskip("pygismo")
+    for path, known in (
+        (export("volume.npz", "gismo", solution="solution.npz"), volume),
+        (Path("volume_u.xml"), field),
+    ):
+        spline = pygismo.nurbs.gsTensorBSpline3()
+        pygismo.io.gsFileData(str(path)).getId(100, spline)
+        assert largest(spline.eval(POINTS.T).T - known(POINTS).reshape(50, -1)) < 1e-12
+
+
+def test_splinepy_reads_a_solution_beside_the_volume(volume, field):
+    splinepy = pytest.importorskip("splinepy")
+    for path, known in ((export("volume.npz", "json", solution="solution.npz"), volume), ("volume_u.json", field)):
+        (spline,) = splinepy.io.json.load(str(path))
+        assert largest(spline.evaluate(POINTS) - known(POINTS).reshape(50, -1)) < 1e-12
+
+
+def test_mfem_reads_displacements_on_its_mesh(volume, field):
+    mfem = pytest.importorskip("mfem.ser")
+    pytest.importorskip("splinepy")
+    mesh = mfem.Mesh(str(export("volume.npz", "mfem", solution="solution.npz")), 1, 0)
+    function, read = mfem.GridFunction(mesh, "volume.gf"), []
+    for element, local in zip(*spans_at(volume.refined(), POINTS), strict=True):
+        value = mfem.Vector()
+        function.GetVectorValue(int(element), mfem_point(*local), value)
+        read.append(value.GetDataArray().copy())
+    assert largest(np.array(read) - field(POINTS).reshape(50, -1)) < 1e-12
+
+
+def test_vtk_reads_displacements_in_its_cells(volume, field):
+    grid = read_vtu(export("volume.npz", "vtk", solution="solution.npz"))
+    values = cell_values(grid, volume.refined(), POINTS, "u")
+    assert largest(values.reshape(50, -1) - field(POINTS).reshape(50, -1)) < 1e-12
+
+
+def test_view_holds_displacements_and_the_length_of_their_error(volume):
+    field = field_on(volume, (3,))
+    Path("report.json").write_text(json.dumps({"schema": 1, "elasticity": {"exact": "x*y;0;sin(z)"}}))
+    grid = read_vtu(export("volume.npz", "view", solution="solution.npz"))
+    data = grid.GetPointData()
+    x, y, z = np.array([grid.GetPoint(i) for i in range(grid.GetNumberOfPoints())]).T
+    error = np.array(data.GetArray("u")) - np.stack([x * y, np.zeros_like(x), np.sin(z)], axis=1)
+    assert largest(np.array(data.GetArray("error")) - np.linalg.norm(error, axis=1)) < 1e-12
+    corner = int(np.argmin(np.linalg.norm(np.array([x, y, z]).T - volume([(1.0, 0.0, 1.0)]), axis=1)))
+    assert largest(np.array(data.GetArray("u"))[corner] - field([(1.0, 0.0, 1.0)])) < 1e-12
+
+
 def test_vtk_reads_its_bezier_cells(volume):
     grid = read_vtu(export("volume.npz", "vtk"))
     assert {grid.GetCellType(i) for i in range(grid.GetNumberOfCells())} == {79}
@@ -165,7 +227,7 @@ def test_vtk_reads_a_solution_of_another_degree_on_finer_spans(degree, in_folder
     grid = read_vtu(export("volume.npz", "vtk", solution="solution.npz"))
     finer = volume.refined()
     assert largest(cell_values(grid, finer, POINTS) - volume(POINTS)) < 1e-12
-    assert largest(cell_values(grid, finer, POINTS, "u") - solution(POINTS)) < 1e-12
+    assert largest(cell_values(grid, finer, POINTS, "u")[:, 0] - solution(POINTS)) < 1e-12
 
 
 def test_view_holds_the_spline_and_its_fields_at_its_nodes(volume):
@@ -356,7 +418,8 @@ def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, 
         (["map.npz", "--to", "vtk", "--out", "map.vtk"], "vtk files end in .vtu"),
         (["map.npz", "--to", "vtk", "--out", "no/such/map.vtu"], "no folder"),
         (["map.npz", "--to", "vtk", "--out", "here.vtu"], "--force"),
-        (["map.npz", "--to", "json", "--solution", "solution.npz"], "--to vtk, view, mfem"),
+        (["map.npz", "--to", "json", "--solution", "solution.npz"], "solution.npz: no such file"),
+        (["map.npz", "--to", "gismo", "--solution", "raised.npz", "--out", "here.xml"], "here_u.xml: exists; --force"),
         (["map.npz", "--to", "mfem", "--solution", "raised.npz"], "this one has (4, 4, 4)"),
         (["map.npz", "--to", "vtk", "--solution", "map.npz"], "coefficients"),
         (["map.npz", "--to", "view", "--solution", "other.npz"], "another volume"),
@@ -365,7 +428,8 @@ def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, 
 def test_bad_requests_are_one_line(arguments, says, in_folder, capsys):
     benchmark_volume(2).save("map.npz")
     Path("words.txt").write_text("once upon a time\n")
-    Path("here.vtu").write_text("mine\n")
+    for name in ("here.vtu", "here_u.xml"):
+        Path(name).write_text("mine\n")
     solve_poisson(benchmark_volume(3), Poisson(exact="x")).save("other.npz")
     solve_poisson(benchmark_volume(2), Poisson(exact="x"), degree=4).save("raised.npz")
     before = set(Path().iterdir())

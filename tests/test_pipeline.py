@@ -52,6 +52,16 @@ def test_checkpoint_folder_goes_once_the_files_stand(formula_training, in_folder
     assert not (in_folder / "out" / "checkpoint").exists()
 
 
+def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, monkeypatch):
+    formula_training()
+    seen = []
+    monkeypatch.setattr("iga_nn.plotting.draw_map", lambda *given: seen.append(given[-1]))
+    Path("corners.json").write_text("[7, 6, 5, 4, 3, 2, 1, 0]")
+    pipeline.parameterize_to("cube", "out", mapping=MapOptions(corners=Path("corners.json")))
+    pipeline.parameterize_to("cube", "out", force=True)
+    assert np.array_equal(seen[0], iga_nn.sample("cube").vertices[7::-1]) and seen[1] is None
+
+
 def test_unknown_problem_is_refused():
     with pytest.raises(InputError, match="heat"):
         iga_nn.run("heat", "cube")

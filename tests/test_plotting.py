@@ -1,15 +1,18 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import formula_parameterization
-from matplotlib.colors import to_rgb
+from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.image import imread
 
 import solve
-from iga_nn import plotting, rendering
+from iga_nn import octant, plotting, rendering
+from iga_nn.cli import main
 from solve.study import benchmark_volume
 
 
@@ -35,8 +38,50 @@ def test_map_figures_show_the_map(tmp_path, drawing):
     volume = benchmark_volume(4)
     plotting.draw_faces(tmp_path / "faces.png", volume)
     plotting.draw_distortion(tmp_path / "distortion.png", volume)
+    plotting.draw_lines(tmp_path / "lines.png", volume)
     assert colored_share(tmp_path / "faces.png") > 0.1
     assert colored_share(tmp_path / "distortion.png") > 0.1
+
+
+def hue_share(path, color) -> float:
+    """Share of the coloured pixels that have the hue of a colour, shaded or not."""
+    pixels = rgb_to_hsv(imread(path)[..., :3].reshape(-1, 3))
+    strong = pixels[pixels[:, 1] > 0.3]
+    return float(np.mean(np.abs(strong[:, 0] - rgb_to_hsv(to_rgb(color))[0]) < 0.02))
+
+
+def test_lines_leave_the_faces_their_colours(tmp_path, drawing):
+    volume = benchmark_volume(2)
+    plotting.draw_faces(tmp_path / "faces.png", volume)
+    plotting.draw_lines(tmp_path / "lines.png", volume)
+    assert all(hue_share(tmp_path / "lines.png", color) > 0.01 for color in plotting.FACE_COLORS)
+    faces, lines = (imread(tmp_path / name)[60:, :, :3] for name in ("faces.png", "lines.png"))  # below the titles
+    assert 0.02 < np.mean(np.abs(faces - lines).max(axis=-1) > 0.1) < 0.2
+
+
+def test_cut_shows_the_inside(tmp_path, drawing):
+    volume = benchmark_volume(2)
+    plotting.draw_cut(tmp_path / "cut.png", volume)
+    left = imread(tmp_path / "cut.png")[:, :450, :3]
+    inside = np.array(to_rgb(octant.INSIDE))
+    brightness = left.mean(axis=-1, keepdims=True)
+    alike = np.abs(left - inside * brightness / inside.mean()).max(axis=-1) < 0.02
+    assert np.mean(alike & (brightness[..., 0] > 0.4) & (brightness[..., 0] < 0.93)) > 0.05
+
+
+def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
+    cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
+    volume = replace(cube, control_points=cube.control_points * size)
+    patches = octant.face_patches(volume, 9) + octant.section_patches(volume, 9)
+    corner, view = octant.best_cut([patch.points for patch in patches[:6]])
+    outward = 2.0 * np.array(corner) - 1.0
+    assert np.all(np.sign(view.towards) == outward)
+    shown = octant.without_octant(patches, corner)
+    offsets = [(patch.points.reshape(-1, 3) / size - 0.5) * outward for patch in shown]
+    assert not np.any(np.all(np.concatenate(offsets) > 1e-9, axis=1))  # nothing of the octant's outside
+    planes = [np.flatnonzero(np.all(np.abs(offset) < 1e-12, axis=0)) for offset in offsets]
+    assert sorted(np.concatenate(planes)) == [0, 1, 2]
+    assert sum(len(offset) for offset in offsets) == 3 * 9**2 + 9 * 5**2 + 3 * 5**2
 
 
 def test_error_figure_also_where_the_error_is_rounding(tmp_path, drawing):
@@ -63,6 +108,22 @@ def test_study_has_a_curve_a_degree(tmp_path):
         assert np.count_nonzero(np.abs(image - to_rgb(color)).max(axis=-1) < 0.02) > 100
 
 
+def test_plots_of_curves_are_also_written_as_pdf(in_folder, formula_training, monkeypatch):
+    formula_training()
+    monkeypatch.setattr(plotting, "can_draw", lambda: False)  # this is about curves
+    benchmark_volume(2).save("map.npz")
+    assert main(["parameterize", "cube", "--quiet", "--vector"]) == 0
+    assert main(["solve", "poisson", "map.npz", "--quiet", "--vector"]) == 0
+    assert main(["study", "map.npz", "--refine", "0", "1", "--quiet", "--vector"]) == 0
+    for name in ("cube/history", "map/convergence", "map-study/study"):
+        assert Path(f"{name}.png").stat().st_size > 5000
+        assert Path(f"{name}.pdf").read_bytes().startswith(b"%PDF-")
+    assert main(["solve", "poisson", "map.npz", "--force", "--refine", "0", "--quiet"]) == 0
+    assert not list(Path("map").glob("convergence.*"))  # of one level there is none, and none stays that is out of date
+    assert main(["parameterize", "cube", "--force", "--quiet"]) == 0
+    assert {path.name for path in Path("cube").glob("history.*")} == {"history.npz", "history.png"}
+
+
 def test_picture_is_framed_whole(drawing):
     square = np.stack(np.meshgrid([0.0, 2.0], [0.0, 1.0], [0.0], indexing="ij"), axis=-1)[:, :, 0]  # (2, 2, 3)
     red = np.broadcast_to([1.0, 0.0, 0.0], square.shape)
@@ -72,6 +133,14 @@ def test_picture_is_framed_whole(drawing):
     height, width = np.ptp(drawn, axis=0) + 1
     assert abs(width - 400 / 1.08) < 6 and abs(height - 200 / 1.08) < 6  # the longer side fills the frame, 4 % margin
     assert np.all(image[200, 200] == [255, 0, 0])  # colours as given
+
+
+def test_marks_on_a_surface_are_seen(drawing):
+    square = np.stack(np.meshgrid([0.0, 2.0], [0.0, 1.0], [0.0], indexing="ij"), axis=-1)[:, :, 0]
+    patch = rendering.Patch(square, np.broadcast_to([1.0, 0.0, 0.0], square.shape), lit=False)
+    view = rendering.widest_view(square.reshape(-1, 3))
+    image = rendering.draw([patch], view, (400, 400), marks=np.array([[1.0, 0.5, 0.0]]))
+    assert np.all(image[200, 200] < 60) and np.all(image[200, 240] == [255, 0, 0])
 
 
 def test_widest_view_is_a_right_handed_frame_along_the_thin_axis():

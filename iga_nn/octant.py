@@ -1,0 +1,95 @@
+"""The volume cut open: the images of the cube's faces and mid-sections without those of one of its eight parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from parameterize.bspline import Array
+from parameterize.volume import AXES, BSplineVolume
+
+from .rendering import Patch, View, widest_view
+from .sampling import FACE_COLORS, face_grid, points_on, section_grid
+
+Octant = tuple[int, int, int]  # the corner of the cube it holds: a side of u, of v and of w
+
+INSIDE = "#e9e6df"  # of the sections, set off from the faces' colours
+TILT = 0.45  # radians: more than one side is seen
+
+
+def face_patches(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patch]:
+    """The images of the six faces, each in its colour. samples: a direction. every: as in Patch."""
+    return [_patch(points_on(volume, face_grid(face, samples)), color, every) for face, color in enumerate(FACE_COLORS)]
+
+
+def section_patches(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patch]:
+    """The images of u = 1/2, v = 1/2 and w = 1/2, in one colour."""
+    return [_patch(points_on(volume, section_grid(axis, samples)), INSIDE, every) for axis in range(3)]
+
+
+def best_cut(faces: Sequence[Array]) -> tuple[Octant, View]:
+    """Which of the eight parts to leave out, and from where to look, so that most of the cut is seen.
+
+    faces: points (m, m, 3) on the six faces, m odd. An octant is closed: as much of its cut planes as of its outside,
+    counted with sign, is turned to the viewer. The latter is known from the faces alone.
+    """
+    view = widest_view(np.concatenate([points.reshape(-1, 3) for points in faces]), tilt=TILT)
+    choices = [(octant, side) for octant in product((0, 1), (0, 1), (0, 1)) for side in (view, view.turned())]
+    return max(choices, key=lambda choice: float(_outside(faces, choice[0]) @ choice[1].towards))
+
+
+def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
+    """What is seen of nine patches, the six faces and the three sections, where an octant is left out.
+
+    Three faces stay whole, of three the quarter in the octant is left out, of the sections this quarter is all.
+    """
+    shown = [patches[2 * axis + 1 - octant[axis]] for axis in range(3)]
+    for axis in range(3):
+        cut, section = patches[2 * axis + octant[axis]], patches[6 + axis]
+        inside = _sides(axis, octant)
+        shown += [_quarter(cut, sides) for sides in product((0, 1), (0, 1)) if sides != inside]
+        shown.append(_quarter(section, inside))
+    return shown
+
+
+def octant_label(octant: Octant) -> str:
+    """Such as "u < 1/2, v > 1/2, w < 1/2"."""
+    return ", ".join(f"{axis} {'<>'[side]} 1/2" for axis, side in zip(AXES, octant, strict=True))
+
+
+def _patch(points: Array, color: str, every: int) -> Patch:
+    from matplotlib.colors import to_rgb
+
+    return Patch(points, np.broadcast_to(to_rgb(color), points.shape), every=every)
+
+
+def _sides(axis: int, octant: Octant) -> tuple[int, int]:
+    """The octant's sides in the two directions of a patch across an axis."""
+    first, second = (side for a, side in enumerate(octant) if a != axis)
+    return first, second
+
+
+def _half(samples: int, side: int) -> slice:
+    middle = samples // 2
+    return slice(middle, None) if side else slice(middle + 1)
+
+
+def _quarter(patch: Patch, sides: tuple[int, int]) -> Patch:
+    rows, columns = (_half(n, side) for n, side in zip(patch.points.shape[:2], sides, strict=True))
+    return replace(patch, points=patch.points[rows, columns], colors=patch.colors[rows, columns])
+
+
+def _outside(faces: Sequence[Array], octant: Octant) -> Array:
+    """Vector area (3,) of the octant's three outer faces, outward."""
+    total = np.zeros(3)
+    for axis, side in enumerate(octant):
+        points = faces[2 * axis + side]
+        first, second = _sides(axis, octant)
+        quarter = points[_half(len(points), first), _half(len(points), second)]
+        diagonals = quarter[1:, 1:] - quarter[:-1, :-1], quarter[:-1, 1:] - quarter[1:, :-1]
+        area = 0.5 * np.cross(*diagonals).sum(axis=(0, 1))
+        total += area if (side == 1) == (axis != 1) else -area  # across v the two directions are left-handed
+    return total
