@@ -161,6 +161,7 @@ def check(
     *,
     component: int | None = None,
     max_faces: int = MAX_FACES,
+    decimate: bool = False,
     strict: bool = False,
     as_json: Json = False,
 ) -> int:
@@ -170,11 +171,15 @@ def check(
         path: surface, sample's or model's name, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
         component: which connected piece of the file to take, counted from 0.
         max_faces: refuse larger surfaces.
+        decimate: bring larger surfaces down to max_faces instead.
         strict: refuse a surface that intersects itself; without this it is a notice.
         as_json: the verdict as JSON on stdout.
     """
     as_volume = is_volume(path)
-    verdict = pipeline.check_volume(path) if as_volume else pipeline.check_surface(path, component, max_faces, strict)
+    if as_volume:
+        verdict = pipeline.check_volume(path)
+    else:
+        verdict = pipeline.check_surface(path, component, max_faces, decimate, strict)
     if as_json:
         _say(json.dumps(reports.plain(verdict), indent=2))
     else:

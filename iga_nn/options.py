@@ -58,6 +58,7 @@ class MapOptions:
         resume: go on from the checkpoint in the output folder.
         component: which connected piece of the file to take, counted from 0.
         max_faces: refuse larger surfaces.
+        decimate: bring larger surfaces down to max_faces instead; a notice says how far they moved.
         steps_factor: shorten (or lengthen) every stage by this factor; for a quick look.
     """
 
@@ -69,6 +70,7 @@ class MapOptions:
     resume: bool = False
     component: int | None = None
     max_faces: int = 500_000
+    decimate: bool = False
     steps_factor: float = 1.0
 
     def config(self) -> Config:

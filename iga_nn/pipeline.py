@@ -163,12 +163,14 @@ def study_to(
         return _finish(state, loaded), studies.as_table(study)
 
 
-def check_surface(mesh: str, component: int | None, max_faces: int, strict: bool = False) -> dict[str, Any]:
+def check_surface(
+    mesh: str, component: int | None, max_faces: int, decimate: bool = False, strict: bool = False
+) -> dict[str, Any]:
     """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not.
 
-    strict: refuse a surface that intersects itself, too.
+    decimate: bring a larger surface down to max_faces. strict: refuse a surface that intersects itself, too.
     """
-    surface = _load(mesh, component, max_faces)
+    surface = _load(mesh, component, max_faces, decimate)
     if strict:
         surface.refuse_crossings()
     return surface.summary()
@@ -203,7 +205,7 @@ def _parameterize(
 ) -> Parameterization:
     config = options.config()
     with state.timed("load"):
-        surface = _load(mesh, options.component, options.max_faces)
+        surface = _load(mesh, options.component, options.max_faces, options.decimate)
         corners = read_corners(options.corners) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
@@ -319,10 +321,16 @@ def _check_size(volume: BSplineVolume, options: ProblemOptions) -> None:
     check_size(volume, max(options.refine), options.degree, 3 if options.section == "elasticity" else 1)
 
 
-def _load(mesh: str | Path, component: int | None, max_faces: int) -> Surface:
+def _load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool) -> Surface:
+    from parameterize import mesh_decimate
+    from parameterize.mesh import MAX_FACES
+
     from .data import resolve
 
-    return resolve(str(mesh), component=component, max_faces=max_faces)
+    if not decimate:
+        return resolve(str(mesh), component=component, max_faces=max_faces)
+    surface = resolve(str(mesh), component=component, max_faces=max(max_faces, MAX_FACES))
+    return mesh_decimate.decimate(surface, max_faces)
 
 
 def _certify(volume: BSplineVolume) -> dict[str, Any]:
