@@ -15,7 +15,7 @@ from cyclopts import App, CycloptsError, Parameter
 from parameterize.mesh import MAX_FACES, MeshError
 from solve.expressions import ExpressionError
 
-from . import __version__, console, pipeline
+from . import __version__, advice, console, pipeline
 from . import report as reports
 from .folder import Outcome
 from .formats import export, is_volume
@@ -284,7 +284,10 @@ def _say(text: str) -> None:
 def _tell(outcome: Outcome, output: OutputOptions) -> int:
     """Say the verdict and return the exit code: 3 wins over 4."""
     verdict = reports.verdict(outcome.report, outcome.folder)
-    _say(json.dumps(reports.plain(verdict), indent=2) if output.as_json else "\n".join(_lines(verdict)))
+    if output.as_json:
+        _say(json.dumps(reports.plain(verdict), indent=2))
+    else:
+        _say("\n".join([*_lines(verdict), *advice.in_words(outcome.report)]))
     if not reports.is_certified(outcome.report):
         return NOT_CERTIFIED
     return DONE if reports.is_converged(outcome.report) else NOT_CONVERGED

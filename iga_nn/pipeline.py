@@ -18,8 +18,8 @@ import numpy as np
 from parameterize.files import save_arrays, save_text
 from parameterize.volume import BSplineVolume
 
+from . import advice, studies
 from . import report as reports
-from . import studies
 from .command import command_line
 from .folder import CHECKPOINT, Outcome, RunFolder, has_checkpoint, open_folder
 from .formats import load_volume
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MAP_FILES = ("volume.npz", "boundary.npz", "history.npz", "history.png", "faces.png", "distortion.png")
+DEFECT_FILES = ("folds.png", "meeting.png")
 SOLUTION_FILES = ("solution.npz", "error.png")
 STUDY_FILES = ("study.csv", "study.png")
 
@@ -193,6 +194,7 @@ def _write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, comm
         versions=reports.versions(),
         parameterization=certificate,
     )
+    _advise(state)
 
 
 def _parameterize(
@@ -226,7 +228,7 @@ def _parameterize(
         equation.reaction_at(x, y, z)
     if options.resume and not has_checkpoint(state.folder):
         log.info("no checkpoint, starting anew")
-    state.begin(*MAP_FILES, *SOLUTION_FILES)
+    state.begin(*MAP_FILES, *DEFECT_FILES, *SOLUTION_FILES)
     checkpoint = state.folder / CHECKPOINT
     try:
         result = parameterize(
@@ -254,12 +256,22 @@ def _parameterize(
         seed=options.seed,
         device=result.device,
         versions=reports.versions(),
-        parameterization=result.quality.as_dict(),
+        parameterization=result.quality.as_dict() | advice.unproved(result.volume, result.certificate),
     )
+    _advise(state, options)
     log.info("certificate: %s", result.certificate.verdict)
     _warn_of_meeting(state.report["parameterization"])
     shutil.rmtree(checkpoint, ignore_errors=True)  # the files above replace it
     _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history))
+    _draw(
+        state,
+        lambda plotting: plotting.draw_defects(
+            state.folder,
+            result.volume,
+            advice.span_places(result.volume, result.certificate.unproved),
+            result.quality.boundary_check.meeting,
+        ),
+    )
     return result
 
 
@@ -346,7 +358,14 @@ def _certify(volume: BSplineVolume) -> dict[str, Any]:
         **check_boundary(volume).as_dict(),
         "det_lower_bound": certificate.lower_bound,
         "witness": certificate.witness,
+        **advice.unproved(volume, certificate),
     }
+
+
+def _advise(state: RunFolder, options: MapOptions | None = None) -> None:
+    """Where the map is not certified, write what to try."""
+    if remedies := advice.what_to_try(state.report, options):
+        state.write(advice=remedies)
 
 
 def _warn_of_meeting(quality: dict[str, Any]) -> None:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from parameterize.bspline import Array
 from parameterize.files import replacing
+from parameterize.injective import Meeting
 from parameterize.volume import BSplineVolume
 
-from .rendering import Patch, can_draw, draw, widest_view
+from .rendering import Patch, View, can_draw, draw, widest_view
 from .sampling import (
     FACE_COLORS,
     MAP,
@@ -23,6 +24,7 @@ from .sampling import (
     error_norm,
     face_grid,
     face_labels,
+    face_window,
     points_on,
     sampled_error,
     section_grid,
@@ -39,6 +41,8 @@ if TYPE_CHECKING:
 
 SAMPLES = 141  # a direction and patch
 PANEL = (900, 700)  # pixels of one view
+WINDOW = 0.15  # of the cube, to every side of a meeting place
+MEETING_COLORS = ("#4477aa", "#ee6677")
 
 
 def draw_solution(folder: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
@@ -59,6 +63,47 @@ def draw_map(folder: Path, volume: BSplineVolume, history: dict[str, NDArray[Any
     if can_draw():
         draw_faces(folder / "faces.png", volume)
         draw_distortion(folder / "distortion.png", volume)
+
+
+def draw_defects(folder: Path, volume: BSplineVolume, places: Array, meeting: Meeting | None) -> None:
+    """Write folds.png where there are places (k, 3), and meeting.png where the boundary meets itself."""
+    if (len(places) or meeting) and can_draw():
+        if len(places):
+            draw_folds(folder / "folds.png", volume, places)
+        if meeting:
+            draw_meeting(folder / "meeting.png", volume, meeting)
+
+
+def draw_folds(path: Path, volume: BSplineVolume, places: Array) -> None:
+    """The boundary as of glass, with black balls at places (k, 3) inside: the spans where det J > 0 is not proved."""
+    figure, (panels,) = _panels(1, 2)
+    _show_around(panels, _glass(volume), places)
+    figure.suptitle(f"det J > 0 is not proved on {len(places)} spans: black balls", fontsize=14)
+    _save(figure, path)
+
+
+def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
+    """The place where the boundary meets itself: in the whole, and the two parts that meet there, from two sides."""
+    from matplotlib.colors import to_rgb
+
+    mark = np.array([meeting.point])
+    parts = []
+    for parameter, color in zip(meeting.parameters, MEETING_COLORS, strict=True):
+        points = points_on(volume, face_window(parameter, WINDOW, SAMPLES))
+        parts.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape), opacity=0.7))
+    figure, (panels,) = _panels(1, 3)
+    glass = _glass(volume)
+    panels[0].imshow(draw(glass, _view_of(glass), PANEL, mark))
+    panels[0].set_title("the whole", fontsize=13)
+    _show_around(panels[1:], parts, mark)
+    figure.suptitle("The boundary meets itself: black ball; the two parts near it", fontsize=14)
+    _save(figure, path)
+
+
+def _glass(volume: BSplineVolume) -> list[Patch]:
+    """The six faces, seen through."""
+    points = [points_on(volume, face_grid(face, SAMPLES)) for face in range(6)]
+    return [Patch(p, np.full(p.shape, 0.6), opacity=0.25) for p in points]
 
 
 def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) -> None:
@@ -252,10 +297,14 @@ def _panels(rows: int, columns: int) -> tuple[Figure, Any]:
 
 def _show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -> None:
     """The same patches from the front and from behind."""
-    view = widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
+    view = _view_of(patches)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
         panel.imshow(draw(patches, direction, PANEL, marks))
         panel.set_title(title, fontsize=13)
+
+
+def _view_of(patches: list[Patch]) -> View:
+    return widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
 
 
 def _write_numbers(panel: Any, solution: Solution) -> None:

@@ -33,11 +33,13 @@ class Patch:
     """A surface patch given by samples on a tensor grid.
 
     points: (m, n, 3). colors: (m, n, 3) red, green, blue in 0..1, shown as they are where `lit` is false.
+    opacity: below 1 what lies behind is seen, too.
     """
 
     points: Array
     colors: Array
     lit: bool = True
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +113,7 @@ def draw(
             lighting=patch.lit,
             ambient=0.5,
             diffuse=0.55,
+            opacity=patch.opacity,
         )
     if marks is not None:
         plotter.add_points(marks, color="black", point_size=18, render_points_as_spheres=True)

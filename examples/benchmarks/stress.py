@@ -28,11 +28,12 @@ from hard_shapes import KINDS, hard_shape, kind_of
 
 import iga_nn
 from iga_nn import report as reports
+from iga_nn.advice import span_places
 from iga_nn.machine import calibrate, processor
 from iga_nn.options import InputError, MapOptions, one_line
 from iga_nn.rendering import can_draw, widest_view
 from iga_nn.samples import write_obj
-from parameterize.bspline import Array, breakpoints
+from parameterize.bspline import Array
 from parameterize.files import replacing, save_text
 from parameterize.mesh import Surface
 
@@ -211,7 +212,7 @@ def run_surface(number: int, options: Options) -> Row:
         start = time.perf_counter()
         result = run(surface, options.mapping.config(), seed=options.mapping.seed, device="cpu")
         row = replace(row, seconds=time.perf_counter() - start, t_cal=t_cal)
-        places = span_middles(result)
+        places = span_places(result.volume, result.certificate.unproved)
         row = replace(row, **_figures(result))
     except Exception as error:
         traceback.print_exc()
@@ -235,14 +236,6 @@ def _figures(result: iga_nn.Parameterization) -> dict[str, object]:
         "boundary_rms": quality.boundary.unit_volume.rms,
         "spline_to_mesh_max": quality.spline_to_mesh.unit_volume.max,
     }
-
-
-def span_middles(result: iga_nn.Parameterization) -> Array:
-    """The middles (k, 3) of the spans where det J > 0 is not proved, on the volume."""
-    spans = result.certificate.unproved  # (k, 3)
-    breaks = [breakpoints(knots) for knots in result.volume.knots]
-    middles = [0.5 * (b[spans[:, axis]] + b[spans[:, axis] + 1]) for axis, b in enumerate(breaks)]
-    return result.volume(np.stack(middles, axis=1)) if len(spans) else np.empty((0, 3))
 
 
 def draw(surface: Surface, places: Array, path: Path) -> None:
