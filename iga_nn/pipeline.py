@@ -22,7 +22,9 @@ from . import advice, studies
 from . import report as reports
 from .command import command_line
 from .folder import CHECKPOINT, Outcome, RunFolder, has_checkpoint, open_folder
+from .forecast import Forecast, forecast
 from .formats import load_volume
+from .machine import available_memory_mb
 from .options import (
     InputError,
     MapOptions,
@@ -68,7 +70,7 @@ def run(
         raise InputError(f"problem {problem!r}: only 'poisson' can be solved")
     mapping, poisson = mapping or MapOptions(), poisson or PoissonOptions()
     equation, spline = poisson.problem(), mapping.config().spline
-    _check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree), poisson)
+    unknowns = _check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree), poisson)
     with open_folder(mesh, out, force, mapping.resume) as (state, finished):
         if finished and "poisson" not in finished.report:
             volume = finished.folder / "volume.npz"
@@ -78,7 +80,7 @@ def run(
         if finished:
             return finished
         command = command_line("run poisson", mesh, mapping, poisson, out=out)
-        result = _parameterize(state, mesh, mapping, progress, command, equation)
+        result = _parameterize(state, mesh, mapping, progress, command, equation, unknowns)
         solution = _solve(state, result.volume, equation, poisson)
         return _finish(state, result.volume, solution, equation)
 
@@ -204,6 +206,7 @@ def _parameterize(
     progress: ProgressCallback | None,
     command: str,
     equation: Poisson | None = None,
+    unknowns: int = 0,
 ) -> Parameterization:
     config = options.config()
     with state.timed("load"):
@@ -217,7 +220,7 @@ def _parameterize(
     from parameterize.run import choose_device, corner_vertices, parameterize
 
     with input_errors():
-        choose_device(options.device)
+        device = choose_device(options.device)
         if corners is not None:
             corner_vertices(surface, corners)
     if equation is not None:  # what can be known of its data before there are points inside
@@ -229,6 +232,8 @@ def _parameterize(
     if options.resume and not has_checkpoint(state.folder):
         log.info("no checkpoint, starting anew")
     state.begin(*MAP_FILES, *DEFECT_FILES, *SOLUTION_FILES)
+    with state.timed("load"):
+        expected = _announce(forecast(surface, config, device=device, unknowns=unknowns))
     checkpoint = state.folder / CHECKPOINT
     try:
         result = parameterize(
@@ -253,6 +258,7 @@ def _parameterize(
         command=command,
         input=surface.summary(),
         config=asdict(config),
+        estimate=expected.as_dict(),
         seed=options.seed,
         device=result.device,
         versions=reports.versions(),
@@ -329,8 +335,22 @@ def _finish(
     return outcome
 
 
-def _check_size(volume: BSplineVolume, options: ProblemOptions) -> None:
-    check_size(volume, max(options.refine), options.degree, 3 if options.section == "elasticity" else 1)
+def _announce(expected: Forecast) -> Forecast:
+    """Say what the run will take, and warn where the machine has not that much memory."""
+    log.info("estimate: %s", expected)
+    free = available_memory_mb()
+    if free is not None and expected.memory_mb > free:
+        log.warning(
+            "%.1f GB of memory are needed, %.1f GB are free: lower --control-points or --refine, or close other programs",
+            expected.memory_mb / 1000.0,
+            free / 1000.0,
+        )
+    return expected
+
+
+def _check_size(volume: BSplineVolume, options: ProblemOptions) -> int:
+    """The largest problem's unknowns."""
+    return check_size(volume, max(options.refine), options.degree, 3 if options.section == "elasticity" else 1)
 
 
 def _load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool) -> Surface:
