@@ -36,7 +36,7 @@ NEWTON_STEP, CERTIFICATE, FIT = 120.0, 250.0, 500.0
 EASY, HARD = (5, 16), (16, 32)  # rounds, and Newton steps a round
 
 # Megabytes
-LIBRARIES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 480.0, 8e-3, 16e-3, 1.6e-3
+LIBRARIES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 8e-3, 16e-3, 1.6e-3
 
 
 @dataclass(frozen=True)

@@ -341,7 +341,7 @@ def _announce(expected: Forecast) -> Forecast:
     free = available_memory_mb()
     if free is not None and expected.memory_mb > free:
         log.warning(
-            "%.1f GB of memory are needed, %.1f GB are free: lower --control-points or --refine, or close other programs",
+            "%.1f GB of memory are needed, %.1f GB are free: lower --control-points or --refine, or free some",
             expected.memory_mb / 1000.0,
             free / 1000.0,
         )
