@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.stamp
 
-.PHONY: setup demo test lint validate
+.PHONY: setup demo test lint validate stress
 
 setup: $(STAMP)
 
@@ -31,3 +31,7 @@ lint: $(STAMP)
 validate: $(STAMP)
 	$(BIN)/python examples/validation.py
 	$(BIN)/python -m pytest -m slow
+
+# Takes some two minutes a surface; goes on where it was interrupted.
+stress: $(STAMP)
+	$(BIN)/python examples/benchmarks/stress.py

@@ -15,7 +15,7 @@ from cyclopts import App, CycloptsError, Parameter
 from parameterize.mesh import MAX_FACES, MeshError
 from solve.expressions import ExpressionError
 
-from . import __version__, console, pipeline
+from . import __version__, advice, console, pipeline
 from . import report as reports
 from .folder import Outcome
 from .formats import export, is_volume
@@ -174,6 +174,7 @@ def check(
     *,
     component: int | None = None,
     max_faces: int = MAX_FACES,
+    decimate: bool = False,
     strict: bool = False,
     as_json: Json = False,
 ) -> int:
@@ -183,11 +184,15 @@ def check(
         path: surface, sample's or model's name, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
         component: which connected piece of the file to take, counted from 0.
         max_faces: refuse larger surfaces.
+        decimate: bring larger surfaces down to max_faces instead.
         strict: refuse a surface that intersects itself; without this it is a notice.
         as_json: the verdict as JSON on stdout.
     """
     as_volume = is_volume(path)
-    verdict = pipeline.check_volume(path) if as_volume else pipeline.check_surface(path, component, max_faces, strict)
+    if as_volume:
+        verdict = pipeline.check_volume(path)
+    else:
+        verdict = pipeline.check_surface(path, component, max_faces, decimate, strict)
     if as_json:
         _say(json.dumps(reports.plain(verdict), indent=2))
     else:
@@ -293,7 +298,10 @@ def _say(text: str) -> None:
 def _tell(outcome: Outcome, output: OutputOptions) -> int:
     """Say the verdict and return the exit code: 3 wins over 4."""
     verdict = reports.verdict(outcome.report, outcome.folder)
-    _say(json.dumps(reports.plain(verdict), indent=2) if output.as_json else "\n".join(_lines(verdict)))
+    if output.as_json:
+        _say(json.dumps(reports.plain(verdict), indent=2))
+    else:
+        _say("\n".join([*_lines(verdict), *advice.in_words(outcome.report)]))
     if not reports.is_certified(outcome.report):
         return NOT_CERTIFIED
     return DONE if reports.is_converged(outcome.report) else NOT_CONVERGED

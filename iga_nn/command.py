@@ -29,6 +29,8 @@ def command_line(command: str, source: str | Path, *options: Any, **given: Any) 
 
 def _words(name: str, value: Any) -> list[str]:
     flag = "--" + name.replace("_", "-")
+    if value is True:
+        return [flag]
     if isinstance(value, tuple):
         return [flag, *map(str, value)]
     return [f"{flag}={value}"] if str(value).startswith("-") else [flag, str(value)]

@@ -77,7 +77,9 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
         if component not in (None, 0):
             raise MeshError(f"{name}: no component {component}: a sample is one piece; leave --component out")
         if len(surface.faces) > max_faces:
-            raise MeshError(f"{name}: {len(surface.faces)} faces, more than {max_faces}: raise --max-faces")
+            raise MeshError(
+                f"{name}: {len(surface.faces)} faces, more than {max_faces}: raise --max-faces, or add --decimate"
+            )
         return surface
     found = None if is_file else _in_data_folder(name)
     known = Path(name).name.split(".")[0]

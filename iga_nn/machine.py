@@ -29,6 +29,16 @@ def calibrate(share: float = 1.0, threads: int | None = None) -> tuple[float, in
     return seconds * 1e12 / (repeats * operations), threads or usual
 
 
+def available_memory_mb() -> float | None:
+    """Memory that a process can still take; None where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return None
+    found = (line.split() for line in lines if line.startswith("MemAvailable:"))
+    return next((int(words[1]) / 1000.0 for words in found), None)
+
+
 def processor() -> str:
     """The model of the CPU."""
     try:

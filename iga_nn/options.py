@@ -58,6 +58,7 @@ class MapOptions:
         resume: go on from the checkpoint in the output folder.
         component: which connected piece of the file to take, counted from 0.
         max_faces: refuse larger surfaces.
+        decimate: bring larger surfaces down to max_faces instead; a notice says how far they moved.
         steps_factor: shorten (or lengthen) every stage by this factor; for a quick look.
     """
 
@@ -69,6 +70,7 @@ class MapOptions:
     resume: bool = False
     component: int | None = None
     max_faces: int = 500_000
+    decimate: bool = False
     steps_factor: float = 1.0
 
     def config(self) -> Config:
@@ -235,13 +237,14 @@ def check_space(refine: Sequence[int], degree: int | None) -> None:
         raise InputError(f"degree {degree}: must lie between 1 and 8")
 
 
-def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1) -> None:
-    """Raise InputError where a mesh on a volume of these knots has too many unknowns."""
+def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1) -> int:
+    """The unknowns of a mesh on a volume of these knots. Raises InputError where these are too many."""
     from solve.space import trial_space
 
     dofs = components * trial_space(volume, refine, degree).dofs
     if dofs > MAX_DOFS:
         raise InputError(f"refine {refine} gives {dofs:,} unknowns, more than {MAX_DOFS:,}: lower refine or degree")
+    return dofs
 
 
 def _range(text: str) -> list[int]:

@@ -14,10 +14,13 @@ from typing import Any
 from parameterize.files import save_text
 
 from . import report as reports
+from .advice import in_words
 from .report import Report
 from .scene import Scene
 
 MAP_FIGURES = {
+    "meeting.png": "Where the boundary meets itself",
+    "folds.png": "Where det J > 0 is not proved",
     "faces.png": "Images of the cube's faces",
     "lines.png": "Parameter lines",
     "cut.png": "Cut open",
@@ -75,7 +78,14 @@ def page(report: Report, scene: Scene, folder: Path) -> str:
     here = files(__package__)
     skeleton, style, script = ((here / f).read_text(encoding="utf-8") for f in ("page.html", "page.css", "viewer.js"))
     name = Path(report["input"]["file"]).name
-    sections = [_convergence(report), _notices(report), *_figures(report, folder), _command(report), _details(report)]
+    sections = [
+        _advice(report),
+        _convergence(report),
+        _notices(report),
+        *_figures(report, folder),
+        _command(report),
+        _details(report),
+    ]
     return Template(skeleton).substitute(
         title=f"{escape(name)}: {_heading(report)}",
         subtitle=f"iga-nn {escape(report['versions']['iga-nn'])}, {report['seconds']['total']:.1f} s",
@@ -170,11 +180,21 @@ def _number(key: str, value: Any) -> str:
     return f"{value:.2f}" if key.startswith("rate") else f"{value:.3e}" if key != "h" else f"{value:.4g}"
 
 
+def _advice(report: Report) -> str:
+    """Where the map is not certified: the places, and what to try."""
+    lines = in_words(report)
+    return f"<h2>Not certified: where, and what to try</h2>{_items(lines)}" if lines else ""
+
+
+def _items(texts: Iterable[str]) -> str:
+    return f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ul>"
+
+
 def _notices(report: Report) -> str:
     notices = [*report["input"].get("notices", []), *reports.solved(report).get("notices", [])]
     if not notices:
         return ""
-    return f"<h2>Notices</h2><ul>{''.join(f'<li>{escape(text)}</li>' for text in notices)}</ul>"
+    return f"<h2>Notices</h2>{_items(notices)}"
 
 
 def _figures(report: Report, folder: Path) -> Iterable[str]:

@@ -18,11 +18,13 @@ import numpy as np
 from parameterize.files import save_arrays, save_text
 from parameterize.volume import BSplineVolume
 
+from . import advice, studies
 from . import report as reports
-from . import studies
 from .command import command_line
 from .folder import CHECKPOINT, Outcome, RunFolder, has_checkpoint, open_folder
+from .forecast import Forecast, forecast
 from .formats import load_volume
+from .machine import available_memory_mb
 from .options import (
     InputError,
     MapOptions,
@@ -44,6 +46,7 @@ log = logging.getLogger(__name__)
 
 MAP_DATA, MAP_PICTURES = ("volume.npz", "boundary.npz", "history.npz"), ("faces", "lines", "cut", "distortion")
 MAP_FILES = (*MAP_DATA, "history.png", "history.pdf", *(f"{name}.png" for name in MAP_PICTURES))
+DEFECT_FILES = ("folds.png", "meeting.png")
 SOLUTION_FILES = ("solution.npz", "convergence.png", "convergence.pdf", "error.png")
 STUDY_FILES = ("study.csv", "study.png", "study.pdf")
 
@@ -70,7 +73,7 @@ def run(
         raise InputError(f"problem {problem!r}: only 'poisson' can be solved")
     mapping, poisson = mapping or MapOptions(), poisson or PoissonOptions()
     equation, spline = poisson.problem(), mapping.config().spline
-    _check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree), poisson)
+    unknowns = _check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree), poisson)
     with open_folder(mesh, out, force, mapping.resume, vector) as (state, finished):
         if finished and "poisson" not in finished.report:
             volume = finished.folder / "volume.npz"
@@ -80,7 +83,7 @@ def run(
         if finished:
             return finished
         command = command_line("run poisson", mesh, mapping, poisson, out=out)
-        result = _parameterize(state, mesh, mapping, progress, command, equation)
+        result = _parameterize(state, mesh, mapping, progress, command, equation, unknowns)
         solution = _solve(state, result.volume, equation, poisson)
         return _finish(state, result.volume, solution, equation)
 
@@ -176,12 +179,14 @@ def study_to(
         return _finish(state, loaded), studies.as_table(study)
 
 
-def check_surface(mesh: str, component: int | None, max_faces: int, strict: bool = False) -> dict[str, Any]:
+def check_surface(
+    mesh: str, component: int | None, max_faces: int, decimate: bool = False, strict: bool = False
+) -> dict[str, Any]:
     """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not.
 
-    strict: refuse a surface that intersects itself, too.
+    decimate: bring a larger surface down to max_faces. strict: refuse a surface that intersects itself, too.
     """
-    surface = _load(mesh, component, max_faces)
+    surface = _load(mesh, component, max_faces, decimate)
     if strict:
         surface.refuse_crossings()
     return surface.summary()
@@ -204,6 +209,7 @@ def _write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, comm
         versions=reports.versions(),
         parameterization=certificate,
     )
+    _advise(state)
 
 
 def _parameterize(
@@ -213,10 +219,11 @@ def _parameterize(
     progress: ProgressCallback | None,
     command: str,
     equation: Poisson | None = None,
+    unknowns: int = 0,
 ) -> Parameterization:
     config = options.config()
     with state.timed("load"):
-        surface = _load(mesh, options.component, options.max_faces)
+        surface = _load(mesh, options.component, options.max_faces, options.decimate)
         corners = read_corners(options.corners) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
@@ -226,7 +233,7 @@ def _parameterize(
     from parameterize.run import choose_device, corner_vertices, parameterize
 
     with input_errors():
-        choose_device(options.device)
+        device = choose_device(options.device)
         marks = None if corners is None else surface.vertices[corner_vertices(surface, corners)]
     if equation is not None:  # what can be known of its data before there are points inside
         x, y, z = surface.vertices.T
@@ -236,7 +243,9 @@ def _parameterize(
         equation.reaction_at(x, y, z)
     if options.resume and not has_checkpoint(state.folder):
         log.info("no checkpoint, starting anew")
-    state.begin(*MAP_FILES, *SOLUTION_FILES)
+    state.begin(*MAP_FILES, *DEFECT_FILES, *SOLUTION_FILES)
+    with state.timed("load"):
+        expected = _announce(forecast(surface, config, device=device, unknowns=unknowns))
     checkpoint = state.folder / CHECKPOINT
     try:
         result = parameterize(
@@ -261,15 +270,26 @@ def _parameterize(
         command=command,
         input=surface.summary(),
         config=asdict(config),
+        estimate=expected.as_dict(),
         seed=options.seed,
         device=result.device,
         versions=reports.versions(),
-        parameterization=result.quality.as_dict(),
+        parameterization=result.quality.as_dict() | advice.unproved(result.volume, result.certificate),
     )
+    _advise(state, options)
     log.info("certificate: %s", result.certificate.verdict)
     _warn_of_meeting(state.report["parameterization"])
     shutil.rmtree(checkpoint, ignore_errors=True)  # the files above replace it
     _draw(state, lambda plotting: plotting.draw_map(state.folder, result.volume, result.history, state.endings, marks))
+    _draw(
+        state,
+        lambda plotting: plotting.draw_defects(
+            state.folder,
+            result.volume,
+            advice.span_places(result.volume, result.certificate.unproved),
+            result.quality.boundary_check.meeting,
+        ),
+    )
     return result
 
 
@@ -327,14 +347,34 @@ def _finish(
     return outcome
 
 
-def _check_size(volume: BSplineVolume, options: ProblemOptions) -> None:
-    check_size(volume, max(options.refine), options.degree, 3 if options.section == "elasticity" else 1)
+def _announce(expected: Forecast) -> Forecast:
+    """Say what the run will take, and warn where the machine has not that much memory."""
+    log.info("estimate: %s", expected)
+    free = available_memory_mb()
+    if free is not None and expected.memory_mb > free:
+        log.warning(
+            "%.1f GB of memory are needed, %.1f GB are free: lower --control-points or --refine, or free some",
+            expected.memory_mb / 1000.0,
+            free / 1000.0,
+        )
+    return expected
 
 
-def _load(mesh: str | Path, component: int | None, max_faces: int) -> Surface:
+def _check_size(volume: BSplineVolume, options: ProblemOptions) -> int:
+    """The largest problem's unknowns."""
+    return check_size(volume, max(options.refine), options.degree, 3 if options.section == "elasticity" else 1)
+
+
+def _load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool) -> Surface:
+    from parameterize import mesh_decimate
+    from parameterize.mesh import MAX_FACES
+
     from .data import resolve
 
-    return resolve(str(mesh), component=component, max_faces=max_faces)
+    if not decimate:
+        return resolve(str(mesh), component=component, max_faces=max_faces)
+    surface = resolve(str(mesh), component=component, max_faces=max(max_faces, MAX_FACES))
+    return mesh_decimate.decimate(surface, max_faces)
 
 
 def _certify(volume: BSplineVolume) -> dict[str, Any]:
@@ -350,7 +390,14 @@ def _certify(volume: BSplineVolume) -> dict[str, Any]:
         **check_boundary(volume).as_dict(),
         "det_lower_bound": certificate.lower_bound,
         "witness": certificate.witness,
+        **advice.unproved(volume, certificate),
     }
+
+
+def _advise(state: RunFolder, options: MapOptions | None = None) -> None:
+    """Where the map is not certified, write what to try."""
+    if remedies := advice.what_to_try(state.report, options):
+        state.write(advice=remedies)
 
 
 def _warn_of_meeting(quality: dict[str, Any]) -> None:

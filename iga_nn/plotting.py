@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from parameterize.bspline import Array
 from parameterize.files import replacing
+from parameterize.injective import Meeting
 from parameterize.volume import BSplineVolume
 
 from .octant import best_cut, face_patches, octant_label, section_patches, without_octant
-from .rendering import Patch, can_draw, draw, widest_view
+from .rendering import Patch, View, can_draw, draw, widest_view
 from .sampling import (
     FACE_COLORS,
     MAP,
@@ -23,7 +24,9 @@ from .sampling import (
     all_grids,
     distortion_on,
     error_norm,
+    face_grid,
     face_labels,
+    face_window,
     points_on,
     sampled_error,
     section_grid,
@@ -43,6 +46,8 @@ EVERY = 14  # samples between two parameter lines: a tenth of the cube
 DISTORTION = "tanh(√ARAP / 2), scale as given"
 PANEL = (900, 700)  # pixels of one view
 PNG = (".png",)
+WINDOW = 0.15  # of the cube, to every side of a meeting place
+MEETING_COLORS = ("#4477aa", "#ee6677")
 
 
 def draw_solution(
@@ -97,6 +102,47 @@ def draw_map(
         draw_lines(folder / "lines.png", volume)
         draw_cut(folder / "cut.png", volume)
         draw_distortion(folder / "distortion.png", volume)
+
+
+def draw_defects(folder: Path, volume: BSplineVolume, places: Array, meeting: Meeting | None) -> None:
+    """Write folds.png where there are places (k, 3), and meeting.png where the boundary meets itself."""
+    if (len(places) or meeting) and can_draw():
+        if len(places):
+            draw_folds(folder / "folds.png", volume, places)
+        if meeting:
+            draw_meeting(folder / "meeting.png", volume, meeting)
+
+
+def draw_folds(path: Path, volume: BSplineVolume, places: Array) -> None:
+    """The boundary as of glass, with black balls at places (k, 3) inside: the spans where det J > 0 is not proved."""
+    figure, (panels,) = _panels(1, 2)
+    _show_around(panels, _glass(volume), places)
+    figure.suptitle(f"det J > 0 is not proved on {len(places)} spans: black balls", fontsize=14)
+    _save(figure, path)
+
+
+def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
+    """The place where the boundary meets itself: in the whole, and the two parts that meet there, from two sides."""
+    from matplotlib.colors import to_rgb
+
+    mark = np.array([meeting.point])
+    parts = []
+    for parameter, color in zip(meeting.parameters, MEETING_COLORS, strict=True):
+        points = points_on(volume, face_window(parameter, WINDOW, SAMPLES))
+        parts.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape), opacity=0.7))
+    figure, (panels,) = _panels(1, 3)
+    glass = _glass(volume)
+    panels[0].imshow(draw(glass, _view_of(glass), PANEL, mark))
+    panels[0].set_title("the whole", fontsize=13)
+    _show_around(panels[1:], parts, mark)
+    figure.suptitle("The boundary meets itself: black ball; the two parts near it", fontsize=14)
+    _save(figure, path)
+
+
+def _glass(volume: BSplineVolume) -> list[Patch]:
+    """The six faces, seen through."""
+    points = [points_on(volume, face_grid(face, SAMPLES)) for face in range(6)]
+    return [Patch(p, np.full(p.shape, 0.6), opacity=0.25) for p in points]
 
 
 def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) -> None:
@@ -322,10 +368,14 @@ def _name_faces(figure: Figure) -> None:
 
 def _show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -> None:
     """The same patches from the front and from behind."""
-    view = widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
+    view = _view_of(patches)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
         panel.imshow(draw(patches, direction, PANEL, marks))
         panel.set_title(title, fontsize=13)
+
+
+def _view_of(patches: list[Patch]) -> View:
+    return widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
 
 
 def _write_numbers(panel: Any, solution: Solution) -> None:

@@ -36,12 +36,14 @@ class Patch:
 
     points: (m, n, 3). colors: (m, n, 3) red, green, blue in 0..1, shown as they are where `lit` is false.
     every: a parameter line is drawn every so many samples, in both directions; 0 for none.
+    opacity: below 1 what lies behind is seen, too.
     """
 
     points: Array
     colors: Array
     lit: bool = True
     every: int = 0
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +117,7 @@ def draw(
             lighting=patch.lit,
             ambient=0.5,
             diffuse=0.55,
+            opacity=patch.opacity,
         )
     cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
     nearer = float(np.linalg.norm(np.ptp(cloud, axis=0))) * view.towards

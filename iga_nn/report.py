@@ -88,6 +88,8 @@ def verdict(report: Report, folder: Path) -> Report:
     if "arap" in quality:
         short["arap"] = quality["arap"]
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
+    defects = {name: quality[name] for name in ("unproved", "boundary_meeting") if quality.get(name)}
+    short |= defects | {name: report[name] for name in ("advice",) if name in report}
     if section := solved(report):
         errors = ("l2", "l2_relative", "h1_seminorm", "error_estimate", "error_estimate_relative")
         keys = ("dofs", *errors, "iterations", "converged")

@@ -45,33 +45,38 @@ def write_obj(surface: Surface, path: str | Path) -> None:
     save_text(path, "\n".join(rows) + "\n")
 
 
-def _ball(count: int) -> tuple[Array, IntArray]:
+def ball(count: int) -> tuple[Array, IntArray]:
     """Evenly spread points (count, 3) of the unit sphere (Fibonacci lattice) and their Delaunay triangles."""
     k = np.arange(count)
     z = 1.0 - (2.0 * k + 1.0) / count
     radius = np.sqrt(1.0 - z**2)
     points = np.stack([radius * np.cos(GOLDEN_ANGLE * k), radius * np.sin(GOLDEN_ANGLE * k), z], axis=1)
+    return points, outward_hull(points)
+
+
+def outward_hull(points: Array) -> IntArray:
+    """Triangles (m, 3) of the convex hull of points (n, 3) around the origin, wound outward."""
     faces = ConvexHull(points).simplices.astype(np.int64)
     a, b, c = (points[faces[:, i]] for i in range(3))
     inward = np.sum(np.cross(b - a, c - a) * a, axis=1) < 0
     faces[inward] = faces[inward][:, ::-1]
-    return points, faces
+    return faces
 
 
 def _ellipsoid() -> tuple[Array, IntArray]:
-    points, faces = _ball(2500)
+    points, faces = ball(2500)
     return points * [1.5, 1.0, 0.7], faces
 
 
 def _bumpy_ball() -> tuple[Array, IntArray]:
-    points, faces = _ball(3000)
+    points, faces = ball(3000)
     x, y, z = 4.5 * points.T
     radius = 1.0 + 0.13 * (np.sin(x) * np.sin(y + 0.5) + np.sin(y) * np.sin(z + 1.0) + np.sin(z) * np.sin(x + 1.5))
     return radius[:, None] * points, faces
 
 
 def _bean() -> tuple[Array, IntArray]:
-    points, faces = _ball(2500)
+    points, faces = ball(2500)
     x, y, z = (points * [1.9, 0.75, 0.65]).T
     x, y = x * (1.0 + 0.08 * points[:, 0]), y * (1.0 + 0.12 * points[:, 0])
     y = y + 0.22 * np.exp(-((2.0 * points[:, 0]) ** 2)) * np.maximum(-points[:, 1], 0.0) ** 2
@@ -103,7 +108,7 @@ def _seashell() -> tuple[Array, IntArray]:
 
     Around the axis the radius is a function of angle and height: the surface cannot meet itself.
     """
-    points, faces = _ball(4000)
+    points, faces = ball(4000)
     way = (1.0 - points[:, 2]) / 2.0  # 0 at the apex, 1 at the end of the canal
     theta = np.arctan2(points[:, 1], points[:, 0])
     phase = theta + 11.0 * np.log(way + 0.1)

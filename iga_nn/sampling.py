@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from parameterize.bspline import Array
 from parameterize.quality import arap
@@ -31,6 +32,15 @@ def face_grid(face: int, samples: int) -> Grid:
 def section_grid(axis: int, samples: int) -> Grid:
     """The same on the section through the middle of the cube, across an axis."""
     return _grid(axis, 0.5, samples)
+
+
+def face_window(parameter: ArrayLike, half: float, samples: int) -> Grid:
+    """Parameters of the part of a face around a point (3,) on the cube's boundary, `half` to every side."""
+    place = np.asarray(parameter, dtype=np.float64)
+    axis = int(np.abs(place - 0.5).argmax())
+    low, high = np.clip(place - half, 0.0, 1.0), np.clip(place + half, 0.0, 1.0)
+    u, v, w = (place[[a]] if a == axis else np.linspace(low[a], high[a], samples) for a in range(3))
+    return u, v, w
 
 
 def all_grids(samples: int) -> list[Grid]:

@@ -50,7 +50,7 @@ def check_face_count(count: int, max_faces: int) -> None:
     """Raise MeshError where a surface has more faces than allowed."""
     if count > max_faces:
         raise MeshError(
-            f"{count} faces, more than max_faces={max_faces}: decimate the surface or raise the limit with --max-faces"
+            f"{count} faces, more than max_faces={max_faces}: raise --max-faces, or bring them down with --decimate"
         )
 
 

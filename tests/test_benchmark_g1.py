@@ -100,7 +100,7 @@ def test_the_markdown_ends_with_the_counts_and_the_machine(tmp_path):
         "Certified 1 of 3; of G1, ARAP mean at or below the paper's 1 of 2, boundary rms at or below"
     )
     assert counts.endswith("the paper's 1 of 2.")
-    assert f"{g1.cores()} cores, 1 at a time" in machine and machine.endswith("preset fast, seed 0.\n")
+    assert f"{g1.processes.cores()} cores, 1 at a time" in machine and machine.endswith("preset fast, seed 0.\n")
     assert all(f"{name} " in machine for name in ("python", "torch", "numpy", "iga-nn"))
 
 
@@ -204,7 +204,7 @@ def test_a_process_that_dies_is_a_row(formula, monkeypatch):
 def test_models_run_in_processes_of_their_own(tmp_path):
     write_obj(surface_from_arrays(*rounded_cube(200, power=5.0)), tmp_path / "duck.obj")
     (tmp_path / "pig.obj").write_text("no surface\n")
-    quick = ["--steps-factor", "0.003", "--control-points", "6", "--jobs", str(g1.cores())]
+    quick = ["--steps-factor", "0.003", "--control-points", "6", "--jobs", str(g1.processes.cores())]
     arguments = ["--models", str(tmp_path), "--out", str(tmp_path), "--only", "pig", "duck", *quick]
     assert g1.main(arguments) == 1
     found = table(tmp_path)

@@ -54,7 +54,8 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
     assert not [file for file in folder.iterdir() if file.name.startswith(".")]  # no temporary file left
     report = json.loads((folder / "report.json").read_text())
     assert list(report) == [
-        "schema", "command", "input", "config", "seed", "device", "versions", "parameterization", "poisson", "seconds",
+        "schema", "command", "input", "config", "estimate", "seed", "device", "versions",
+        "parameterization", "poisson", "seconds",
     ]  # fmt: skip
     assert report["poisson"]["exact"] == "x*y"
     assert [level["elements"] for level in report["poisson"]["levels"]] == [4**3, 8**3]

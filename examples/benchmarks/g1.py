@@ -12,12 +12,9 @@ row, which says why; the paper's santa4 is not public, its row waits for santa4.
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import json
 import os
 import signal
-import subprocess
 import sys
 import time
 import traceback
@@ -26,7 +23,9 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any, Literal, NoReturn
+from typing import Any, Literal
+
+import processes
 
 import iga_nn
 from iga_nn import report as reports
@@ -37,9 +36,6 @@ from parameterize.files import save_text
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DONE, ABSENT = "done", "model not public"
-BAD_INPUT, INTERRUPTED = 2, 130
-POLL = 0.2  # seconds
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -137,7 +133,7 @@ class Options:
     @property
     def threads(self) -> int:
         """Of each process."""
-        return max(1, cores() // self.jobs)
+        return max(1, processes.cores() // self.jobs)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -156,17 +152,12 @@ def main(argv: list[str] | None = None) -> int:
                 print(_told(row), flush=True)
     except KeyboardInterrupt:
         print(f"g1.py: interrupted; {len(rows)} rows are in {options.out / 'g1.csv'}", file=sys.stderr)
-        return INTERRUPTED
+        return processes.INTERRUPTED
     except OSError as error:  # the disk is full
         print(f"g1.py: {one_line(error)}", file=sys.stderr)
-        return BAD_INPUT
+        return processes.BAD_INPUT
     print(f"{summary(rows)}\n{options.out / 'g1.md'}")
     return int(any(row.status not in (DONE, ABSENT) for row in rows))
-
-
-def cores() -> int:
-    """Of the processor, as far as this process may use them."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _told(row: Row) -> str:
@@ -176,12 +167,6 @@ def _told(row: Row) -> str:
 
 
 # Arguments
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        """One line, without the usage."""
-        self.exit(BAD_INPUT, f"{self.prog}: {message}\n")
 
 
 def _options(argv: list[str] | None) -> tuple[Options, str | None]:
@@ -209,7 +194,9 @@ def _options(argv: list[str] | None) -> tuple[Options, str | None]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="g1.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = processes.OneLineParser(
+        prog="g1.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     models = Path(os.environ.get(DATA_FOLDER) or REPOSITORY.parent / "shared" / "models")
     results = Path(__file__).resolve().parent / "results"
     parser.add_argument("--models", type=Path, default=models, help=f"folder of NAME.obj (default: {models})")
@@ -227,36 +214,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 # Processes, one a model
-
-
-@dataclass(frozen=True)
-class _Child:
-    """One model's process; its row is the last line it prints."""
-
-    name: str
-    process: subprocess.Popen[bytes]
-    output: IO[bytes]
-
-    @classmethod
-    def start(cls, name: str, options: Options) -> _Child:
-        output = TemporaryFile()  # noqa: SIM115 - a pipe could fill up; closed with the row
-        threads = dict.fromkeys(THREAD_VARIABLES, str(options.threads))
-        process = subprocess.Popen(_command(name, options), stdout=output, env=os.environ | threads)
-        return cls(name, process, output)
-
-    def row(self) -> Row:
-        """Of a process that has ended."""
-        with self.output:
-            self.output.seek(0)
-            lines = self.output.read().splitlines()
-        if self.process.returncode != 0 or not lines:
-            return Row(self.name, f"its process ended with code {self.process.returncode}, without a result")
-        return Row(**json.loads(lines[-1]))
-
-    def stop(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        self.output.close()
 
 
 def _command(name: str, options: Options) -> list[str]:
@@ -278,19 +235,10 @@ def _results(options: Options) -> Generator[Row, None, None]:
     """Each model's row as soon as it is known; processes still running end with this generator."""
     absent = {name: why for name in options.names if (why := _absence(name, options.models))}
     yield from (Row(name, why) for name, why in absent.items())
-    waiting = [name for name in options.names if name not in absent]
-    running: list[_Child] = []
-    try:
-        while waiting or running:
-            while waiting and len(running) < options.jobs:
-                running.append(_Child.start(waiting.pop(0), options))
-            for child in [child for child in running if child.process.poll() is not None]:
-                running.remove(child)
-                yield child.row()
-            time.sleep(POLL)
-    finally:
-        for child in running:
-            child.stop()
+    commands = {name: _command(name, options) for name in options.names if name not in absent}
+    with closing(processes.in_processes(commands, options.threads, options.jobs)) as running:
+        for ended in running:
+            yield Row(ended.name, ended.failure) if ended.result is None else Row(**ended.result)
 
 
 def _file(name: str, folder: Path) -> Path:
@@ -373,12 +321,8 @@ def write_tables(rows: Sequence[Row], options: Options) -> None:
 def as_csv(rows: Sequence[Row]) -> str:
     """Every figure, ours and the paper's, with all its digits; empty where there is none."""
     columns = [field.name for field in fields(Row)] + [f"paper_{field.name}" for field in fields(Published)]
-    text = io.StringIO()
-    table = csv.DictWriter(text, columns, lineterminator="\n")
-    table.writeheader()
-    for row in rows:
-        table.writerow(asdict(row) | {f"paper_{name}": value for name, value in asdict(PAPER[row.model]).items()})
-    return text.getvalue()
+    paper = [{f"paper_{name}": value for name, value in asdict(PAPER[row.model]).items()} for row in rows]
+    return processes.as_csv(columns, (asdict(row) | beside for row, beside in zip(rows, paper, strict=True)))
 
 
 def as_markdown(rows: Sequence[Row], options: Options) -> str:
@@ -389,13 +333,13 @@ def as_markdown(rows: Sequence[Row], options: Options) -> str:
         "Figures at or below the paper's are bold. The paper's are those of Table B.6, with the models brought to "
         "volume 1, and for conch and santa4 of Table 3, at the scale they came in. Its det J > 0 is at samples of the "
         'network; "certified" is a proof for the spline.',
-        _table(QUALITY_HEAD, [_quality_cells(row) for row in rows]),
+        processes.as_markdown(QUALITY_HEAD, [_quality_cells(row) for row in rows]),
         "Distances between spline and mesh, at the scale the models came in; triangles of the boundary map turned over",
-        _table(DISTANCE_HEAD, [_cells(row, DISTANCE_COLUMNS) for row in measured]),
+        processes.as_markdown(DISTANCE_HEAD, [_cells(row, DISTANCE_COLUMNS) for row in measured]),
         "Wall seconds of the parameterization; t_cal: 1e12 float32 operations on the same threads, right before",
-        _table(TIME_HEAD, [_cells(row, TIME_COLUMNS) for row in measured]),
+        processes.as_markdown(TIME_HEAD, [_cells(row, TIME_COLUMNS) for row in measured]),
         f"Poisson's equation, u = {DEFAULT_EXACT}",
-        _table(SOLVE_HEAD, [_cells(row, SOLVE_COLUMNS) for row in measured]),
+        processes.as_markdown(SOLVE_HEAD, [_cells(row, SOLVE_COLUMNS) for row in measured]),
         *_caveats(rows, options),
         summary(rows),
         _machine(options),
@@ -455,11 +399,6 @@ def _beside(ours: float | None, theirs: float, form: str) -> str:
     return f"**{form.format(ours)}**" if ours <= theirs else form.format(ours)
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def summary(rows: Sequence[Row]) -> str:
     """One line of counts; every model that is there or should be counts, santa4 only where it was run."""
     tried = [row for row in rows if row.status != ABSENT]
@@ -490,7 +429,7 @@ def _machine(options: Options) -> str:
     mapping = options.mapping
     versions = ", ".join(f"{name} {number}" for name, number in reports.versions().items())
     return (
-        f"{processor()}, {cores()} cores, {options.jobs} at a time with {options.threads} threads each; "
+        f"{processor()}, {processes.cores()} cores, {options.jobs} at a time with {options.threads} threads each; "
         f"{versions}; preset {mapping.preset}, seed {mapping.seed}."
     )
 

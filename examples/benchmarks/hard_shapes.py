@@ -1,0 +1,161 @@
+"""Random closed surfaces of genus 0 that are hard to fill with one cube, made by formula: equal numbers, equal shapes.
+
+A unit ball is deformed and turned at random; its 1 500 to 3 000 triangles are spread so that they come out even, or
+evened out afterwards. Where the surface then intersects itself, the same shape is made anew, milder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from iga_nn.samples import GOLDEN_ANGLE, ball, outward_hull
+from parameterize.mesh import MeshError, Surface, surface_from_arrays
+from parameterize.mesh_cross import crossing_faces
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Field = Callable[[Array], Array]  # points (n, 3) -> values (n,)
+FINE = 10_000  # points of a ball whose triangles are evened out
+FACES = (1500, 3000)
+SEED = 2025
+MILDER = 0.85  # of the severity, each time a shape is made anew
+TRIES = 20
+
+
+def hard_shape(number: int) -> Surface:
+    """Surface `number` (0, 1, ...): kinds take turns; named by number and kind."""
+    kind = kind_of(number)
+    name, severity = f"{number:03d}-{kind}", 1.0
+    for _ in range(TRIES):
+        vertices, faces = _triangles(SHAPES[kind], np.random.default_rng([SEED, number]), severity)
+        if not len(crossing_faces(vertices, faces)):
+            return surface_from_arrays(vertices, faces, name)
+        severity *= MILDER
+    raise MeshError(f"{name}: intersects itself even after {TRIES} tries")
+
+
+def kind_of(number: int) -> str:
+    """One of KINDS."""
+    return KINDS[number % len(KINDS)]
+
+
+def _triangles(shape: Shape, rng: np.random.Generator, severity: float) -> tuple[Array, IntArray]:
+    """Vertices and faces, deformed and turned, of even edges."""
+    count = int(rng.integers(*FACES))
+    if shape.__name__ in STRETCH:
+        points, faces = _stretched_ball(count // 2 + 2, STRETCH[shape.__name__])
+        vertices = shape(points, rng, severity)
+    else:
+        points, faces = ball(FINE)
+        vertices, faces, *_ = igl.decimate(shape(points, rng, severity), faces, count, block_intersections=True)
+    return vertices @ Rotation.random(rng=rng).as_matrix(), np.asarray(faces, dtype=np.int64)
+
+
+def _stretched_ball(count: int, stretch: float) -> tuple[Array, IntArray]:
+    """Points (count, 3) of the unit ball and triangles that are even once the x axis is stretched by that factor."""
+    axis = np.linspace(-1.0, 1.0, 2001)  # x along the axis
+    element = np.sqrt(1.0 - axis**2 + (axis / stretch) ** 2)  # area of a ring of the spheroid, over d x
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (element[1:] + element[:-1]))])
+    k = np.arange(count)
+    x = np.interp((k + 0.5) / count, area / area[-1], axis)
+    radius = np.sqrt(1.0 - x**2)
+    points = np.stack([x, radius * np.cos(GOLDEN_ANGLE * k), radius * np.sin(GOLDEN_ANGLE * k)], axis=1)
+    return points, outward_hull(points * [stretch, 1.0, 1.0])
+
+
+# The kinds; severity 1 is the hardest
+
+
+def bumpy(points: Array, rng: np.random.Generator, severity: float) -> Array:
+    """A ball, slightly flattened, all bumps and hollows."""
+    bumps = _field(rng, rng.uniform(3.0, 7.0))(points)
+    axes = rng.uniform(0.7, 1.3, 3)
+    return np.exp(severity * rng.uniform(0.2, 0.35) * bumps)[:, None] * points * axes
+
+
+def bent(points: Array, rng: np.random.Generator, severity: float) -> Array:
+    """A swelling sausage bent by 200 to 400 degrees, lifted like a spring so that its ends pass one another."""
+    angle = severity * np.radians(rng.uniform(200.0, 400.0))
+    width = rng.uniform(0.25, 0.45) * (1.0 + 0.2 * _field(rng, 2.0)(points))
+    along = 0.5 * angle * points[:, 0]
+    out = 1.0 + width * points[:, 1]
+    lift = width * points[:, 2] * rng.uniform(0.7, 1.3) + rng.uniform(0.15, 0.35) * along
+    return np.stack([out * np.sin(along), out * np.cos(along), lift], axis=1)
+
+
+def spiky(points: Array, rng: np.random.Generator, severity: float) -> Array:
+    """A ball with 4 to 10 spikes, up to four times as high as wide, the whole twisted."""
+    count = int(rng.integers(4, 11))
+    tips = ball(count)[0] @ Rotation.random(rng=rng).as_matrix()
+    widths = rng.uniform(0.2, 0.4, count)  # radians
+    heights = severity * widths * rng.uniform(2.5, 6.0, count)
+    angles = np.arccos(np.clip(points @ tips.T, -1.0, 1.0))  # (n, count)
+    radius = 0.7 + (heights * np.exp(-((angles / widths) ** 2))).sum(axis=1)
+    grown = radius[:, None] * points
+    return _twisted(grown, severity * rng.uniform(-0.5, 0.5))
+
+
+def thin(points: Array, rng: np.random.Generator, severity: float) -> Array:
+    """A sheet, 8 to 15 times as wide as thick, rolled up by 90 to 250 degrees and wavy."""
+    sheet = _plate(points, 1.0 / rng.uniform(8.0, 15.0)) * [1.0, rng.uniform(0.6, 1.0), 1.0]
+    angle = severity * np.radians(rng.uniform(90.0, 250.0))
+    wave = severity * rng.uniform(0.03, 0.1) * _field(rng, 3.0)(sheet * [1.0, 1.0, 0.0])
+    out = 2.0 / angle + sheet[:, 2] + wave
+    along = 0.5 * angle * sheet[:, 0]
+    return np.stack([out * np.sin(along), sheet[:, 1], out * np.cos(along)], axis=1)
+
+
+def flat(points: Array, rng: np.random.Generator, severity: float) -> Array:
+    """A plate with 2 to 6 arms, like a gingerbread man, 8 to 15 times as wide as thick."""
+    plate = _plate(points, 1.0 / rng.uniform(8.0, 15.0))
+    arms = int(rng.integers(2, 7))
+    theta, rho = np.arctan2(plate[:, 1], plate[:, 0]), np.hypot(plate[:, 0], plate[:, 1])
+    outline = rng.uniform(0.25, 0.55) * np.cos(arms * theta) + 0.2 * np.sin((arms - 1) * theta + rng.uniform(0.0, 6.0))
+    grown = 1.0 + severity * outline * rho**2
+    return plate * np.stack([grown, grown, np.ones_like(grown)], axis=1)
+
+
+def long(points: Array, rng: np.random.Generator, severity: float) -> Array:
+    """A worm 8 to 12 times as long as wide, with necks and bulges, in a gentle curve through space."""
+    length = 1.0 + severity * rng.uniform(7.0, 11.0)
+    along = points[:, 0]
+    width = np.sqrt(1.0 + along**2) * np.exp(0.3 * severity * _field(rng, rng.uniform(5.0, 9.0))(points * [1, 0, 0]))
+    phases, amplitudes = rng.uniform(0.0, 6.0, 2), severity * rng.uniform(0.5, 2.0, 2)
+    curve = amplitudes * np.sin(2.0 * along[:, None] + phases)  # (n, 2)
+    across = width[:, None] * points[:, 1:] * [1.0, rng.uniform(0.6, 1.0)]
+    return np.concatenate([length * along[:, None], across + curve], axis=1)
+
+
+Shape = Callable[[Array, np.random.Generator, float], Array]
+SHAPES: dict[str, Shape] = {s.__name__: s for s in (bumpy, bent, spiky, thin, flat, long)}
+KINDS = tuple(SHAPES)
+STRETCH = {"bent": 5.0, "long": 10.0, "thin": 0.1, "flat": 0.1}  # about what a kind does to the ball's x axis
+
+
+def _field(rng: np.random.Generator, frequency: float, waves: int = 12) -> Field:
+    """A smooth random field around 0, of standard deviation near 1: waves of one length in all directions."""
+    directions = rng.normal(size=(waves, 3))
+    directions *= frequency / np.linalg.norm(directions, axis=1, keepdims=True)
+    phases = rng.uniform(0.0, 2.0 * np.pi, waves)
+    return lambda points: np.sqrt(2.0 / waves) * np.sin(points @ directions.T + phases).sum(axis=1)
+
+
+def _plate(points: Array, thickness: float) -> Array:
+    """The ball as a round plate of radius 1 across the z axis, flat with a round rim; thickness: in diameters."""
+    rho = np.hypot(points[:, 1], points[:, 2])
+    height = np.sign(points[:, 0]) * np.sqrt(np.clip(1.0 - rho**4, 0.0, 1.0))
+    return np.stack([points[:, 1], points[:, 2], thickness * height], axis=1)
+
+
+def _twisted(points: Array, rate: float) -> Array:
+    """Turned about the z axis, by `rate` radians a unit of distance from it."""
+    angle = rate * np.linalg.norm(points, axis=1)
+    x, y = points[:, 0], points[:, 1]
+    return np.stack(
+        [x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle), points[:, 2]], axis=1
+    )

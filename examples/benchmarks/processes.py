@@ -1,0 +1,104 @@
+"""What the benchmarks share: a process of its own for every row, arguments refused in one line, tables."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import json
+import os
+import subprocess
+import time
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from tempfile import TemporaryFile
+from typing import IO, Any, NoReturn
+
+BAD_INPUT, INTERRUPTED = 2, 130
+POLL = 0.2  # seconds
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Of the command line; bad arguments are one line, without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        """Exit code 2."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}\n")
+
+
+def cores() -> int:
+    """Of the processor, as far as this process may use them."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A process that has ended. result: the JSON object of the last line it printed; None where there is none."""
+
+    name: str
+    code: int
+    result: dict[str, Any] | None
+
+    @property
+    def failure(self) -> str:
+        """In words."""
+        return f"its process ended with code {self.code}, without a result"
+
+
+def in_processes(commands: Mapping[str, Sequence[str]], threads: int, jobs: int) -> Generator[Ended, None, None]:
+    """Run each command in a process, `jobs` at a time; yield as they end. Those still running end with this."""
+    waiting = list(commands)
+    running: list[_Child] = []
+    try:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                name = waiting.pop(0)
+                running.append(_Child.start(name, commands[name], threads))
+            for child in [child for child in running if child.process.poll() is not None]:
+                running.remove(child)
+                yield child.ended()
+            time.sleep(POLL)
+    finally:
+        for child in running:
+            child.stop()
+
+
+@dataclass(frozen=True)
+class _Child:
+    name: str
+    process: subprocess.Popen[bytes]
+    output: IO[bytes]
+
+    @classmethod
+    def start(cls, name: str, command: Sequence[str], threads: int) -> _Child:
+        output = TemporaryFile()  # noqa: SIM115 - a pipe could fill up; closed with the row
+        environment = os.environ | dict.fromkeys(THREAD_VARIABLES, str(threads))
+        return cls(name, subprocess.Popen(command, stdout=output, env=environment), output)
+
+    def ended(self) -> Ended:
+        with self.output:
+            self.output.seek(0)
+            lines = self.output.read().splitlines()
+        succeeded = self.process.returncode == 0 and lines
+        return Ended(self.name, self.process.returncode, json.loads(lines[-1]) if succeeded else None)
+
+    def stop(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self.output.close()
+
+
+def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> str:
+    """Every figure with all its digits; empty where there is none."""
+    text = io.StringIO()
+    table = csv.DictWriter(text, list(columns), lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return text.getvalue()
+
+
+def as_markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)

@@ -1,0 +1,83 @@
+"""What a user of a map that is not certified needs to know: where, and what to try."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from parameterize.bspline import Array, breakpoints
+from parameterize.certificate import Certificate
+from parameterize.volume import BSplineVolume
+
+from .options import MAX_CONTROL_POINTS
+from .report import Report, is_certified
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .options import MapOptions
+
+SHOWN = 5  # places
+
+
+def span_parameters(volume: BSplineVolume, spans: NDArray[np.int64]) -> Array:
+    """Middles (k, 3) of spans (k, 3) in the cube."""
+    breaks = [breakpoints(knots) for knots in volume.knots]
+    middles = [0.5 * (b[spans[:, axis]] + b[spans[:, axis] + 1]) for axis, b in enumerate(breaks)]
+    return np.stack(middles, axis=1)
+
+
+def span_places(volume: BSplineVolume, spans: NDArray[np.int64]) -> Array:
+    """Images (k, 3) of the middles of spans (k, 3), in the volume's units."""
+    return volume(span_parameters(volume, spans)) if len(spans) else np.empty((0, 3))
+
+
+def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
+    """An entry of the section `parameterization`: how many spans lack a proof, and a few of them, evenly picked.
+
+    The first place is the worst fold found, where there is one.
+    """
+    spans = certificate.unproved
+    if not len(spans):
+        return {}
+    picked = spans[np.unique(np.linspace(0, len(spans) - 1, SHOWN).round().astype(int))]
+    parameters = span_parameters(volume, picked)
+    if certificate.witness is not None:
+        parameters = np.concatenate([[certificate.witness], parameters])[:SHOWN]
+    return {"unproved": {"spans": len(spans), "parameters": parameters.tolist(), "places": volume(parameters).tolist()}}
+
+
+def what_to_try(report: Report, options: MapOptions | None = None) -> list[str]:
+    """Remedies for a report of a map that is not certified, the most promising first; none for one that is.
+
+    options: those the map was made with, where they are known.
+    """
+    if is_certified(report):
+        return []
+    quality, remedies = report["parameterization"], []
+    if options is not None and options.steps_factor < 1.0:
+        remedies.append("the whole training: leave out --steps-factor")
+    if quality["bijective"] == "certified":  # then the boundary meets itself, without a fold
+        remedies.append("a surface whose parts stand farther apart there, or more faces around that gap")
+    more = min(max(quality["control_points"]) + 10, MAX_CONTROL_POINTS)
+    if more > max(quality["control_points"]):
+        remedies.append(f"more control points: --control-points {more}")
+    if options is None or options.corners is None:
+        remedies.append("your own corners, away from those places: --corners FILE")
+    else:
+        remedies.append("other corners, farther apart and away from those places: --corners FILE")
+    remedies.append(f"another seed: --seed {options.seed + 1 if options else 1}")
+    return remedies
+
+
+def in_words(report: Report) -> list[str]:
+    """The places and the remedies, one a line; none for a certified map."""
+    quality, lines = report["parameterization"], []
+    if found := quality.get("unproved"):
+        places = ", ".join("({:.6g}, {:.6g}, {:.6g})".format(*place) for place in found["places"])
+        lines.append(f"not proved       on {found['spans']} spans, near {places}")
+    if meeting := quality.get("boundary_meeting"):
+        place = "({:.6g}, {:.6g}, {:.6g})".format(*meeting["point"])
+        lines.append(f"meets itself     at {place}")
+    return lines + [f"try              {remedy}" for remedy in report.get("advice", [])]

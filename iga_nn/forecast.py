@@ -1,0 +1,141 @@
+"""What a run will take, said before it starts: from counts, and the time of two small pieces of its work.
+
+The pieces: a pass, the network forward and back on 1000 points; a product with the second derivative of the spline's
+distortion. How many of them a run takes is known from profiles of the models conch, bird and bunny.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import torch
+
+    from parameterize.config import Config, SplineConfig
+    from parameterize.mesh import Surface
+
+Clock = Callable[[], float]
+REPEATS = 3
+PASS_POINTS = 1000
+LARGEST = 30  # control points a direction that the product is timed with; beyond that it grows with their number
+
+# Passes
+TRAINING_STEP = 1.5e-3  # for each of its points
+NEWTON_VERTEX, LAST_VERTEX = 1e-3, 0.04  # for each vertex of the surface: a Newton step, and all that comes after them
+CALLS = 0.12  # what a product takes however small it is
+UNKNOWN = 2.4e-3  # for each unknown of the problem solved
+REST = 1000.0  # libraries loaded, figures drawn
+
+# Products
+NEWTON_STEP, CERTIFICATE, FIT = 120.0, 250.0, 500.0
+EASY, HARD = (5, 16), (16, 32)  # rounds, and Newton steps a round
+
+# Megabytes
+LIBRARIES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 8e-3, 16e-3, 1.6e-3
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """seconds: where the surface is an easy and where it is a hard one, one start; memory_mb: the peak, resident."""
+
+    seconds: tuple[float, float]
+    memory_mb: float
+
+    def __str__(self) -> str:
+        low, high = self.seconds
+        unit, size = ("minutes", 60.0) if high >= 90.0 else ("seconds", 1.0)
+        first, last = max(1, round(low / size)), max(1, round(high / size))
+        span = f"{first} to {last}" if first < last else f"{last}"
+        return f"about {span} {unit}, {self.memory_mb / 1000.0:.1f} GB of memory"
+
+    def as_dict(self) -> dict[str, Any]:
+        """The section `estimate` of report.json."""
+        return {"seconds": list(self.seconds), "memory_mb": self.memory_mb}
+
+
+def forecast(
+    surface: Surface,
+    config: Config,
+    *,
+    device: torch.device,
+    unknowns: int = 0,
+    clock: Clock = time.perf_counter,
+) -> Forecast:
+    """Estimate a run on this machine, as busy as it is now.
+
+    unknowns: of the largest problem that is solved afterwards. Where the first start is not certified, the second takes
+    as long again.
+    """
+    spline, vertices = config.spline, len(surface.vertices)
+    points = _training_points(surface, config)
+    one_pass = _pass_seconds(config, device, clock)
+    product = _product_seconds(spline, device, clock) + CALLS * one_pass
+    once = sum(stage.steps for stage in config.stages) * TRAINING_STEP * points * one_pass
+    once += FIT * product + (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
+    step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
+    low, high = (
+        once + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
+        for rounds, steps in (EASY, HARD)
+    )
+    activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
+    mapped = PER_CONTROL_POINT * spline.control_points**3 + PER_VERTEX * vertices
+    return Forecast((low, high), LIBRARIES + max(activations, mapped, PER_UNKNOWN * unknowns))
+
+
+def _training_points(surface: Surface, config: Config) -> int:
+    """Points that the network maps in a step."""
+    import torch
+
+    from parameterize.sample import stencils
+
+    vertices, faces, cell = surface.unit_vertices, surface.faces, config.train.cell
+    nodes = stencils(vertices, faces, cell, device=torch.device("cpu"), dtype=torch.float32).nodes
+    return len(nodes) + min(len(vertices), 3 * config.train.triangles)
+
+
+def _pass_seconds(config: Config, device: torch.device, clock: Clock) -> float:
+    import torch
+
+    from parameterize.network import InverseMap
+
+    with torch.random.fork_rng(devices=[]):
+        network = InverseMap(config.network).to(device)
+    points = torch.full((PASS_POINTS, 3), 0.5, device=device)
+
+    def run() -> None:
+        loss = network(points).square().sum()
+        loss.backward()
+        float(loss.detach())  # waits for the device
+
+    return _fastest(run, clock)
+
+
+def _product_seconds(spline: SplineConfig, device: torch.device, clock: Clock) -> float:
+    import torch
+
+    from parameterize.bspline import greville, open_uniform_knots
+    from parameterize.energy import Distortion
+
+    count = min(spline.control_points, LARGEST)
+    knots = open_uniform_knots(count, spline.degree)
+    rows = greville(knots, spline.degree)
+    control = torch.as_tensor(np.stack(np.meshgrid(rows, rows, rows, indexing="ij")), device=device)
+    product = Distortion((knots, knots, knots), spline, device=device).curvature(control, 1.0)
+    rough = control.float()
+    seconds = _fastest(lambda: float(product(rough).sum()), clock)
+    return seconds * (spline.control_points / count) ** 3
+
+
+def _fastest(work: Callable[[], object], clock: Clock) -> float:
+    """Seconds of the fastest run but the first, which also warms up."""
+    seconds = []
+    for _ in range(REPEATS + 1):
+        start = clock()
+        work()
+        seconds.append(clock() - start)
+    return max(min(seconds[1:]), 1e-6)

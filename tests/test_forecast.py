@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+import iga_nn
+from iga_nn import machine, report
+from iga_nn.cli import main
+from iga_nn.forecast import Forecast, forecast
+from parameterize.config import preset
+
+CPU = torch.device("cpu")
+QUICK = ["--steps-factor", "0.05", "--control-points", "8"]
+
+
+def test_it_is_said_in_plain_words():
+    assert str(Forecast((125.0, 347.0), 1240.0)) == "about 2 to 6 minutes, 1.2 GB of memory"
+    assert str(Forecast((12.0, 89.0), 640.0)) == "about 12 to 89 seconds, 0.6 GB of memory"
+    assert str(Forecast((110.0, 120.0), 640.0)) == "about 2 minutes, 0.6 GB of memory"
+    assert str(Forecast((0.1, 0.2), 640.0)) == "about 1 seconds, 0.6 GB of memory"
+
+
+def test_more_work_takes_longer_and_more_memory():
+    bean, fast = iga_nn.sample("bean"), preset("fast")
+    quick = forecast(bean, fast.scaled(0.05).with_control_points(8), device=CPU)
+    usual = forecast(bean, fast, device=CPU)
+    solved = forecast(bean, fast, device=CPU, unknowns=2_000_000)
+    paper = forecast(bean, replace(preset("paper"), train=preset("fast").train), device=CPU)
+    assert quick.seconds[1] < usual.seconds[0] < usual.seconds[1] < paper.seconds[1]
+    assert quick.memory_mb < usual.memory_mb < solved.memory_mb
+
+
+def test_the_calibration_takes_less_than_a_second_and_no_random_numbers():
+    bean, fast = iga_nn.sample("bean"), preset("fast")
+    forecast(bean, fast, device=CPU)  # loads torch
+    before, start = torch.get_rng_state(), time.process_time()
+    forecast(bean, fast, device=CPU)
+    assert time.process_time() - start < 1.0
+    assert torch.equal(torch.get_rng_state(), before)
+
+
+def test_a_small_run_takes_what_was_said(in_folder):
+    """In processor seconds, and resident memory, of a process of its own: other programs may keep this one waiting."""
+    script = f"""
+import json, resource, sys, time
+import torch
+torch.set_num_threads(1)
+import iga_nn
+from iga_nn.forecast import forecast
+from iga_nn.cli import main
+from parameterize.config import preset
+config = preset("fast").scaled(0.05).with_control_points(8)
+said = forecast(iga_nn.sample("bean"), config, device=torch.device("cpu"), clock=time.process_time)
+assert main(["parameterize", "bean", "--device", "cpu", "--quiet", *{QUICK!r}, "--out", "out"]) in (0, 3)
+usage = resource.getrusage(resource.RUSAGE_SELF)
+print(json.dumps([*said.seconds, said.memory_mb, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1000.0]))
+"""
+    one = dict.fromkeys(("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    path = {"PYTHONPATH": str(Path(iga_nn.__file__).resolve().parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, env=os.environ | one | path
+    )
+    low, high, memory, seconds, peak = json.loads(done.stdout.splitlines()[-1])
+    assert low / 3.0 < seconds < 3.0 * high
+    assert high < 9.0 * low
+    assert memory / 2.0 < peak < 2.0 * memory
+
+
+def test_it_is_said_before_the_training_and_kept_in_the_report(formula_training, in_folder, capsys):
+    formula_training()
+    assert main(["parameterize", "cube", "--out", "out"]) == 0
+    (line,) = [text for text in capsys.readouterr().err.splitlines() if text.startswith("estimate:")]
+    assert re.fullmatch(r"estimate: about \d+( to \d+)? (minutes|seconds), \d\.\d GB of memory", line)
+    found = report.read(in_folder / "out")["estimate"]
+    assert 0.0 < found["seconds"][0] < found["seconds"][1] and 300.0 < found["memory_mb"] < 3000.0
+
+
+def test_quiet_and_json_keep_stdout_for_the_verdict(formula_training, in_folder, capsys):
+    formula_training()
+    assert main(["run", "poisson", "cube", "--refine", "0", "--out", "out", "--json", "--quiet"]) == 0
+    captured = capsys.readouterr()
+    assert "estimate" not in captured.err
+    json.loads(captured.out)
+
+
+def test_too_little_memory_is_a_warning_even_when_quiet(formula_training, in_folder, capsys, monkeypatch):
+    formula_training()
+    monkeypatch.setattr("iga_nn.pipeline.available_memory_mb", lambda: 100.0)
+    assert main(["parameterize", "cube", "--out", "out", "--quiet"]) == 0
+    assert "GB of memory are needed, 0.1 GB are free" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="read from /proc/meminfo")
+def test_free_memory_is_below_all_memory():
+    whole = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e6
+    assert 0.0 < machine.available_memory_mb() < whole
