@@ -18,7 +18,7 @@ from .layout import sides
 from .surface_fit import SurfaceFit
 
 _A_SPAN = 2
-_NEAR = 0.5  # of a span's length at volume 1
+_NEAR = 1.0 / 3.0  # of a span's length at volume 1
 _NEARLY_ALL = 0.95
 
 
@@ -64,6 +64,10 @@ class EdgeAnchors:
         """Take the points of the surface nearest to F as it is, each with the normal of its triangle."""
         _, points, normals = self._nearest(control)
         self.fit.aim(points, normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3))
+
+    def release(self) -> None:
+        """Pull on nothing until they are aimed again."""
+        self.fit.aim(self.fit.points, np.zeros((len(self.fit.points), 3, 3)))
 
     def _nearest(self, control: Tensor) -> tuple[Array, Array, Array]:
         """F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""

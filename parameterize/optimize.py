@@ -33,7 +33,8 @@ _SLIDES = 2  # of the boundary parameters after each step
 _RELAXATIONS = 1  # sweeps over triangles that they turned over
 _SHORTEST_STEP = 1e-6
 _LEAST_STEPS = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
-# After so many rounds the surface gives way where the map is not proved: a cube edge in a valley cannot lie on it.
+# After so many rounds the anchors let go, and the surface gives way where the map is not proved: a cube edge in a
+# valley cannot lie on it.
 _PATIENT_ROUNDS = 2
 _GIVING_WAY = 0.25  # of the weights there, each round
 
@@ -60,9 +61,9 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the surface data near them loses weight. Once the map is certified,
-    a few more rounds take that back as far as they can. Anchors along the cube's edges hold F where it was close to the
-    surface there from the start, else in those last rounds. The result is the last certified map, else the one with the
-    fewest unproved spans.
+    a few more rounds take that back as far as they can. Anchors along the cube's edges draw F to the surface in those
+    last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
+    result is the last certified map, else the one with the fewest unproved spans.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
@@ -94,7 +95,7 @@ def _rounds(
     config = energy.config
     energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
     best = Optimized(control, certify(_as_volume(control, knots, config.degree)))
-    anchored = energy.anchors.near(control)
+    near = energy.anchors.near(control)
     first, polished = 0, 0
     if (saved := checkpoints.load(_CHECKPOINT)) is not None:
         first, control, best = _restore(*saved, energy, best, knots)
@@ -106,8 +107,10 @@ def _rounds(
                 break
             polished += 1
             energy.take_back(_GIVING_WAY)
-        if anchored or polished:
+        if polished or (near and number < _PATIENT_ROUNDS):
             energy.anchors.aim(control)
+        else:
+            energy.anchors.release()
         energy.start_round(control, config.penalties[min(number, len(config.penalties) - 1)])
         control = _descend(control, energy, number, history, progress)
         certificate = certify(_as_volume(control, knots, config.degree))

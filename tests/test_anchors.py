@@ -61,7 +61,16 @@ def test_what_they_pull_on_comes_closer():
     assert (inward[[0, 0, 0, 0, -1, -1, -1, -1], [0, 0, -1, -1] * 2, [0, -1] * 4] > 0.0).all()
 
 
-def test_near_is_told_from_far_by_half_a_span():
-    """Edges of the unit cube are 0.707 to 0.866 from its centre; half a span is 0.167."""
-    assert anchors_on_a_ball(radius=0.75).near(unit_cube())
-    assert not anchors_on_a_ball(radius=0.5).near(unit_cube())
+def test_near_is_told_from_far_by_a_third_of_a_span():
+    """Edges of the unit cube are 0.707 to 0.866 from its centre; a third of a span is 0.111."""
+    assert anchors_on_a_ball(radius=0.78).near(unit_cube())
+    assert not anchors_on_a_ball(radius=0.6).near(unit_cube())
+
+
+def test_released_they_pull_on_nothing():
+    anchors, control = anchors_on_a_ball(), unit_cube()
+    anchors.aim(control)
+    anchors.release()
+    energy, gradient = anchors.fit.energy_and_gradient(control)
+    assert energy == 0.0
+    assert not gradient.any()
