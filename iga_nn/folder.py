@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +15,11 @@ from . import report as reports
 from .options import InputError
 
 CHECKPOINT = "checkpoint"
+MAP_DATA, MAP_PICTURES = ("volume.npz", "boundary.npz", "history.npz"), ("faces", "lines", "cut", "distortion")
+MAP_FILES = (*MAP_DATA, "history.png", "history.pdf", *(f"{name}.png" for name in MAP_PICTURES))
+DEFECT_FILES = ("folds.png", "meeting.png")
+SOLUTION_FILES = ("solution.npz", "convergence.png", "convergence.pdf", "error.png")
+STUDY_FILES = ("study.csv", "study.png", "study.pdf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +54,13 @@ class RunFolder:
         start = time.perf_counter()
         yield
         self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
+
+    def draw(self, draw: Callable[[Any], None]) -> None:
+        """Figures by functions of plotting.py, timed; importing matplotlib and VTK takes part of it."""
+        from . import plotting
+
+        with self.timed("report"):
+            draw(plotting)
 
     def begin(self, *replaced: str) -> None:
         """The input is good: from here on nothing in the folder counts as finished; files of an older run go."""

@@ -1,0 +1,145 @@
+"""From a surface to its volume in a folder: read, announced, trained, written, drawn."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from parameterize.files import save_arrays
+
+from . import advice
+from . import report as reports
+from .folder import CHECKPOINT, DEFECT_FILES, MAP_FILES, SOLUTION_FILES, RunFolder, has_checkpoint
+from .forecast import Forecast, forecast
+from .machine import available_memory_mb
+from .options import InputError, MapOptions, input_errors, read_corners
+from .verdict import tell
+
+if TYPE_CHECKING:
+    from parameterize.mesh import Surface
+    from parameterize.progress import ProgressCallback
+    from parameterize.run import Parameterization
+    from solve import Poisson
+
+log = logging.getLogger(__name__)
+
+
+def load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool) -> Surface:
+    """A surface by path or name, through the gate. Raises MeshError where it is refused."""
+    from parameterize import mesh_decimate
+    from parameterize.mesh import MAX_FACES
+
+    from .data import resolve
+
+    if not decimate:
+        return resolve(str(mesh), component=component, max_faces=max_faces)
+    surface = resolve(str(mesh), component=component, max_faces=max(max_faces, MAX_FACES))
+    return mesh_decimate.decimate(surface, max_faces)
+
+
+def map_surface(
+    state: RunFolder,
+    mesh: str | Path,
+    options: MapOptions,
+    progress: ProgressCallback | None,
+    command: str,
+    equation: Poisson | None = None,
+    unknowns: int = 0,
+) -> Parameterization:
+    """Parameterize, and leave everything that is known of the map in the folder.
+
+    command: that repeats it. equation, unknowns: what is solved on it afterwards, and how large that is.
+    """
+    with state.timed("load"):
+        surface = load(mesh, options.component, options.max_faces, options.decimate)
+        corners = read_corners(options.corners) if options.corners else None
+    log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
+    for notice in surface.notices:
+        log.warning("%s: %s", surface.name, notice)
+    from parameterize.run import choose_device, corner_vertices
+
+    with input_errors():
+        device = choose_device(options.device)
+        marks = None if corners is None else surface.vertices[corner_vertices(surface, corners)]
+    if equation is not None:
+        _check_data(equation, surface)
+    if options.resume and not has_checkpoint(state.folder):
+        log.info("no checkpoint, starting anew")
+    state.begin(*MAP_FILES, *DEFECT_FILES, *SOLUTION_FILES)
+    with state.timed("load"):
+        expected = forecast(surface, options.config(), device=device, unknowns=unknowns)
+    _announce(expected)
+    result = _train(surface, options, corners, progress, state.folder / CHECKPOINT)
+    state.seconds.update(result.seconds)
+    _write(state, surface, result, command, expected, options)
+    state.draw(lambda plotting: plotting.draw_map(state.folder, result.volume, result.history, state.endings, marks))
+    places = advice.span_places(result.volume, result.certificate.unproved)
+    meeting = result.quality.boundary_check.meeting
+    state.draw(lambda plotting: plotting.draw_defects(state.folder, result.volume, places, meeting))
+    return result
+
+
+def _check_data(equation: Poisson, surface: Surface) -> None:
+    """What can be known of the data before there are points inside: their values on the surface."""
+    x, y, z = surface.vertices.T
+    for evaluate in (equation.boundary_at, equation.source_at, equation.kappa_at, equation.reaction_at):
+        evaluate(x, y, z)
+
+
+def _announce(expected: Forecast) -> None:
+    """Say what the run will take, and warn where the machine has not that much memory."""
+    log.info("estimate: %s", expected)
+    free = available_memory_mb()
+    if free is not None and expected.memory_mb > free:
+        log.warning(
+            "%.1f GB of memory are needed, %.1f GB are free: lower --control-points or --refine, or free some",
+            expected.memory_mb / 1000.0,
+            free / 1000.0,
+        )
+
+
+def _train(
+    surface: Surface, options: MapOptions, corners: Any, progress: ProgressCallback | None, checkpoint: Path
+) -> Parameterization:
+    from parameterize.checkpoint import CheckpointError
+    from parameterize.corners import PathError
+    from parameterize.run import parameterize
+
+    try:
+        return parameterize(
+            surface,
+            options.config(),
+            seed=options.seed,
+            device=options.device,
+            corners=corners,
+            progress=progress,
+            checkpoint_dir=checkpoint,
+            resume=options.resume,
+        )
+    except CheckpointError as error:
+        raise InputError(str(error)) from None
+    except PathError as error:
+        raise InputError(f"{surface.name}: {error}; train longer, or give --corners") from None
+
+
+def _write(
+    state: RunFolder, surface: Surface, result: Parameterization, command: str, expected: Forecast, options: MapOptions
+) -> None:
+    result.volume.save(state.folder / "volume.npz")
+    result.boundary.save(state.folder / "boundary.npz")
+    save_arrays(state.folder / "history.npz", **result.history)
+    state.write(
+        command=command,
+        input=surface.summary(),
+        config=asdict(result.config),
+        estimate=expected.as_dict(),
+        seed=options.seed,
+        device=result.device,
+        versions=reports.versions(),
+        parameterization=result.quality.as_dict() | advice.unproved(result.volume, result.certificate),
+    )
+    tell(state, options)
+    shutil.rmtree(state.folder / CHECKPOINT, ignore_errors=True)  # the files above replace it
