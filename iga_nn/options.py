@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from solve import Elasticity, Poisson
 
 _CORNERS_BYTES = 65_536
+_LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 MAX_CONTROL_POINTS = 100  # per direction
 MAX_STEPS_FACTOR = 100.0
 MAX_REFINE = 6
@@ -287,7 +288,6 @@ def read_corners(path: Path) -> np.ndarray[Any, Any]:
         )
     if rows.shape == (8, 3):
         return rows
-    numbers = rows.astype(np.int64)
-    if np.any(numbers != rows):
-        raise InputError(f"{path}: vertex numbers must be whole")
-    return numbers
+    if np.any(rows != np.rint(rows)) or np.abs(rows).max() > _LARGEST_WHOLE:
+        raise InputError(f"{path}: vertex numbers must be whole and at most {_LARGEST_WHOLE}")
+    return rows.astype(np.int64)
