@@ -7,6 +7,7 @@ import os
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,11 @@ def replacing(target: Path) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def unfinished(target: Path) -> list[Path]:
+    """What processes that were killed while they wrote `target` left beside it."""
+    return list(target.parent.glob(f".{escape(target.stem)}.*.part{escape(target.suffix)}"))
 
 
 def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:

@@ -37,12 +37,13 @@ import numpy as np
 import torch
 from test_mesh import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, obj, off, ply, text_stl
 
-from iga_nn import spline_files
-from iga_nn.cli import main as command
+from iga_nn import pipeline, spline_files
+from iga_nn.formats import is_volume
 from iga_nn.options import InputError, input_errors, one_line, read_corners
 from iga_nn.samples import sample
 from parameterize.boundary import BoundaryMap
 from parameterize.checkpoint import Checkpoints
+from parameterize.mesh import MAX_FACES, MeshError
 from parameterize.run import corner_vertices
 from parameterize.volume import BSplineVolume
 from solve.expressions import Expression, ExpressionError
@@ -54,6 +55,9 @@ SECONDS = 20  # for one file; the processor's
 MEMORY = 2 << 30  # bytes a reader may grow by
 ADDRESSES = 16 << 30  # bytes of address space, so that a failing reader does not take the machine along
 
+REFUSALS = (InputError, MeshError, ExpressionError, OSError)  # exit code 2: as in iga_nn.cli.main
+SCRATCH = "/dev/shm"  # noqa: S108 - 200 000 files are written to memory where that is possible
+
 Pieces = list[bytes]
 
 
@@ -61,13 +65,13 @@ Pieces = list[bytes]
 class Reader:
     """One kind of file.
 
-    read: the exit code that a path gives, with what is said on stderr. seeds: good files, each in the pieces that
-    `pack` makes a file of: spoiling a piece gets past the checksum of the whole. packed: also as .gz.
+    read: called with a path, as the command line does it. seeds: good files, each in the pieces that `pack` makes a
+    file of: spoiling a piece gets past the checksum of the whole. packed: also as .gz.
     """
 
     name: str
     suffix: str
-    read: Callable[[Path], int]
+    read: Callable[[Path], None]
     seeds: tuple[Pieces, ...]
     pack: Callable[[Pieces], bytes] = b"".join
     packed: bool = False
@@ -77,8 +81,41 @@ class Reader:
 
 NUMBERS = (0, 1, 2, 3, 127, 255, 256, 65535, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1, 10**9)
 WORDS = [str(n).encode() for n in (*NUMBERS, -1, -2, -(2**31), 10**18, 10**40, "9" * 5000)]
-WORDS += [b"nan", b"inf", b"-inf", b"1e308", b"-1e308", b"1e-320", b"1e999", b"0x10", b"1_000", b"0.5", b"-1.5", b"1e-9", b".", b"-", b"", b"\0"]
-WORDS += [b"x", b"'", b'"', b"<", b"[", b"]", b"{}", b"null", b"true", b"(((((", b"**", b"/0", b"\n", b"\xff\xfe", b"\xc3"]
+WORDS += [
+    b"nan",
+    b"inf",
+    b"-inf",
+    b"1e308",
+    b"-1e308",
+    b"1e-320",
+    b"1e999",
+    b"0x10",
+    b"1_000",
+    b"0.5",
+    b"-1.5",
+    b"1e-9",
+    b".",
+    b"-",
+    b"",
+    b"\0",
+]
+WORDS += [
+    b"x",
+    b"'",
+    b'"',
+    b"<",
+    b"[",
+    b"]",
+    b"{}",
+    b"null",
+    b"true",
+    b"(((((",
+    b"**",
+    b"/0",
+    b"\n",
+    b"\xff\xfe",
+    b"\xc3",
+]
 WORD = re.compile(rb"[-+.\w]+")
 
 
@@ -172,7 +209,7 @@ def spoiled(reader, rng):
 
 
 def file_of(reader, seed, number, count):
-    """File `number` of `count`: half of them the first seed cut off, at every place if they suffice, the rest random."""
+    """File `number` of `count`: up to half are the first seed cut off, at every place if they suffice; then random."""
     whole = reader.pack(reader.seeds[0])
     if number < min(len(whole), count // 2):
         return reader.suffix, whole[: number * len(whole) // min(len(whole), count // 2)]
@@ -183,22 +220,21 @@ def file_of(reader, seed, number, count):
 
 
 def check(path):
-    return command(["check", str(path)])
+    """What `iga-nn check` does."""
+    if is_volume(path):
+        pipeline.check_volume(path)
+    else:
+        pipeline.check_surface(str(path), None, MAX_FACES)
 
 
-def reading(read):
-    """The exit code of what the command line reads on the way: an error becomes its line."""
+def given(read):
+    """The same for a file that the command line is given beside its input."""
 
-    def code(path):
-        try:
-            with input_errors():
-                read(path)
-        except InputError as error:
-            sys.stderr.write(f"iga-nn: {one_line(error)}\n")
-            return 2
-        return 0
+    def checked(path):
+        with input_errors():
+            read(path)
 
-    return code
+    return checked
 
 
 def read_formula(path):
@@ -257,7 +293,7 @@ def meshio_reader(name, suffix, *options):
     """Tetrahedra, and quadrangles."""
     tetrahedra = np.array([[0, 1, 2, 4], [1, 3, 2, 7], [1, 4, 7, 5], [2, 7, 4, 6], [1, 2, 7, 4]])
     meshes = [meshio.Mesh(CUBE, [("tetra", tetrahedra)]), meshio.Mesh(CUBE, [("quad", np.array(QUADS))])]
-    seeds = [written(partial(meshio.write, mesh=mesh, **given), suffix) for given in options for mesh in meshes]
+    seeds = [written(partial(meshio.write, mesh=mesh, **chosen), suffix) for chosen in options for mesh in meshes]
     return surface_reader(name, suffix, *seeds)
 
 
@@ -290,7 +326,7 @@ def checkpoint_reader():
     def pack(pieces):
         return len(pieces[0]).to_bytes(8, "little") + b"".join(pieces)
 
-    return Reader("checkpoint", ".safetensors", reading(read_checkpoint), ([content[8:start], content[start:]],), pack)
+    return Reader("checkpoint", ".safetensors", given(read_checkpoint), ([content[8:start], content[start:]],), pack)
 
 
 def foreign_readers():
@@ -309,12 +345,13 @@ FORMULAS = ("exp(x+z)*sin(y)", "1e-3*(x**2-y)/(2+z)-3.5", "-tanh(x*y)**(1/3)+abs
 @cache
 def readers() -> tuple[Reader, ...]:
     """Every reader with its good files."""
-    round_ball = ball(subdivisions=1)
+    round_ball, textured = ball(subdivisions=1), obj(faces=MIXED).replace("f 1 3", "vt 0 0\nf 1/1 3//1", 1)
     volumes = [bent(3, 2), bent(4, 3), benchmark_volume(2, 1, amplitude=0.4)]
     fields = [field_on(v, net) for v in volumes[:2] for net in (v.control_points[..., 0], v.control_points)]
+    box = BoundaryMap(cube().vertices, cube().vertices, cube().faces)
     numbers, points = list(range(8)), np.indices((2, 2, 2)).reshape(3, 8).T.tolist()
     return (
-        surface_reader("obj", ".obj", obj(), obj(faces=MIXED).replace("f 1 3", "vt 0 0\nf 1/1 3//1", 1), obj(*round_ball)),
+        surface_reader("obj", ".obj", obj(), textured, obj(*round_ball)),
         surface_reader("stl, text", ".stl", text_stl(), text_stl(*TETRAHEDRON)),
         surface_reader("stl, binary", ".stl", binary_stl(*TETRAHEDRON), binary_stl(header=b"solid"), binary_stl()),
         surface_reader("ply, text", ".ply", ply(), ply(faces=MIXED), flagged_ply()),
@@ -325,17 +362,17 @@ def readers() -> tuple[Reader, ...]:
         meshio_reader("msh, binary", ".msh", *({"file_format": f, "binary": True} for f in ("gmsh", "gmsh22"))),
         meshio_reader("vtu", ".vtu", {"binary": False}, {"compression": None}, {"compression": "zlib"}),
         npz_reader("volume.npz", check, *volumes),
-        npz_reader("solution.npz", reading(SplineField.load), *fields),
-        npz_reader("boundary.npz", reading(BoundaryMap.load), BoundaryMap(cube().vertices, cube().vertices, cube().faces)),
+        npz_reader("solution.npz", given(SplineField.load), *fields),
+        npz_reader("boundary.npz", given(BoundaryMap.load), box),
         checkpoint_reader(),
         Reader(
             "corners",
             ".json",
-            reading(read_corners_of_cube),
-            tuple([json.dumps(given).encode()] for given in (numbers, points)),
+            given(read_corners_of_cube),
+            tuple([json.dumps(rows).encode()] for rows in (numbers, points)),
         ),
         *foreign_readers(),
-        Reader("formula", ".txt", reading(read_formula), tuple([text.encode()] for text in FORMULAS)),
+        Reader("formula", ".txt", given(read_formula), tuple([text.encode()] for text in FORMULAS)),
     )
 
 
@@ -367,18 +404,18 @@ def judge(reader: Reader, path: Path, content: bytes) -> tuple[str, str]:
     started = time.process_time()
     with overheard() as told:
         try:
-            code = reader.read(path)
-        except BaseException:
-            return "crashed", traceback.format_exc()
+            reader.read(path)
+            outcome, line = "accepted", ""
+        except REFUSALS as error:
+            names_it = path.name in str(error) or "corners" in str(error)
+            outcome, line = "refused" if names_it else "crashed", one_line(error)
+        except BaseException:  # SystemExit, too
+            outcome, line = "crashed", traceback.format_exc()
         told.seek(0)
         said = told.read().decode(errors="replace")
     if time.process_time() - started > SECONDS:
-        return "slow", said
-    if code in (0, 3):  # 3: a volume that is not certified
-        return ("crashed" if said else "accepted"), said
-    is_one_line = said.startswith("iga-nn: ") and said.count("\n") == 1 and said.endswith("\n")
-    names_it = path.name in said or "corners" in said
-    return ("refused" if code == 2 and is_one_line and names_it else "crashed"), said
+        return "slow", line
+    return ("crashed" if said else outcome), said + line
 
 
 # The long run.
@@ -468,6 +505,7 @@ def main() -> int:
     parser.add_argument("--failed", type=Path, default=Path("out/fuzz"), help="folder for the files that failed")
     options = parser.parse_args()
     chosen = [r for r in readers() if not options.reader or r.name in options.reader]
+    tempfile.tempdir = SCRATCH if os.access(SCRATCH, os.W_OK) else None
     whole_files()  # before the processes part
     total = Counter[str]()
     print(f"{'reader':14s}", *(f"{outcome:>9s}" for outcome in OUTCOMES), f"{'peak MB':>8s} {'seconds':>8s}")
