@@ -87,8 +87,8 @@ def shapes():
 
 def files():
     """What is no defect of a surface: archives, limits, choices."""
-    yield "cube.zip", refused(_archive(), "unknown format")
-    yield "zipped.obj", refused(_archive(), "it holds binary data")
+    yield "cube.zip", refused(_archive(), "unpack what is in it first")
+    yield "zipped.obj", refused(_archive(), "unpack what is in it first")
     yield "zipped.npz", refused(_archive(), "has no array named")
     yield "limit.obj", accepted(obj(faces=TRIANGLES), "", "--max-faces", "12")
     yield "over.obj", refused(obj(faces=TRIANGLES), "12 faces, more than max_faces=11", "--max-faces", "11")
