@@ -335,7 +335,8 @@ def small_disk(size):
 
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 @pytest.mark.parametrize("size", [100, 1500, 4000])
-def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training, in_folder, capsys):
+def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training, in_folder, capsys, monkeypatch):
+    monkeypatch.setattr("iga_nn.pipeline._draw", lambda *_: None)  # figures come last and take longest
     formula_training()
     benchmark_volume(6).save("map.npz")
     for arguments in (["solve", "poisson", "map.npz", "--refine", "0"], ["parameterize", "cube"]):
@@ -352,7 +353,8 @@ def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training,
         shutil.rmtree("out")
 
 
-def test_what_a_killed_run_left_half_written_goes(formula_training, in_folder):
+def test_what_a_killed_run_left_half_written_goes(formula_training, in_folder, monkeypatch):
+    monkeypatch.setattr("iga_nn.pipeline._draw", lambda *_: None)
     formula_training()
     Path("cube").mkdir()
     Path("cube/.volume.1.part.npz").write_bytes(b"half")
