@@ -162,6 +162,8 @@ def _parse_meshio(data: bytes, suffix: str, limit: int) -> tuple[Array, IntArray
     for kind, rows in blocks:
         if kind in POLYGONS and (rows.ndim != 2 or rows.shape[1] < 3):
             raise MeshError(f"a face with fewer corners than it promises; {DAMAGED}")
+        if kind == "tetra" and rows.shape[1:] != (4,):
+            raise MeshError(f"tetrahedra with fewer corners than 4; {DAMAGED}")
         check_indices(vertices, rows)
     tetrahedra = [rows for kind, rows in blocks if kind == "tetra"]
     if tetrahedra:

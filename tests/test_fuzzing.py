@@ -14,6 +14,7 @@ from hypothesis.extra import numpy as arrays
 from iga_nn.options import InputError, read_corners
 from parameterize.boundary import BoundaryMap
 from parameterize.files import save_arrays
+from parameterize.mesh import MeshError
 from parameterize.volume import BSplineVolume
 from solve.expressions import Expression, ExpressionError
 from solve.field import SplineField
@@ -58,6 +59,44 @@ def test_a_process_that_dies_is_counted_and_its_file_kept(tmp_path):
     tally = fuzzing.survey(reader, 0, 3, tmp_path)
     assert tally.outcomes == {"crashed": 3}
     assert len(list(tmp_path.glob("dying-*.txt"))) == 3
+
+
+def test_knot_spans_too_narrow_for_derivatives_are_refused(tmp_path):
+    """Found by the fuzzer: the certificate of such a volume ended in a traceback."""
+    volume = fuzzing.bent(4, 2)
+    knots = volume.knots[0].copy()
+    knots[3] = 1e-310
+    BSplineVolume(volume.degrees, (knots, *volume.knots[1:]), volume.control_points).save(tmp_path / "narrow.npz")
+    with pytest.raises(InputError, match=r"narrow\.npz: has a knot span narrower than 1e-100"):
+        fuzzing.check(tmp_path / "narrow.npz")
+
+
+def test_an_end_knot_too_many_is_refused(tmp_path):
+    """Found by the fuzzer: a division by zero in the certificate."""
+    volume = fuzzing.bent(3, 1)
+    held = good_arrays(BSplineVolume) | {"degrees": np.array(volume.degrees), "control_points": volume.control_points}
+    held |= {f"knots_{axis}": knots for axis, knots in zip("uvw", volume.knots, strict=True)}
+    save_arrays(tmp_path / "end.npz", **held | {"knots_w": np.array([0.0, 0.0, 0.0, 1.0, 1.0])})
+    with pytest.raises(InputError, match="must be repeated 2 times, not more"):
+        fuzzing.check(tmp_path / "end.npz")
+
+
+def test_corners_too_far_to_measure_are_refused(tmp_path):
+    """Found by the fuzzer: numpy warned of an overflow."""
+    path = tmp_path / "corners.json"
+    path.write_text(json.dumps([[1e308, 0, 0]] * 8))
+    with pytest.raises(InputError, match="three finite coordinates"):
+        read_corners(path)
+
+
+def test_tetrahedra_without_corners_are_refused(tmp_path, monkeypatch):
+    """Found by the fuzzer in a damaged binary .msh."""
+    path = tmp_path / "cube.msh"
+    path.write_bytes(next(reader for reader in fuzzing.readers() if reader.name == "msh, binary").seeds[0][0])
+    mesh = fuzzing.meshio.Mesh(np.eye(3), [("tetra", np.empty((0, 0), dtype=int))])
+    monkeypatch.setattr("meshio.read", lambda *_, **__: mesh)
+    with pytest.raises(MeshError, match="tetrahedra with fewer corners than 4"):
+        fuzzing.check(path)
 
 
 ANY_ARRAY = arrays.arrays(
