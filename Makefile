@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.stamp
 
-.PHONY: setup demo test lint validate stress
+.PHONY: setup demo test lint validate stress fuzz audit
 
 setup: $(STAMP)
 
@@ -35,3 +35,13 @@ validate: $(STAMP)
 # Takes some two minutes a surface; goes on where it was interrupted.
 stress: $(STAMP)
 	$(BIN)/python examples/benchmarks/stress.py
+
+fuzz: $(STAMP)
+	OMP_NUM_THREADS=1 $(BIN)/python tests/fuzzing.py --files 100000
+
+# In an environment of its own. --strict: a package that the service does not answer for is a failure, not a success.
+audit: $(STAMP)
+	$(PYTHON) -m venv .venv/audit
+	.venv/audit/bin/pip install pip-audit==2.10.1
+	.venv/audit/bin/pip-audit --strict --no-deps --disable-pip -r constraints.txt || \
+		{ echo "NOT AUDITED: a package has a known vulnerability, or the service could not be asked; the lines above say which"; exit 1; }

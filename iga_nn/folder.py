@@ -11,6 +11,8 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
+from parameterize.files import unfinished
+
 from . import report as reports
 from .options import InputError
 
@@ -65,7 +67,9 @@ class RunFolder:
     def begin(self, *replaced: str) -> None:
         """The input is good: from here on nothing in the folder counts as finished; files of an older run go."""
         for name in (reports.FILE_NAME, reports.PAGE_NAME, *replaced):
-            (self.folder / name).unlink(missing_ok=True)
+            target = self.folder / name
+            for old in (target, *unfinished(target)):
+                old.unlink(missing_ok=True)
 
     def write(self, **sections: Any) -> None:
         """Add sections to the report and write it."""

@@ -53,6 +53,7 @@ ENDINGS = {
     "json": ".json",
 }
 BESIDE = {"gismo": "_u.xml", "mfem": ".gf", "json": "_u.json"}  # the file of a solution, after the volume's stem
+NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
 
 def is_volume(path: str | Path) -> bool:
@@ -70,9 +71,11 @@ def load_volume(path: str | Path) -> BSplineVolume:
     source = Path(path)
     with input_errors():
         kind = kind_of(source) if source.is_file() else None
-        if kind in ("gismo", "mfem", "json"):
-            return spline_files.read(source, kind)
-        return BSplineVolume.load(source)
+        foreign = kind in ("gismo", "mfem", "json")
+        volume = spline_files.read(source, str(kind)) if foreign else BSplineVolume.load(source)
+    if min(float(np.diff(np.unique(knots)).min()) for knots in volume.knots) < NARROWEST:
+        raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
+    return volume
 
 
 def export(

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from solve import Elasticity, Poisson
 
 _CORNERS_BYTES = 65_536
+_LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
+_LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 MAX_CONTROL_POINTS = 100  # per direction
 MAX_STEPS_FACTOR = 100.0
 MAX_REFINE = 6
@@ -283,14 +285,13 @@ def read_corners(path: Path) -> np.ndarray[Any, Any]:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (ValueError, TypeError, OverflowError, RecursionError):
         raise InputError(f"{path}: corners must be a JSON list of eight points or of eight vertex numbers") from None
-    if rows.shape not in ((8, 3), (8,)) or not np.all(np.isfinite(rows)):
+    if rows.shape not in ((8, 3), (8,)) or not np.all(np.abs(rows) <= _LARGEST_COORDINATE):  # refuses NaN, too
         raise InputError(
             f"{path}: corners must be eight points of three finite coordinates or eight vertex numbers, "
             f"found an array of shape {rows.shape}"
         )
     if rows.shape == (8, 3):
         return rows
-    numbers = rows.astype(np.int64)
-    if np.any(numbers != rows):
-        raise InputError(f"{path}: vertex numbers must be whole")
-    return numbers
+    if np.any(rows != np.rint(rows)) or np.abs(rows).max() > _LARGEST_WHOLE:
+        raise InputError(f"{path}: vertex numbers must be whole and at most {_LARGEST_WHOLE}")
+    return rows.astype(np.int64)

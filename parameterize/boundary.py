@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .bspline import Array
+from .bspline import Array, real_array
 from .files import load_arrays, save_arrays
 from .volume import FACE_NAMES
 
@@ -97,7 +97,7 @@ class BoundaryMap:
 
 
 def _rows_of_three(values: Array, name: str) -> Array:
-    rows = np.asarray(values, dtype=np.float64)
+    rows = real_array(values, name)
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise ValueError(f"{name} must have shape (n, 3), got {rows.shape}")
     if not np.all(np.isfinite(rows)):

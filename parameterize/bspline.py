@@ -49,6 +49,8 @@ def check_knots(knots: ArrayLike, degree: int) -> Array:
     if values[0] != values[degree] or values[-1] != values[-degree - 1] or values[0] == values[-1]:
         raise ValueError(f"the knot vector is not open: its first and last {degree + 1} knots must coincide")
     inner = values[degree + 1 : -degree - 1]
+    if inner.size and (inner[0] == values[0] or inner[-1] == values[-1]):
+        raise ValueError(f"the first and last knot must be repeated {degree + 1} times, not more")
     if inner.size and np.unique(inner, return_counts=True)[1].max() > degree:
         raise ValueError(f"an inner knot is repeated more than {degree} times: the spline would be discontinuous")
     return values

@@ -1,7 +1,11 @@
-"""Checkpoints of a run: tensors and a JSON header in one safetensors file, replaced as a whole."""
+"""Checkpoints of a run: tensors and a JSON header in one safetensors file, replaced as a whole.
+
+A checksum over both is kept with them: what is damaged is refused, not computed with.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from copy import copy
@@ -15,7 +19,7 @@ from torch import Tensor
 
 from .files import save_bytes
 
-FORMAT = 1
+FORMAT = 2
 NAMES = ("training", "spline")
 
 
@@ -32,7 +36,7 @@ class Checkpoints:
 
     def __init__(self, folder: Path | None, identity: Mapping[str, Any], *, resume: bool) -> None:
         self._folder, self._resume, self._suffix = folder, resume, ""
-        self._identity = json.dumps({"format": FORMAT, **identity}, sort_keys=True)
+        self._identity = json.dumps(identity, sort_keys=True)
         if folder is not None and not resume:
             for path in [path for name in NAMES for path in folder.glob(f"{name}*.safetensors")]:
                 path.unlink()
@@ -48,9 +52,10 @@ class Checkpoints:
         if self._folder is None:
             return
         self._folder.mkdir(parents=True, exist_ok=True)
-        header = {"identity": self._identity, "state": json.dumps(state)}
+        header = {"format": str(FORMAT), "identity": self._identity, "state": json.dumps(state)}
+        # copies: the file format refuses tensors that share memory
         copies = {k: v.detach().cpu().clone(memory_format=torch.contiguous_format) for k, v in tensors.items()}
-        content = to_bytes(copies, metadata=header)  # copies: the file format refuses tensors that share memory
+        content = to_bytes(copies, metadata=header | {"sha256": _digest(copies, header)})
         save_bytes(self._folder / f"{name}{self._suffix}.safetensors", content)
 
     def load(self, name: str) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
@@ -68,13 +73,35 @@ class Checkpoints:
                 header = file.metadata() or {}
                 # copies lie aligned in memory as in the first run; sums over tensors within the file round differently
                 tensors = {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118 - not a mapping
-            found, state = json.loads(header["identity"]), json.loads(header["state"])
-        except (SafetensorError, OSError, KeyError, ValueError) as error:
+        except (SafetensorError, OSError, ValueError) as error:
             raise CheckpointError(f"{path}: not a readable checkpoint ({error}); run without --resume") from None
-        wanted = json.loads(self._identity)
-        differing = sorted(key for key in wanted.keys() | found.keys() if wanted.get(key) != found.get(key))
+        if header.get("format") != str(FORMAT):
+            raise CheckpointError(
+                f"{path}: written by another version of iga-nn (format {header.get('format', 'unknown')}, "
+                f"this one reads {FORMAT}); run without --resume"
+            )
+        if header.pop("sha256", None) != _digest(tensors, header):
+            raise CheckpointError(f"{path}: not a readable checkpoint (damaged); run without --resume")
+        differing = _differing(json.loads(self._identity), json.loads(header["identity"]))
         if differing:
             raise CheckpointError(
                 f"{path}: belongs to another run ({', '.join(differing)} differ); run without --resume"
             )
-        return tensors, state
+        return tensors, json.loads(header["state"])
+
+
+def _digest(tensors: Mapping[str, Tensor], header: Mapping[str, str]) -> str:
+    """SHA-256 of everything a checkpoint holds."""
+    return hashlib.sha256(to_bytes(dict(tensors)) + json.dumps(header, sort_keys=True).encode()).hexdigest()
+
+
+def _differing(wanted: Any, found: Any) -> list[str]:
+    """Dotted names of the entries that are not equal in two tables of plain JSON values."""
+    names: list[str] = []
+    for key in sorted(wanted.keys() | found.keys()):
+        ours, theirs = wanted.get(key), found.get(key)
+        if isinstance(ours, dict) and isinstance(theirs, dict):
+            names += [f"{key}.{name}" for name in _differing(ours, theirs)]
+        elif ours != theirs:
+            names.append(key)
+    return names

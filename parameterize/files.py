@@ -7,6 +7,7 @@ import os
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,11 @@ def replacing(target: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def unfinished(target: Path) -> list[Path]:
+    """What processes that were killed while they wrote `target` left beside it."""
+    return list(target.parent.glob(f".{escape(target.stem)}.*.part{escape(target.suffix)}"))
+
+
 def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     """Read the named arrays of an .npz, and no others.
 
@@ -73,7 +79,10 @@ def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[A
     except Exception as error:  # of a damaged archive: zipfile, its decompressors and numpy raise a dozen kinds
         raise ValueError(f"{source}: not a readable .npz archive ({str(error) or type(error).__name__})") from None
     if missing:
-        raise ValueError(f"{source}: has no array named {', '.join(missing)}")
+        remedy = (
+            "" if any(entry.filename.endswith(".npy") for entry in held.values()) else "; unpack what is in it first"
+        )
+        raise ValueError(f"{source}: has no array named {', '.join(missing)}{remedy}")
     if refused:
         raise ValueError(f"{source}: unpacks to {unpacked} bytes, more than {MAX_UNPACKED_BYTES}")
     return arrays

@@ -141,6 +141,8 @@ def _check_medit(data: bytes) -> Header:
 def _check_vtu(data: bytes) -> Header:
     if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
         raise MeshError(f"not a whole .vtu: no <VTKFile> ... </VTKFile>; {DAMAGED}")
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise MeshError("the .vtu declares a document type: entities are not expanded here, take the declaration out")
     for name in (b"NumberOfPoints", b"NumberOfCells"):
         for match in re.findall(name + rb"\s*=\s*[\"'](\d+)[\"']", data):
             count = _count(match)  # at least a byte each, compressed or not

@@ -20,6 +20,7 @@ from .mesh_gmsh import trim_gmsh
 from .mesh_headers import DAMAGED, check_header, plain_ply
 from .mesh_obj import trim_obj
 from .mesh_polygons import triangulate
+from .mesh_unpack import unpacking_at_most
 
 TRIMESH_FORMATS = (".stl", ".ply", ".off")
 MESHIO_FORMATS = {".obj": "obj", ".ply": "ply", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
@@ -68,7 +69,7 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
         vertices, faces = _parse_trimesh(data, suffix[0])
         count = min(len(faces), promised)
     else:
-        vertices, faces, count = _parse_meshio(plain or data, suffix[0])
+        vertices, faces, count = _parse_meshio(plain or data, suffix[0], BYTES_AT_LEAST + BYTES_PER_FACE * max_faces)
     if count < promised:
         raise MeshError(f"{promised} faces promised, {count} read; {DAMAGED}")
     if len(faces) > count:
@@ -137,7 +138,7 @@ def _parse_trimesh(data: bytes, suffix: str) -> tuple[Array, IntArray]:
     return vertices, faces
 
 
-def _parse_meshio(data: bytes, suffix: str) -> tuple[Array, IntArray, int]:
+def _parse_meshio(data: bytes, suffix: str, limit: int) -> tuple[Array, IntArray, int]:
     """Vertices, triangles, and the number of polygons they were cut from."""
     import meshio
 
@@ -145,7 +146,7 @@ def _parse_meshio(data: bytes, suffix: str) -> tuple[Array, IntArray, int]:
         copy = Path(folder, f"mesh{suffix}")
         copy.write_bytes(data)
         try:
-            with _quiet():
+            with _quiet(), unpacking_at_most(limit):
                 mesh = meshio.read(copy, file_format=MESHIO_FORMATS[suffix])
         except (Exception, SystemExit) as error:  # meshio exits the process on some files
             raise MeshError(f"not readable as {suffix} ({_first_line(error)}); {DAMAGED}") from None
@@ -161,6 +162,8 @@ def _parse_meshio(data: bytes, suffix: str) -> tuple[Array, IntArray, int]:
     for kind, rows in blocks:
         if kind in POLYGONS and (rows.ndim != 2 or rows.shape[1] < 3):
             raise MeshError(f"a face with fewer corners than it promises; {DAMAGED}")
+        if kind == "tetra" and rows.shape[1:] != (4,):
+            raise MeshError(f"tetrahedra with fewer corners than 4; {DAMAGED}")
         check_indices(vertices, rows)
     tetrahedra = [rows for kind, rows in blocks if kind == "tetra"]
     if tetrahedra:

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from test_mesh import ACCEPTED, CUBE, QUADS, REFUSED, TRIANGLES, ball, joined, obj
+from shapes import ball as round_surface
+from test_mesh import ACCEPTED, CUBE, QUADS, REFUSED, TRIANGLES, ball, binary_stl, joined, obj, ply
 
 
 @dataclass(frozen=True)
 class Case:
-    """content: of the file. code: 0 accepted, 2 refused. says: words of a notice or of the error, "" where none."""
+    """content: of the file. code: 0 accepted, 2 refused. says: words of a notice or of the error, "" where none.
+
+    options: of `iga-nn check`.
+    """
 
     content: bytes
     code: int
     says: str
+    options: tuple[str, ...] = ()
 
 
-def accepted(content, says=""):
-    return Case(content if isinstance(content, bytes) else content.encode(), 0, says or "")
+def accepted(content, says="", *options):
+    return Case(content if isinstance(content, bytes) else content.encode(), 0, says or "", options)
 
 
-def refused(content, says):
-    return Case(content if isinstance(content, bytes) else content.encode(), 2, says)
+def refused(content, says, *options):
+    return Case(content if isinstance(content, bytes) else content.encode(), 2, says, options)
 
 
 def _torus():
@@ -42,6 +49,21 @@ def _scan(holes):
     return obj(vertices, np.delete(faces, np.arange(holes) * 97, axis=0))
 
 
+def _archive():
+    """A surface zipped, under a name that would lead out of a folder."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("../../cube.obj", obj())
+    return stream.getvalue()
+
+
+def _textured():
+    """Every corner of every face with a texture place of its own, as programs write models with seams."""
+    places = "vt 0 0\nvt 1 0\nvt 0.5 1\n"
+    rows = [f"f {a}/1 {b}/2 {c}/3" for a, b, c in (TRIANGLES + 1).tolist()]
+    return obj(faces=[]) + places + "\n".join(rows) + "\n"
+
+
 def _turned_inside(vertices, faces):
     return vertices, faces[:, ::-1]
 
@@ -57,13 +79,33 @@ def shapes():
     yield "sheet.obj", refused(obj(CUBE[:4], [[0, 2, 3], [0, 3, 1], [0, 3, 2], [0, 1, 3]]), "")
     yield "scan.obj", refused(_scan(3), "open surface: 3 boundary loops")
     yield "spike.obj", accepted(_spike(), "self-intersection")
+    yield "strict_spike.obj", refused(_spike(), "pull the sheets apart", "--strict")
     yield "huge.obj", accepted(obj(1e12 * CUBE), "unusual size")
     yield "tiny.obj", accepted(obj(1e-9 * CUBE), "unusual size")
     yield "far.obj", accepted(obj(CUBE + 1e7, QUADS), "far from the origin")
+
+
+def files():
+    """What is no defect of a surface: archives, limits, choices."""
+    yield "cube.zip", refused(_archive(), "unpack what is in it first")
+    yield "zipped.obj", refused(_archive(), "unpack what is in it first")
+    yield "zipped.npz", refused(_archive(), "has no array named")
+    yield "limit.obj", accepted(obj(faces=TRIANGLES), "", "--max-faces", "12")
+    yield "over.obj", refused(obj(faces=TRIANGLES), "12 faces, more than max_faces=11", "--max-faces", "11")
+    yield "over.stl", refused(binary_stl(), "12 faces, more than max_faces=11", "--max-faces", "11")
+    yield "over.ply", refused(ply(), "12 faces, more than max_faces=11", "--max-faces", "11")
+    yield "second.obj", accepted(obj(*joined(ball(), ball(center=(3, 0, 0)))), "component 1 taken", "--component", "1")
+    yield "places.obj", accepted(_textured(), "")
+
+
+def large():
+    """50 000 vertices: too slow to make for every run of the tests."""
+    return accepted(obj(*round_surface(50_000)), "")
 
 
 CASES = {
     **{name: accepted(*row) for name, row in ACCEPTED.items()},
     **{name: refused(*row) for name, row in REFUSED.items()},
     **dict(shapes()),
+    **dict(files()),
 }

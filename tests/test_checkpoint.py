@@ -4,6 +4,7 @@ import resource
 import pytest
 import torch
 
+from parameterize import checkpoint
 from parameterize.checkpoint import CheckpointError, Checkpoints
 
 IDENTITY = {"surface": "abc", "seed": 0, "config": {"steps": [1, 2]}}
@@ -64,6 +65,33 @@ def test_another_run_is_refused_and_the_difference_named(tmp_path, name):
     other = Checkpoints(tmp_path, IDENTITY | {name: "other"}, resume=True)
     with pytest.raises(CheckpointError, match=rf"\({name} differ\)"):
         other.load("training")
+
+
+def test_of_many_settings_those_that_differ_are_named(tmp_path):
+    Checkpoints(tmp_path, IDENTITY, resume=False).save("training", {"x": torch.zeros(1)}, {})
+    other = Checkpoints(tmp_path, IDENTITY | {"seed": 1, "config": {"steps": [1, 3], "rounds": 2}}, resume=True)
+    with pytest.raises(CheckpointError, match=r"another run \(config\.rounds, config\.steps, seed differ\)"):
+        other.load("training")
+
+
+def test_another_version_is_refused_by_name(tmp_path, monkeypatch):
+    checkpoints = Checkpoints(tmp_path, IDENTITY, resume=True)
+    monkeypatch.setattr(checkpoint, "FORMAT", 99)
+    checkpoints.save("training", {"x": torch.zeros(1)}, {})
+    monkeypatch.undo()
+    with pytest.raises(CheckpointError, match=r"another version of iga-nn \(format 99, this one reads \d+\)"):
+        checkpoints.load("training")
+
+
+def test_any_damaged_byte_is_refused(tmp_path):
+    checkpoints = Checkpoints(tmp_path, IDENTITY, resume=True)
+    checkpoints.save("training", {"x": torch.arange(3.0), "y": torch.ones(2)}, {"step": 1})
+    path = tmp_path / "training.safetensors"
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        with pytest.raises(CheckpointError, match=r"training\.safetensors: "):
+            checkpoints.load("training")
 
 
 def test_a_broken_file_is_refused(tmp_path):

@@ -3,9 +3,12 @@ from __future__ import annotations
 import csv
 import json
 import os
+import resource
+import shutil
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +17,7 @@ import pytest
 
 import iga_nn
 import solve
+from iga_nn import report as reports
 from iga_nn.cli import main
 from iga_nn.folder import open_folder
 from iga_nn.rendering import can_draw
@@ -324,6 +328,47 @@ def test_bad_data_leave_an_earlier_solution_alone(in_folder, capsys):
     assert {file.name: file.read_bytes() for file in Path("map").iterdir()} == before
     assert main(["solve", "poisson", "map.npz", "--refine", "0", "--force", "--source", "1"]) == 0
     assert not Path("map/error.png").exists()  # nothing of the older problem stays
+
+
+@contextmanager
+def small_disk(size):
+    """No file may grow beyond `size` bytes; exceeding it is reported as a full disk is."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+@pytest.mark.parametrize("size", [100, 1500, 4000])
+def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training, in_folder, capsys, monkeypatch):
+    monkeypatch.setattr("iga_nn.pipeline._draw", lambda *_: None)  # figures come last and take longest
+    formula_training()
+    benchmark_volume(6).save("map.npz")
+    for arguments in (["solve", "poisson", "map.npz", "--refine", "0"], ["parameterize", "cube"]):
+        with small_disk(size):
+            assert main([*arguments, "--out", "out"]) == 2
+        assert "File too large" in one_line(capsys.readouterr().err)
+        for path in Path("out").iterdir() if Path("out").exists() else []:
+            assert ".part" not in path.name
+            if path.suffix == ".npz":
+                np.load(path, allow_pickle=False).close()
+            else:
+                assert not reports.is_finished(json.loads(path.read_text()))
+        assert main([*arguments, "--out", "out", "--quiet"]) == 0  # there is room again: nothing is in the way
+        shutil.rmtree("out")
+
+
+def test_what_a_killed_run_left_half_written_goes(formula_training, in_folder, monkeypatch):
+    monkeypatch.setattr("iga_nn.pipeline._draw", lambda *_: None)
+    formula_training()
+    Path("cube").mkdir()
+    Path("cube/.volume.1.part.npz").write_bytes(b"half")
+    Path("cube/.volume.npz").write_bytes(b"somebody's")
+    assert main(["parameterize", "cube", "--quiet"]) == 0
+    assert not Path("cube/.volume.1.part.npz").exists() and Path("cube/.volume.npz").exists()
 
 
 def test_second_run_in_the_same_folder_is_refused(in_folder, capsys):

@@ -1,6 +1,11 @@
+import base64
 import gzip
+import lzma
 import os
+import re
 import struct
+import zlib
+from functools import partial
 from pathlib import Path
 
 import meshio
@@ -198,6 +203,10 @@ REFUSED = {
         '<VTKFile type="UnstructuredGrid"><Piece NumberOfPoints="1000000000" NumberOfCells="1"></Piece></VTKFile>',
         "NumberOfPoints=1000000000",
     ),
+    "entities.vtu": (
+        '<!DOCTYPE a [<!ENTITY b "c">]><VTKFile type="UnstructuredGrid">&b;</VTKFile>',
+        "declares a document type",
+    ),
     "open.obj": (HOLE, "open surface: 1 boundary loop (4 edges)"),
     "two_holes.obj": (obj(faces=QUADS[2:]), "open surface: 2 boundary loops (8 edges)"),
     "fin.obj": (obj() + "v 2 2 2\nf 1 2 9\n", "1 non-manifold edges"),
@@ -231,6 +240,28 @@ def test_a_gzip_bomb_stops_at_the_limit(tmp_path):
     zeros = gzip.compress(b"v 0 0 0\n" * (BYTES_AT_LEAST // 8 + 1000), compresslevel=1)
     with pytest.raises(MeshError, match="unpacks to more than"):
         load_surface(write(tmp_path, "bomb.obj.gz", zeros), max_faces=4)
+
+
+@pytest.mark.parametrize(
+    ("compressor", "pack"), [("ZLib", partial(zlib.compress, level=1)), ("LZMA", partial(lzma.compress, preset=0))]
+)
+def test_a_bomb_in_an_array_of_a_vtu_stops_at_the_limit(compressor, pack, tmp_path):
+    packed = pack(bytes(BYTES_AT_LEAST + 10_000))
+    header = np.array([1, 0, 0, len(packed)], dtype=np.uint32)
+    array = base64.b64encode(header.tobytes()) + base64.b64encode(packed)
+    path = tmp_path / "bomb.vtu"
+    meshio.write(path, meshio.Mesh(CUBE, [("quad", np.array(QUADS))]), binary=False)
+    content = re.sub(rb"ascii(.*?>)[^<]*", lambda match: b"binary" + match[1] + array, path.read_bytes(), count=1)
+    content = content.replace(b"<VTKFile ", b'<VTKFile compressor="vtk%bDataCompressor" ' % compressor.encode())
+    with pytest.raises(MeshError, match="unpacks to more than"):
+        load_surface(write(tmp_path, "bomb.vtu", content), max_faces=4)
+
+
+def test_compressed_arrays_of_a_vtu_are_read(tmp_path):
+    mesh = meshio.Mesh(CUBE, [("quad", np.array(QUADS))])
+    for compression in ("zlib", "lzma"):
+        meshio.write(tmp_path / "cube.vtu", mesh, compression=compression)
+        assert is_unit_cube(load_surface(tmp_path / "cube.vtu"))
 
 
 def test_max_faces_is_checked_before_and_after_parsing(tmp_path):

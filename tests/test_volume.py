@@ -101,7 +101,7 @@ def parts(**change):
             {"knots": (2.0 * open_uniform_knots(6, 3), *make_volume().knots[1:])},
             "direction u: knots must run from 0 to 1",
         ),
-        ({"degrees": (2, 2, 1)}, "direction u"),
+        ({"degrees": (2, 2, 1)}, "must be repeated 3 times, not more"),
     ],
 )
 def test_parts_that_do_not_fit(change, message):
