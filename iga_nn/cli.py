@@ -262,7 +262,7 @@ def serve_page(
     """
     from .app import serve
 
-    serve(_say, port, open_browser, max_upload, mapping, poisson)
+    serve(_say, port=port, open_browser=open_browser, max_upload=max_upload, mapping=mapping, poisson=poisson)
     return DONE
 
 

@@ -142,7 +142,12 @@ async def running(chromium, folder):
     """A Chromium that tabs can be opened in."""
     import aiohttp
 
-    arguments = [*QUIET, f"--user-data-dir={folder / 'profile'}", "--remote-debugging-port=0", "--window-size=1280,1000"]
+    arguments = [
+        *QUIET,
+        f"--user-data-dir={folder / 'profile'}",
+        "--remote-debugging-port=0",
+        "--window-size=1280,1000",
+    ]
     with (folder / "chromium.log").open("w") as log:
         process = subprocess.Popen([chromium, *arguments, "about:blank"], stderr=log)
         try:

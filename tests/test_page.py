@@ -15,6 +15,7 @@ from iga_nn.cli import main
 from iga_nn.sampling import FACE_COLORS
 from solve.study import benchmark_volume
 
+
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     """report.json and report.html of a small solve, and their folder."""
