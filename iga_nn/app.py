@@ -35,6 +35,7 @@ def serve(
     try:
         from .app_server import Page
     except ModuleNotFoundError as error:
-        raise InputError(f"the live page needs {error.name}, which is not installed: {INSTALL}") from None
+        package = (error.name or "trame").partition(".")[0]
+        raise InputError(f"the live page needs {package}, which is not installed: {INSTALL}") from None
     with TemporaryDirectory(prefix="iga-nn-") as root, input_errors():
         Page(Path(root), max_upload, mapping, poisson).run(say, port, open_browser)

@@ -42,10 +42,13 @@ def lay_out(server: Any, limit: int) -> None:
             with html.Div("No file at hand? Take a sample: ", classes="soft samples"):
                 for name in SAMPLES:
                     html.Button(name, classes="button small", click=f"window.post('sample/{name}')")
-        with html.Ul(classes="list", v_if="jobs.length > 1"), html.Li(v_for="job in jobs", key="job.number"):
-            with html.Button(click="shown = job.number", classes=("{shown: job.number === (shown || current)}",)):
-                html.Span("{{ job.name }}")
-                html.Small("{{ job.label }}")
+        with (
+            html.Ul(classes="list", v_if="jobs.length > 1"),
+            html.Li(v_for="job in jobs", key="job.number"),
+            html.Button(click="shown = job.number", classes=("{shown: job.number === (shown || current)}",)),
+        ):
+            html.Span("{{ job.name }}")
+            html.Small("{{ job.label }}")
         with html.Section(v_for="job in jobs.filter((one) => one.number === (shown || current))", key="job.number"):
             _lay_out_job()
 

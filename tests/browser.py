@@ -109,6 +109,7 @@ class Tab:
 
     async def picture(self, path, width=1280, height=1000, whole=False):
         """A PNG of what is seen at that size of window, or of the whole page."""
+        await self.call("Page.bringToFront")  # a tab behind another one is not drawn
         await self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
         )
