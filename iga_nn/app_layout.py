@@ -1,7 +1,7 @@
 """The live page's parts, as trame's widgets; what is in double braces or a tuple is evaluated in the browser.
 
 State: `jobs`, rows of app_view.row; `current`, the job a new tab shows; `shown`, the one this tab's user chose; for
-each job `points_N`, `polys_N` and `colors_N` for vtk.js.
+each job `points_N`, `polys_N` and `colors_N` for vtk.js (get(name) gives Vue's reference to a state, hence `.value`).
 """
 
 from __future__ import annotations
@@ -104,9 +104,12 @@ def _lay_out_actions() -> None:
         html.Button(
             "{{ job.state === 'waiting' ? 'Take out of the queue' : 'Stop' }}",
             v_if="['waiting', 'running'].includes(job.state)",
+            disabled=("job.stopping",),
             classes="button",
             click="trigger('stop', [job.number])",
         )
+        html.Span("Stopping ...", v_if="job.stopping", classes="soft")
+        html.Span("Starting ...", v_if="job.state === 'running' && !job.facts", classes="soft")
 
 
 def _lay_out_drawing() -> None:

@@ -31,7 +31,8 @@ from .samples import SAMPLES, sample, write_obj
 
 HOST = "127.0.0.1"  # the page is for this computer's user: there is no option for another one
 POLICY = (  # the browser itself refuses to fetch anything from elsewhere; Vue compiles templates, hence unsafe-eval
-    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' ws: data: blob:"
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
+    f"connect-src 'self' ws://{HOST}:* ws://localhost:* data: blob:; frame-ancestors 'self'"
 )
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]

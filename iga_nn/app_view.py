@@ -61,6 +61,7 @@ def row(job: Job, before: int) -> dict[str, Any]:
         "state": job.state,
         "label": LABELS[job.state] + (f", {before} before it" if before else ""),
         "text": job.text,
+        "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",
         "resumable": has_checkpoint(job.results),
         "mapped": job.mapped is not None,

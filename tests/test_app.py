@@ -182,9 +182,7 @@ def test_only_results_are_given_out(page):
 
 def test_a_page_without_its_packages_says_what_to_install(tmp_path):
     code = (
-        "import sys; sys.modules['trame'] = None\n"
-        "from iga_nn.cli import main\n"
-        "sys.exit(main(['app', '--port', '0']))\n"
+        "import sys; sys.modules['trame'] = None\nfrom iga_nn.cli import main\nsys.exit(main(['app', '--port', '0']))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 2 and done.stdout == ""
