@@ -25,8 +25,9 @@ def lay_out(server: Any, limit: int) -> None:
         client.Script((here / "app.js").read_text(encoding="utf-8"))
         html.H1("iga-nn")
         html.P(
-            "Turns a closed surface into a solid spline volume, proves that it has no folds, and solves an equation "
-            "on it. All of this happens on your own computer.",
+            "Turns a closed surface into a solid spline volume, proves that it has no folds, and solves Poisson's "
+            "equation on it. Give it a surface, press Start, watch it turn into a cube; then look at the result and "
+            "keep its files. Nothing leaves this computer.",
             classes="soft",
         )
         with html.Section(classes=("{drop: true, compact: jobs.length > 0}",)):
@@ -146,7 +147,7 @@ def _lay_out_progress() -> None:
             html.Dd("{{ fact[1] }}")
             html.Small("{{ fact[2] }}")
         html.Progress(value=("job.share",), max="1")
-        html.P("Loss of the training, logarithmic", v_if="job.curve", classes="soft")
+        html.P("The loss so far, logarithmic; each stage weighs it anew", v_if="job.curve", classes="soft")
         html.Div(
             v_if="job.curve",
             v_html="`<svg class='curve' viewBox='0 0 100 100' preserveAspectRatio='none'>"

@@ -50,7 +50,7 @@ CONTENT = {  # of the files, those a user wants first in front
 }
 VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # three sides of the cube are seen
 GREY = 190  # of 255
-EDGES_UP_TO = 6_000  # faces whose edges are drawn, too
+EDGES_UP_TO = 3_000  # faces whose edges are drawn, too
 
 
 def row(job: Job, before: int) -> dict[str, Any]:
