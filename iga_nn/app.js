@@ -30,8 +30,9 @@ document.addEventListener("change", (event) => {
   event.target.value = "";
 });
 
-// A frame as high as what it shows, so that there is one scroll bar.
+// A frame as high as what it shows, so that there is one scroll bar; its width changes with the window's.
 function fit(frame) {
-  const page = frame.contentDocument.documentElement;
-  new ResizeObserver(() => { frame.style.height = `${page.offsetHeight + 4}px`; }).observe(page);
+  const grow = () => { frame.style.height = `${frame.contentDocument.documentElement.offsetHeight + 4}px`; };
+  frame.contentWindow.addEventListener("resize", grow);
+  grow();
 }

@@ -98,7 +98,11 @@ async def walk(chromium, port, folder, capsys):
         await trained(first, folder)
         await finished(first, folder)
         await stopped(second)
+        await first.click("cube.obj\nstopped")  # away from the report
+        await first.sees("It can go on")
         for tab in (first, second):
+            await asyncio.sleep(0.5)
+            await tab.text()  # whatever it has to say by now
             assert tab.complaints == []
             assert tab.asked
             own = (f"http://127.0.0.1:{port}/", f"ws://127.0.0.1:{port}/", "data:", "blob:")
