@@ -263,6 +263,28 @@ def export_volume(
     return DONE
 
 
+@app.command(name="app")
+def serve_page(
+    *,
+    port: int = 8080,
+    open_browser: Annotated[bool, Parameter(name="--open")] = False,
+    max_upload: int = 64,
+    mapping: Mapping = NO_MAPPING,
+    poisson: Equation = NO_POISSON,
+) -> int:
+    """Serve a page to this computer's browser: drop a surface, watch it become a volume, take the files.
+
+    Args:
+        port: of 127.0.0.1; 0 takes a free one.
+        open_browser: open the page in the browser.
+        max_upload: megabytes a surface's file may have.
+    """
+    from .app import serve
+
+    serve(_say, port=port, open_browser=open_browser, max_upload=max_upload, mapping=mapping, poisson=poisson)
+    return DONE
+
+
 def main(argv: list[str]) -> int:
     """Run one command and return its exit code; everything but a bug of ours ends in one line and a code."""
     try:

@@ -83,6 +83,11 @@ class RunFolder:
         return Outcome(self.folder, reports.plain(self.report))
 
 
+def default_folder(source: str | Path) -> Path:
+    """Where results go unless `--out` says so: the input's stem, in the current folder."""
+    return Path(Path(source).name.split(".")[0])
+
+
 @contextmanager
 def open_folder(
     source: str | Path, out: str | Path | None, force: bool, resume: bool = False, vector: bool = False
@@ -90,7 +95,7 @@ def open_folder(
     """Make the output folder and hold it, tried before anything costly; on --resume a finished one is the answer."""
     if out == "":
         raise InputError("out is empty: name a folder")
-    folder = Path(out) if out is not None else Path(Path(source).name.split(".")[0])
+    folder = Path(out) if out is not None else default_folder(source)
     with _writable(folder):
         is_new = not folder.exists()
         folder.mkdir(parents=True, exist_ok=True)

@@ -148,6 +148,10 @@ class Trainer:
         """G at points (m, 3), as float64."""
         return map_points(self.network, points, self.device, self.dtype)
 
+    def mapped(self) -> Array:
+        """G at the surface's vertices (n, 3), as the network is now."""
+        return self.map(self.vertices)
+
     def _prepare(self, stage: StageConfig) -> BoundarySamples:
         """Choose corners and cut the surface, where the stage asks for it, by the network as it is."""
         if stage.weights.cor > 0.0 and self.corners is None:
@@ -194,7 +198,7 @@ class Trainer:
                 pace = (time.perf_counter() - started) / (run.step - begun)
                 _, _, loss, folded, _ = self.history.rows[-1]
                 left = pace * (stage.steps - run.step + later)
-                self.progress(Progress(stage.name, run.step, stage.steps, loss, folded, left))
+                self.progress(Progress(stage.name, run.step, stage.steps, loss, folded, left, self.mapped))
                 if run.step % _CHECKPOINT_STEPS == 0 or run.step == stage.steps:
                     self._save(run, optimizer)
         except KeyboardInterrupt:

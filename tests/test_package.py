@@ -10,6 +10,7 @@ import pytest
 
 import iga_nn
 
+HEAVY = ("torch", "vtk", "vtkmodules", "pyvista", "trame", "aiohttp")
 ROOT = Path(iga_nn.__file__).resolve().parents[1]
 
 
@@ -29,7 +30,7 @@ def python(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     ],
 )
 def test_no_torch_until_training_starts_and_no_vtk_until_a_figure(use, tmp_path):
-    code = f"{use}\nimport sys\nprint([m for m in ('torch', 'vtk', 'vtkmodules', 'pyvista') if m in sys.modules])"
+    code = f"{use}\nimport sys\nprint([m for m in {HEAVY} if m in sys.modules])"
     done = python("-c", code, cwd=tmp_path)
     assert done.stdout.strip() == "[]", done.stderr
 

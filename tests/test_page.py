@@ -3,36 +3,17 @@ from __future__ import annotations
 import base64
 import json
 import re
-import shutil
-import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import browse
 from matplotlib.colors import rgb_to_hsv, to_rgb
-from matplotlib.image import imread
 
 import solve
 from iga_nn import page, scene
 from iga_nn.cli import main
 from iga_nn.sampling import FACE_COLORS
 from solve.study import benchmark_volume
-
-QUIET = (
-    "--headless", "--no-sandbox", "--hide-scrollbars", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-    "--enable-logging=stderr", "--no-first-run", "--disable-background-networking", "--disable-component-update",
-    "--disable-sync", "--disable-default-apps", "--disable-extensions",
-)  # fmt: skip
-
-OWN = "not an origin"
-
-
-@pytest.fixture
-def chromium() -> str:
-    found = shutil.which("chromium") or shutil.which("chromium-browser")
-    if found is None:
-        pytest.skip("no chromium on this machine; remedy: apt-get install --no-install-recommends chromium")
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -43,24 +24,6 @@ def result(tmp_path_factory):
     arguments = ["--refine", "0", "1", "--exact", "x*y*z", "--quiet", "--out", str(folder / "out")]
     assert main(["solve", "poisson", str(folder / "map <b>.npz"), *arguments]) == 0
     return folder / "out"
-
-
-def browse(chromium: str, folder: Path, url: str, width: int) -> tuple[np.ndarray, str, list[str]]:
-    """Picture (height, width, 3) of a page, what its console said, and the addresses that were asked for."""
-    shot, log = folder / "shot.png", folder / "net.json"
-    places = (f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}", f"--screenshot={shot}")
-    done = subprocess.run(
-        [chromium, *QUIET, *places, f"--window-size={width},1000", url], capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
-    console = "\n".join(line for line in done.stderr.splitlines() if "CONSOLE" in line)
-    return imread(shot)[..., :3], console, addresses(log)
-
-
-def addresses(log: Path) -> list[str]:
-    """What the page asked for; the browser's own errands have no initiator."""
-    events = [event.get("params", {}) for event in json.loads(log.read_text(encoding="utf-8"))["events"]]
-    return [event["url"] for event in events if "url" in event and event.get("initiator", OWN) != OWN]
 
 
 def drawn(image: np.ndarray) -> np.ndarray:

@@ -128,6 +128,20 @@ def test_progress_tells_every_step(surface, tmp_path):
     assert all(s.seconds_left >= 0.0 and np.isfinite(s.loss) and s.folded >= 0 for s in seen)
 
 
+def test_looking_at_the_mapped_surface_changes_nothing(surface, undisturbed):
+    looks = []
+
+    def look(state):
+        if state.mapped is not None:
+            looks.append(state.mapped())
+
+    same_result(undisturbed, parameterize(surface, tiny_config(), seed=3, device="cpu", progress=look))
+    assert len(looks) == sum(STEPS)
+    own = [points[: len(surface.vertices)] for points in looks]
+    assert np.abs(own[0] - surface.unit_vertices).max() < 0.5  # starts near the surface as placed
+    assert not np.array_equal(own[0], own[-1]) and all(points.shape == looks[0].shape for points in looks)
+
+
 def test_checkpoint_of_another_run_is_refused(surface, tmp_path):
     def interrupt(state):
         raise KeyboardInterrupt

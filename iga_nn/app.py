@@ -1,0 +1,41 @@
+"""The live page, `iga-nn app`: its options, and the look whether the packages it needs are there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from .options import InputError, MapOptions, PoissonOptions, input_errors
+
+INSTALL = "pip install 'iga-nn[app]'"
+
+
+def serve(
+    say: Callable[[str], None],
+    *,
+    port: int,
+    open_browser: bool,
+    max_upload: int,
+    mapping: MapOptions,
+    poisson: PoissonOptions,
+) -> None:
+    """Serve the page until interrupted; max_upload in megabytes; the address is told to `say`.
+
+    Raises InputError for options that cannot be run, without trame, and where the port is taken.
+    """
+    mapping.config()
+    poisson.problem()
+    if mapping.resume or mapping.corners:
+        raise InputError("resume and corners belong to one surface: leave them out here")
+    if not 0 <= port <= 65_535:
+        raise InputError(f"port {port}: must lie between 0, for any free one, and 65535")
+    if max_upload < 1:
+        raise InputError(f"max upload {max_upload}: must be at least 1 megabyte")
+    try:
+        from .app_server import Page
+    except ModuleNotFoundError as error:
+        package = (error.name or "trame").partition(".")[0]
+        raise InputError(f"the live page needs {package}, which is not installed: {INSTALL}") from None
+    with TemporaryDirectory(prefix="iga-nn-") as root, input_errors():
+        Page(Path(root), max_upload, mapping, poisson).run(say, port, open_browser)

@@ -1,0 +1,200 @@
+"""The live page's server: trame's, for this computer's browser alone; surfaces come in, jobs run, files go out.
+
+All open tabs share the list of jobs; which one a tab shows is its own affair. Pictures are drawn by the browser, so
+that the server needs no graphics library for them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import webbrowser
+from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from aiohttp import ClientError, web
+from trame.app import get_server
+
+from parameterize.bspline import Array
+from parameterize.mesh import Surface
+
+from . import job_process
+from .app_layout import lay_out
+from .app_view import CONTENT, MEGABYTE, colors, places, row, triangles
+from .data import resolve
+from .folder import has_checkpoint
+from .job_process import Message
+from .jobs import Job, Jobs
+from .options import MapOptions, PoissonOptions, one_line
+from .samples import SAMPLES, sample, write_obj
+
+HOST = "127.0.0.1"  # the page is for this computer's user: there is no option for another one
+POLICY = (  # the browser itself refuses to fetch anything from elsewhere; Vue compiles templates, hence unsafe-eval
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
+    f"connect-src 'self' ws://{HOST}:* ws://localhost:* data: blob:; frame-ancestors 'self'"
+)
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Page:
+    """One running page: its trame server, its routes, its jobs."""
+
+    def __init__(self, root: Path, max_upload: int, mapping: MapOptions, poisson: PoissonOptions) -> None:
+        self._server: Any = get_server("iga-nn", client_type="vue3")
+        self._limit, self._mapping, self._poisson = max_upload * MEGABYTE, mapping, poisson
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._drawn: dict[int, Array] = {}  # points last sent, by job
+        self.jobs = Jobs(root, self._check, self._run, self._tell)
+
+    def run(self, say: Callable[[str], None], port: int, open_browser: bool) -> None:
+        """Serve until interrupted."""
+        server = self._server
+        server.state.update({"jobs": [], "current": 0, "shown": 0, "trame__title": "iga-nn"})
+        server.state.client_only("shown")
+        for name, act in {"start": self.jobs.start, "stop": self.jobs.stop}.items():
+            server.trigger(name)(self._on_job(act))
+        lay_out(server, self._limit)
+        server.controller.on_server_bind.add(self._bind)
+
+        def ready(**_: Any) -> None:
+            self._loop = asyncio.get_running_loop()
+            address = f"http://{HOST}:{server.port}/"
+            say(f"{address}\nopen this address in a browser; Ctrl-C ends the page and deletes its files")
+            if open_browser:
+                webbrowser.open(address)
+
+        server.controller.on_server_ready.add(ready)
+        try:
+            server.start(port=port, host=HOST, open_browser=False, show_connection_info=False, timeout=0)
+        finally:
+            self._loop = None
+            self.jobs.close()
+
+    # Jobs
+
+    def _check(self, path: Path) -> Surface:
+        return resolve(str(path), component=self._mapping.component, max_faces=self._mapping.max_faces)
+
+    def _run(self, job: Job) -> Iterator[Message]:
+        mapping = replace(self._mapping, resume=has_checkpoint(job.results))
+        return job_process.run(job.folder, job.name, mapping, self._poisson, job.stop)
+
+    def _on_job(self, act: Callable[[Job], None]) -> Callable[[int], None]:
+        def on_number(number: int) -> None:
+            if job := self.jobs.find(number):
+                act(job)
+
+        return on_number
+
+    def _tell(self, job: Job) -> None:
+        """From any thread: show the change in every tab."""
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._show, job)
+
+    def _show(self, changed: Job) -> None:
+        with self._server.state as state:
+            jobs = list(self.jobs)
+            state.jobs = [row(job, self.jobs.before(job)) for job in jobs]
+            state.current = next((job.number for job in jobs if job.state == "running"), jobs[-1].number)
+            self._draw(state, changed)
+
+    def _draw(self, state: Any, job: Job) -> None:
+        """Send the surface, and where the training takes it, when there is something new."""
+        if job.surface is None:
+            return
+        points = job.surface.unit_vertices if job.mapped is None else job.mapped
+        if self._drawn.get(job.number) is points:
+            return
+        if job.number not in self._drawn:
+            state[f"polys_{job.number}"] = triangles(job.surface)
+        self._drawn[job.number] = points
+        state[f"colors_{job.number}"] = colors(points, job.surface, mapped=job.mapped is not None)
+        state[f"points_{job.number}"] = places(points)
+
+    # Routes
+
+    def _bind(self, served: Any) -> None:
+        """Add our routes and guards to the web server before it listens."""
+        served.config["host"] = HOST  # whatever trame's own variables and arguments say
+        app: web.Application = served.app
+        app.middlewares.append(_guard(lambda: self._server.port))
+        app.on_response_prepare.append(_restrict)
+        app.add_routes(
+            [
+                web.post("/upload", self._upload),
+                web.post("/sample/{name}", self._sample),
+                web.post("/paraview/", self._session),
+                web.get("/files/{number}/{name}", self._file),
+            ]
+        )
+
+    async def _session(self, request: web.Request) -> web.Response:
+        """Where trame's client asks for the address of its web socket."""
+        return web.json_response({"sessionURL": f"ws://{request.host}/ws"})
+
+    async def _upload(self, request: web.Request) -> web.Response:
+        """Take a file as the body; the answer is the job's number, refused or not."""
+        job = self.jobs.add(request.query.get("name", ""))
+        announced = request.query.get("size", "")
+        size = int(announced) if announced.isdecimal() else 0
+        try:
+            if size <= self._limit:
+                size = await self._keep(request, job.path)
+        except (OSError, ClientError) as error:
+            self.jobs.refuse(job, f"{job.name}: did not arrive whole ({one_line(error)}): try again")
+            return web.Response(text=str(job.number))
+        if size > self._limit:
+            limit = self._limit // MEGABYTE
+            self.jobs.refuse(job, f"{job.name}: larger than {limit} MB: simplify it, or raise --max-upload")
+        else:
+            self.jobs.check(job)
+        return web.Response(text=str(job.number))
+
+    async def _keep(self, request: web.Request, path: Path) -> int:
+        """Write the body to a file, up to the limit; the bytes seen."""
+        size = 0
+        with path.open("wb") as stream:
+            async for part in request.content.iter_chunked(MEGABYTE):
+                size += len(part)
+                if size > self._limit:
+                    break
+                stream.write(part)
+        return size
+
+    async def _sample(self, request: web.Request) -> web.Response:
+        name = request.match_info["name"]
+        if name not in SAMPLES:
+            raise web.HTTPNotFound
+        job = self.jobs.add(f"{name}.obj")
+        await asyncio.to_thread(lambda: write_obj(sample(name), job.path))
+        self.jobs.check(job)
+        return web.Response(text=str(job.number))
+
+    async def _file(self, request: web.Request) -> web.FileResponse:
+        """A result of a job; nothing but the names in CONTENT."""
+        number, name = request.match_info["number"], request.match_info["name"]
+        job = self.jobs.find(int(number)) if number.isdecimal() else None
+        if job is None or name not in CONTENT or not (job.results / name).is_file():
+            raise web.HTTPNotFound
+        return web.FileResponse(job.results / name, headers={"Cache-Control": "no-store"})
+
+
+def _guard(port: Callable[[], int]) -> Any:
+    """Answer this page alone: another site's page may reach this port through the user's browser."""
+
+    @web.middleware
+    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        own = {f"{name}:{port()}" for name in (HOST, "localhost")}
+        origin = request.headers.get("Origin")
+        if request.host not in own or (origin is not None and origin.removeprefix("http://") not in own):
+            raise web.HTTPForbidden(text=f"this page answers at http://{HOST}:{port()}/ only")
+        return await handler(request)
+
+    return guard
+
+
+async def _restrict(_: web.Request, response: web.StreamResponse) -> None:
+    response.headers["Content-Security-Policy"] = POLICY
+    response.headers["X-Content-Type-Options"] = "nosniff"

@@ -1,0 +1,132 @@
+"""What the live page shows of a job, as the browser takes it: plain values, and arrays for vtk.js."""
+
+from __future__ import annotations
+
+import base64
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from parameterize.bspline import Array
+from parameterize.mesh import Surface
+
+from .folder import has_checkpoint
+from .jobs import Job
+from .sampling import FACE_COLORS
+
+MEGABYTE = 1 << 20
+STAGES = {
+    "S(2)": "1 of 6: to a round shape",
+    "S(1)": "2 of 6: to a rounded cube",
+    "cube": "3 of 6: to a cube",
+    "corners": "4 of 6: corners fixed",
+    "edges": "5 of 6: edges fixed",
+    "spline": "6 of 6: the spline itself",
+}
+LABELS = {
+    "checking": "being checked",
+    "refused": "refused",
+    "ready": "accepted",
+    "waiting": "waiting",
+    "running": "running",
+    "done": "done",
+    "failed": "failed",
+    "stopped": "stopped",
+}
+CONTENT = {  # of the files, those a user wants first in front
+    "volume.npz": "the spline volume",
+    "solution.npz": "the solution of Poisson's equation on it",
+    "boundary.npz": "the map from the surface to the cube",
+    "report.html": "this report, to keep",
+    "report.json": "the report for programs",
+    "history.npz": "loss of every training step",
+    "faces.png": "the cube's faces in colours",
+    "distortion.png": "distortion on three sections",
+    "error.png": "error on three sections",
+    "history.png": "loss over the steps",
+}
+VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # three sides of the cube are seen
+GREY = 190  # of 255
+EDGES_UP_TO = 3_000  # faces whose edges are drawn, too
+
+
+def row(job: Job, before: int) -> dict[str, Any]:
+    """What the page says of a job, in JSON's own types."""
+    said: dict[str, Any] = {
+        "number": job.number,
+        "name": job.name,
+        "state": job.state,
+        "label": LABELS[job.state] + (f", {before} before it" if before else ""),
+        "text": job.text,
+        "stopping": job.state == "running" and job.stop.is_set(),
+        "line": job.log[-1] if job.log else "",
+        "resumable": has_checkpoint(job.results),
+        "mapped": job.mapped is not None,
+        "files": _files(job) if job.state in ("done", "failed", "stopped") else [],
+    }
+    if job.surface is not None:
+        vertices, faces = len(job.surface.vertices), len(job.surface.faces)
+        said["size"] = f"{vertices:,} vertices, {faces:,} faces"
+        said["edges"] = faces <= EDGES_UP_TO
+        said["notices"] = list(job.surface.notices)
+    if job.progress is not None:
+        now = job.progress
+        minutes, seconds = divmod(round(max(0.0, now.seconds_left)), 60)
+        said["facts"] = [
+            ["Stage", STAGES.get(now.stage, now.stage), f"step {now.step} of {now.steps}"],
+            ["Time left", f"{minutes}:{seconds:02d}", "at most" if now.stage == "spline" else "until the spline"],
+            ["Loss", f"{now.loss:.2e}", "what the training lowers"],
+            ["Folded samples", f"{now.folded:,}", "0 is wanted"],
+        ]
+        said["share"] = now.step / max(now.steps, 1)
+        said["curve"] = _curve(job.losses)
+    return said
+
+
+def _files(job: Job) -> list[dict[str, Any]]:
+    """The results there are, with what they hold."""
+    found = [(name, job.results / name) for name in CONTENT if (job.results / name).is_file()]
+    return [{"name": name, "size": _size(path.stat().st_size), "holds": CONTENT[name]} for name, path in found]
+
+
+def _size(count: int) -> str:
+    return f"{count / MEGABYTE:.1f} MB" if count >= MEGABYTE else f"{max(1, round(count / 1024))} kB"
+
+
+def _curve(losses: list[float]) -> str:
+    """Points of a polyline in a box of 100 x 100: the logarithm of the loss over the steps told."""
+    logs = np.log10(np.maximum(losses, 1e-300))
+    if len(logs) < 2 or not math.isfinite(float(np.ptp(logs))):
+        return ""
+    x = np.linspace(0.0, 100.0, len(logs))
+    y = 95.0 - 90.0 * (logs - logs.min()) / (np.ptp(logs) or 1.0)
+    return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+
+
+def triangles(surface: Surface) -> dict[str, str]:
+    """The surface's triangles as VTK lists cells: the number of corners before each."""
+    return _packed(np.insert(surface.faces, 0, 3, axis=1).astype(np.uint32))
+
+
+def places(points: Array) -> dict[str, str]:
+    """Points (n, 3), turned so that the browser's camera, which looks along the third axis, sees them well."""
+    return _packed((points @ VIEW.T).astype(np.float32))
+
+
+def colors(points: Array, surface: Surface, *, mapped: bool) -> dict[str, str]:
+    """Red, green, blue of the triangles: of the cube's face each is nearest to; grey before the training."""
+    if not mapped:
+        return _packed(np.full(surface.faces.shape, GREY, dtype=np.uint8))
+    away = points[surface.faces].mean(axis=1) - 0.5  # (m, 3), from the cube's centre
+    axis = np.abs(away).argmax(axis=1)
+    side = np.take_along_axis(away, axis[:, None], axis=1)[:, 0] > 0.0
+    palette = np.array([[int(color[at : at + 2], 16) for at in (1, 3, 5)] for color in FACE_COLORS], dtype=np.uint8)
+    return _packed(palette[2 * axis + side])  # (m, 3)
+
+
+def _packed(values: NDArray[Any]) -> dict[str, str]:
+    data = base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+    return {"bvals": data, "dtype": values.dtype.name}

@@ -1,0 +1,147 @@
+"""One job in a process of its own: the pipeline's run, followed step by step through a pipe, stopped at any time.
+
+A process, so that a stop works during every step, and so that what the job loads and holds goes with it.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Event as SharedEvent
+from pathlib import Path
+from threading import Event
+from typing import Literal
+
+from parameterize.bspline import Array
+from parameterize.mesh import MeshError
+from parameterize.progress import Progress
+from solve.expressions import ExpressionError
+
+from . import pipeline
+from .console import LOGGERS
+from .options import InputError, MapOptions, PoissonOptions, one_line
+
+INTERVAL = 0.4  # seconds between two steps that are told
+SHARE = 0.05  # of the job's time, at most, goes into telling them
+GRACE = 3.0  # seconds a job has to stop by itself, leaving a checkpoint
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """The training after one step; mapped: where it takes the surface's vertices and those added to them, (n, 3)."""
+
+    progress: Progress
+    mapped: Array | None
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of the log."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class End:
+    """How the job ended; text: why, where it failed."""
+
+    state: Literal["done", "failed", "stopped"]
+    text: str = ""
+
+
+Message = Step | Line | End
+
+
+def run(folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions, stop: Event) -> Iterator[Message]:
+    """Run the surface `name` that lies in `folder`, results beside it; what happens as it happens, an End last."""
+    spawn = multiprocessing.get_context("spawn")  # a copy of a process with threads may hang
+    receiver, sender = spawn.Pipe(duplex=False)
+    halt = spawn.Event()
+    process = spawn.Process(target=_work, args=(sender, halt, folder, name, mapping, poisson), daemon=True)
+    process.start()
+    sender.close()
+    try:
+        yield from _follow(receiver, halt, stop, process)
+    finally:
+        process.terminate()
+        process.join()
+        receiver.close()
+
+
+def _follow(
+    receiver: Connection, halt: SharedEvent, stop: Event, process: multiprocessing.process.BaseProcess
+) -> Iterator[Message]:
+    """Messages up to the End, which is made up where the process goes without a word."""
+    patience = float("inf")
+    while True:
+        if stop.is_set() and not halt.is_set():
+            halt.set()
+            patience = time.monotonic() + GRACE
+        if time.monotonic() > patience:
+            process.terminate()
+        try:
+            if not receiver.poll(0.1):
+                continue
+            message: Message = receiver.recv()
+        except (EOFError, OSError):
+            process.join()
+            code = process.exitcode
+            yield End("stopped") if stop.is_set() else End("failed", f"the job's process ended with code {code}")
+            return
+        yield message
+        if isinstance(message, End):
+            return
+
+
+def _work(
+    sender: Connection, halt: SharedEvent, folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions
+) -> None:
+    """In the child: run in the job's folder, so that messages and the command name the file as the user does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is the parent's affair
+    os.chdir(folder)
+    teller = _Teller(sender, halt)
+    for logger in map(logging.getLogger, LOGGERS):
+        logger.addHandler(teller)
+        logger.setLevel(logging.INFO)
+        logger.propagate = False
+    try:
+        pipeline.run("poisson", name, mapping=mapping, poisson=poisson, progress=teller.step)
+    except KeyboardInterrupt:
+        sender.send(End("stopped"))
+    except (InputError, MeshError, ExpressionError, OSError) as error:
+        sender.send(End("failed", one_line(error)))
+    except Exception as error:
+        sender.send(End("failed", f"a bug of ours: please report the traceback in the terminal ({one_line(error)})"))
+        raise
+    else:
+        sender.send(End("done"))
+
+
+class _Teller(logging.Handler):
+    """Sends the log's lines, and steps now and then; interrupts the training where a stop is asked for."""
+
+    def __init__(self, sender: Connection, halt: SharedEvent) -> None:
+        super().__init__()
+        self._sender, self._halt, self._next = sender, halt, 0.0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Send a line of the log."""
+        self._sender.send(Line(record.getMessage()))
+
+    def step(self, progress: Progress) -> None:
+        """Take the state after a step of the training."""
+        if self._halt.is_set():
+            raise KeyboardInterrupt
+        start = time.monotonic()
+        if start < self._next:
+            return
+        mapped = progress.mapped() if progress.mapped is not None else None
+        self._sender.send(Step(replace(progress, mapped=None), mapped))
+        end = time.monotonic()
+        self._next = end + max(INTERVAL, (end - start) / SHARE)

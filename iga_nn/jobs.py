@@ -1,0 +1,181 @@
+"""The jobs of the live page: surfaces that were dropped, checked one by one, run one at a time, the others in a queue.
+
+A job's states: checking -> refused | ready -> waiting -> running -> done | failed | stopped, the last of which may be
+started again.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Event, Lock
+
+from parameterize.bspline import Array
+from parameterize.mesh import MeshError, Surface
+from parameterize.progress import Progress
+
+from .folder import default_folder
+from .job_process import Line, Message, Step
+from .options import one_line
+
+log = logging.getLogger(__name__)
+
+NAME_LENGTH = 80
+
+
+@dataclass(eq=False)
+class Job:
+    """A surface's file in a folder of its own, and what became of it.
+
+    text: why it was refused or failed. mapped: the surface's vertices (n, 3) as the training takes them to the cube.
+    losses: of the training, as they were told. log: the run's lines.
+    """
+
+    number: int
+    name: str
+    folder: Path
+    state: str = "checking"
+    text: str = ""
+    surface: Surface | None = None
+    progress: Progress | None = None
+    mapped: Array | None = None
+    losses: list[float] = field(default_factory=list)
+    log: list[str] = field(default_factory=list)
+    stop: Event = field(default_factory=Event)
+    turn: Future[None] | None = None
+
+    @property
+    def path(self) -> Path:
+        """The surface's file."""
+        return self.folder / self.name
+
+    @property
+    def results(self) -> Path:
+        """The folder a run leaves its files in."""
+        return self.folder / default_folder(self.name)
+
+
+Check = Callable[[Path], Surface]
+Run = Callable[[Job], Iterator[Message]]
+
+
+class Jobs:
+    """All jobs, in the order they came.
+
+    check: reads a surface or raises MeshError. run: yields what a job does. changed: called after every change, from
+    whichever thread made it.
+    """
+
+    def __init__(self, root: Path, check: Check, run: Run, changed: Callable[[Job], None]) -> None:
+        self._root, self._check, self._run, self._changed = root, check, run, changed
+        self._jobs: list[Job] = []
+        self._queue: list[Job] = []  # waiting and running
+        self._lock = Lock()
+        self._gate, self._runner = ThreadPoolExecutor(1), ThreadPoolExecutor(1)
+
+    def __iter__(self) -> Iterator[Job]:
+        return iter(tuple(self._jobs))
+
+    def find(self, number: int) -> Job | None:
+        """The job of that number."""
+        return next((job for job in self if job.number == number), None)
+
+    def before(self, job: Job) -> int:
+        """How many jobs come before it in the queue, the running one among them."""
+        with self._lock:
+            return self._queue.index(job) if job in self._queue else 0
+
+    def add(self, name: str) -> Job:
+        """A new job with an empty folder: write its file, then let it be checked."""
+        with self._lock:
+            number = len(self._jobs) + 1
+            job = Job(number, safe_name(name), self._root / str(number))
+            job.folder.mkdir()
+            self._jobs.append(job)
+        self._changed(job)
+        return job
+
+    def refuse(self, job: Job, text: str) -> None:
+        """The job is not taken, for a reason of one line."""
+        job.state, job.text = "refused", text
+        self._changed(job)
+
+    def check(self, job: Job) -> None:
+        """Send the job through the gate, after those before it."""
+        self._gate.submit(self._pass, job)
+
+    def start(self, job: Job) -> None:
+        """Put an accepted or a stopped job into the queue; anything else stays as it is."""
+        with self._lock:
+            if job.state not in ("ready", "stopped"):
+                return
+            job.state = "waiting"
+            job.stop.clear()
+            self._queue.append(job)
+            job.turn = self._runner.submit(self._work, job)
+        self._changed(job)
+
+    def stop(self, job: Job) -> None:
+        """Stop a running job, or take a waiting one out of the queue."""
+        with self._lock:
+            if job.turn is None or job not in self._queue:
+                return
+            job.stop.set()
+            if job.turn.cancel():
+                self._queue.remove(job)
+                job.state = "stopped" if job.progress else "ready"
+        self._changed(job)
+
+    def close(self) -> None:
+        """Stop everything and wait for it."""
+        for job in self:
+            self.stop(job)
+        self._gate.shutdown(cancel_futures=True)
+        self._runner.shutdown(cancel_futures=True)
+
+    def _pass(self, job: Job) -> None:
+        try:
+            job.surface = self._check(job.path)
+        except (MeshError, OSError) as error:
+            self.refuse(job, one_line(error).replace(f"{job.folder}/", ""))  # as the user knows the file
+        except Exception:
+            log.exception("%s", job.path)
+            self.refuse(job, f"{job.name}: a bug of ours: please report the traceback in the terminal")
+        else:
+            job.state = "ready"
+            self._changed(job)
+
+    def _work(self, job: Job) -> None:
+        job.state = "running"
+        self._changed(job)
+        state, text = "failed", "the job ended without a word"
+        try:
+            for message in self._run(job):
+                if isinstance(message, Step):
+                    self._take(job, message)
+                elif isinstance(message, Line):
+                    job.log.append(message.text)
+                else:
+                    state, text = message.state, message.text
+                self._changed(job)
+        finally:
+            with self._lock:
+                self._queue.remove(job)
+                job.state, job.text = state, text
+            self._changed(job)
+
+    def _take(self, job: Job, step: Step) -> None:
+        job.progress = step.progress
+        if step.mapped is not None and job.surface is not None:
+            job.mapped = step.mapped[: len(job.surface.vertices)]
+            job.losses.append(step.progress.loss)
+
+
+def safe_name(given: str) -> str:
+    """A file's name without folders, of plain characters, its ending kept."""
+    last = re.split(r"[/\\]", given)[-1]
+    return re.sub(r"[^\w.+ -]", "_", last)[-NAME_LENGTH:].lstrip(". -") or "surface"

@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import base64
+import json
+
+import numpy as np
+
+from iga_nn.app_view import CONTENT, colors, places, row, triangles
+from iga_nn.jobs import Job
+from iga_nn.pipeline import MAP_FILES, SOLUTION_FILES
+from iga_nn.report import FILE_NAME, PAGE_NAME
+from iga_nn.samples import sample
+from iga_nn.sampling import FACE_COLORS
+from parameterize.progress import Progress
+
+
+def unpacked(packed, columns):
+    return np.frombuffer(base64.b64decode(packed["bvals"]), packed["dtype"]).reshape(-1, columns)
+
+
+def test_arrays_come_back_as_they_were():
+    cube = sample("cube")
+    cells = unpacked(triangles(cube), 4)
+    assert np.all(cells[:, 0] == 3) and np.array_equal(cells[:, 1:], cube.faces)
+    seen = unpacked(places(cube.unit_vertices), 3)
+    lengths = [
+        np.linalg.norm(points[cube.faces[:, 0]] - points[cube.faces[:, 1]], axis=1)
+        for points in (seen, cube.unit_vertices)
+    ]
+    assert np.allclose(*lengths, atol=1e-6)  # turned, not deformed
+    assert len(np.unique(unpacked(colors(cube.unit_vertices, cube, mapped=False), 3))) == 1
+
+
+def test_colours_are_those_of_the_cubes_faces():
+    cube = sample("cube")
+    found = unpacked(colors(cube.vertices, cube, mapped=True), 3)
+    centres = cube.vertices[cube.faces].mean(axis=1)
+    for face, color in enumerate(FACE_COLORS):
+        on_it = np.abs(centres[:, face // 2] - face % 2) < 1e-9
+        assert np.any(on_it)
+        assert {"#" + bytes(rgb).hex() for rgb in found[on_it]} == {color}
+
+
+def test_a_row_says_stage_loss_and_time_left(tmp_path):
+    job = Job(2, "bean.obj", tmp_path, state="running", surface=sample("bean"), losses=[10.0, 1.0, 0.1])
+    job.progress = Progress("cube", 30, 300, 0.1, 4, 83.4)
+    said = row(job, before=0)
+    assert [fact[1] for fact in said["facts"]] == ["3 of 6: to a cube", "1:23", "1.00e-01", "4"]
+    assert said["share"] == 0.1 and said["curve"] == "0.0,5.0 50.0,50.0 100.0,95.0"
+    assert said["size"] == "2,500 vertices, 4,996 faces" and said["files"] == []
+    assert json.loads(json.dumps(said)) == said
+
+
+def test_results_are_offered_with_what_they_hold(tmp_path):
+    assert set(CONTENT) == {*MAP_FILES, *SOLUTION_FILES, FILE_NAME, PAGE_NAME}
+    job = Job(1, "bean.obj", tmp_path, state="done")
+    job.results.mkdir()
+    (job.results / "volume.npz").write_bytes(b"x" * 3_000_000)
+    (job.results / "secret.txt").write_text("x")
+    assert row(job, 0)["files"] == [{"name": "volume.npz", "size": "2.9 MB", "holds": "the spline volume"}]
+
+
+def test_a_waiting_job_knows_its_place(tmp_path):
+    assert row(Job(1, "a.obj", tmp_path, state="waiting"), before=2)["label"] == "waiting, 2 before it"
