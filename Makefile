@@ -17,7 +17,7 @@ $(STAMP): pyproject.toml constraints.txt
 
 demo: $(STAMP)
 	$(BIN)/iga-nn run poisson seashell --out out/demo --force
-	@echo "Look at out/demo/faces.png, distortion.png and error.png; the numbers are in out/demo/report.json."
+	@echo "Open out/demo/report.html; the numbers are in out/demo/report.json."
 
 test: lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile
