@@ -22,10 +22,10 @@ from parameterize.mesh import Surface
 from . import job_process
 from .app_layout import lay_out
 from .app_view import CONTENT, MEGABYTE, colors, places, row, triangles
-from .data import resolve
 from .folder import has_checkpoint
 from .job_process import Message
 from .jobs import Job, Jobs
+from .mapping import load
 from .options import MapOptions, PoissonOptions, one_line
 from .samples import SAMPLES, sample, write_obj
 
@@ -75,7 +75,8 @@ class Page:
     # Jobs
 
     def _check(self, path: Path) -> Surface:
-        return resolve(str(path), component=self._mapping.component, max_faces=self._mapping.max_faces)
+        given = self._mapping
+        return load(path, given.component, given.max_faces, given.decimate)
 
     def _run(self, job: Job) -> Iterator[Message]:
         mapping = replace(self._mapping, resume=has_checkpoint(job.results))

@@ -44,9 +44,14 @@ CONTENT = {  # of the files, those a user wants first in front
     "report.json": "the report for programs",
     "history.npz": "loss of every training step",
     "faces.png": "the cube's faces in colours",
+    "lines.png": "the same with parameter lines",
+    "cut.png": "the volume cut open",
     "distortion.png": "distortion on three sections",
     "error.png": "error on three sections",
+    "convergence.png": "errors over the mesh size",
     "history.png": "loss over the steps",
+    "folds.png": "where det J > 0 is not proved",
+    "meeting.png": "where the boundary meets itself",
 }
 VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # three sides of the cube are seen
 GREY = 190  # of 255
