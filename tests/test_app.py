@@ -147,9 +147,8 @@ async def trained(tab, folder):
     """Loss and time left, and the six faces' colours on the surface."""
     await tab.sees("Time left", PATIENCE)
     assert re.search(r"Loss\n\d\.\d\de[+-]\d\d\n", await tab.text())
-    await tab.until("document.querySelector('.drawing canvas') !== null")
-    image = await tab.picture(folder / "training.png")
-    assert sum(pixels_of(image, color) > 500 for color in FACE_COLORS) >= 3
+    await tab.sees("each colour is one face of the cube", PATIENCE)
+    await shows_faces(tab, folder / "training.png")
 
 
 async def finished(tab, folder):
@@ -158,8 +157,17 @@ async def finished(tab, folder):
     assert "my ball.obj: Poisson's equation" in text and "iga-nn run poisson 'my ball.obj'" in text
     (folder / "volume.npz").write_bytes(base64.b64decode(await tab.value(FETCHED)))
     assert load_volume(folder / "volume.npz").shape == (6, 6, 6)
-    image = await tab.picture(folder / "done.png")
-    assert sum(pixels_of(image, color) > 500 for color in FACE_COLORS) >= 3
+    await shows_faces(tab, folder / "done.png")
+
+
+async def shows_faces(tab, path, seconds=30.0):
+    """Wait until three of the cube's faces are drawn in their colours."""
+    end = asyncio.get_running_loop().time() + seconds
+    seen = 0
+    while seen < 3:
+        assert asyncio.get_running_loop().time() < end, f"the faces are not drawn: {path}"
+        image = await tab.picture(path)
+        seen = sum(pixels_of(image, color) > 500 for color in FACE_COLORS)
 
 
 async def stopped(tab):
