@@ -336,7 +336,12 @@ def foreign_readers():
     volumes = [bent(3, 1), bent(3, 2)]
     for kind, suffix in (("gismo", ".xml"), ("mfem", ".mesh"), ("json", ".json")):
         write = getattr(spline_files, f"write_{kind}")
-        yield Reader(kind, suffix, check, tuple([written(partial(write, volume=v), suffix)] for v in volumes))
+        yield Reader(
+            kind,
+            suffix,
+            check,
+            tuple([written(lambda path, v=v, write=write: write(path, v), suffix)] for v in volumes),
+        )
 
 
 FORMULAS = ("exp(x+z)*sin(y)", "1e-3*(x**2-y)/(2+z)-3.5", "-tanh(x*y)**(1/3)+abs(log(z))*pi", "sqrt(e**x)+cos(tan(y))")

@@ -152,7 +152,7 @@ async def trained(tab, folder):
 
 
 async def finished(tab, folder):
-    await tab.until(f"{REPORT}?.includes('det J')", PATIENCE)
+    await tab.until(f"{REPORT}?.includes('iga-nn run poisson')", PATIENCE)  # near its end
     text = await tab.value(REPORT)
     assert "my ball.obj: Poisson's equation" in text and "iga-nn run poisson 'my ball.obj'" in text
     (folder / "volume.npz").write_bytes(base64.b64decode(await tab.value(FETCHED)))
