@@ -2,7 +2,8 @@
 
 No vertex of the mesh need have its parameter there, and F, which keeps a small crease along those edges, could stick
 out unseen, most of all at the eight corners, and blow up the elements there. They are for a map that is nearly there:
-on a rough one the nearest points are those of another part of the surface, and it would be held there.
+on a rough one the nearest points are those of another part of the surface, and it would be held there. Corners that the
+user gives are held throughout, each at its place.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from .layout import sides
 from .surface_fit import SurfaceFit
 
 _A_SPAN = 2
-_NEAR = 1.0 / 3.0  # of a span's length at volume 1
-_NEARLY_ALL = 0.95
+_NEAR = 0.5  # of a span's length at volume 1
+_NEARLY_ALL = 0.99
+_GIVEN = 100.0  # weight of a given corner, where the distance along the normal has 1
 
 
 def edge_points(knots: tuple[Array, Array, Array]) -> Array:
@@ -53,9 +55,10 @@ class EdgeAnchors:
             np.zeros((0, 3), dtype=np.int64),
             device=surface.device,
         )
+        self.release()
 
     def near(self, control: Tensor) -> bool:
-        """Whether F is so close to the surface along nearly all edges that the nearest points are the right ones."""
+        """Whether F is so close to the surface all along the edges that the nearest points are the right ones."""
         here, points, _ = self._nearest(control)
         longest = _NEAR / (min(control.shape[1:]) - self.fit.degree)
         return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= _NEARLY_ALL
@@ -63,11 +66,19 @@ class EdgeAnchors:
     def aim(self, control: Tensor) -> None:
         """Take the points of the surface nearest to F as it is, each with the normal of its triangle."""
         _, points, normals = self._nearest(control)
-        self.fit.aim(points, normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3))
+        self._aim(points, normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3))
 
     def release(self) -> None:
-        """Pull on nothing until they are aimed again."""
-        self.fit.aim(self.fit.points, np.zeros((len(self.fit.points), 3, 3)))
+        """Pull on nothing but given corners until they are aimed again."""
+        self._aim(self.fit.points, np.zeros((len(self.fit.points), 3, 3)))
+
+    def _aim(self, points: Array, quadrics: Array) -> None:
+        """Aim, given corners at their own places."""
+        if (given := self._surface.given_corners) is not None:
+            corner = np.isin(self.fit.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
+            points, quadrics = points.copy(), quadrics.copy()
+            points[corner], quadrics[corner] = given, _GIVEN * np.eye(3)
+        self.fit.aim(points, quadrics)
 
     def _nearest(self, control: Tensor) -> tuple[Array, Array, Array]:
         """F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""

@@ -226,6 +226,7 @@ def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> 
         sides(layout.places),
         layout.faces,
         device=task.device,
+        given_corners=None if task.given_corners is None else task.vertices[task.given_corners],
     )
 
 

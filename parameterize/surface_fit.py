@@ -31,6 +31,7 @@ class SurfaceFit:
     """points (N, 3) at volume 1, quadrics (N, 3, 3), weights (N,) that sum to 1, parameters (N, 3), faces (N,).
 
     triangles (m, 3) between the points; between them `relax` keeps the layout on the cube one-to-one.
+    given_corners (8, 3): where the user wants the corners of the cube; anchors.py holds F there.
     """
 
     def __init__(
@@ -45,9 +46,10 @@ class SurfaceFit:
         triangles: IntArray,
         *,
         device: torch.device,
+        given_corners: Array | None = None,
     ) -> None:
         self.knots, self.degree, self.device = knots, degree, device
-        self.triangles = triangles
+        self.triangles, self.given_corners = triangles, given_corners
         self._weights = weights
         self._normals = vertex_normals(points, triangles)
         self._facing: FacingPenalty | None = None

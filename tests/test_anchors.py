@@ -13,7 +13,7 @@ KNOTS = (open_uniform_knots(6, 3),) * 3  # three spans a direction
 TANGENTIAL = 1e-3
 
 
-def anchors_on_a_ball(radius=0.5):
+def anchors_on_a_ball(radius=0.5, given_corners=None):
     points, faces = ball(2000)
     points = 0.5 + radius * points
     fit = SurfaceFit(
@@ -26,6 +26,7 @@ def anchors_on_a_ball(radius=0.5):
         sides(points),
         faces,
         device=torch.device("cpu"),
+        given_corners=given_corners,
     )
     return EdgeAnchors(fit, TANGENTIAL)
 
@@ -61,10 +62,10 @@ def test_what_they_pull_on_comes_closer():
     assert (inward[[0, 0, 0, 0, -1, -1, -1, -1], [0, 0, -1, -1] * 2, [0, -1] * 4] > 0.0).all()
 
 
-def test_near_is_told_from_far_by_a_third_of_a_span():
-    """Edges of the unit cube are 0.707 to 0.866 from its centre; a third of a span is 0.111."""
-    assert anchors_on_a_ball(radius=0.78).near(unit_cube())
-    assert not anchors_on_a_ball(radius=0.6).near(unit_cube())
+def test_near_is_told_from_far_by_half_a_span():
+    """Edges of the unit cube are 0.707 to 0.866 from its centre; half a span is 0.167."""
+    assert anchors_on_a_ball(radius=0.75).near(unit_cube())
+    assert not anchors_on_a_ball(radius=0.5).near(unit_cube())
 
 
 def test_released_they_pull_on_nothing():
@@ -74,3 +75,15 @@ def test_released_they_pull_on_nothing():
     energy, gradient = anchors.fit.energy_and_gradient(control)
     assert energy == 0.0
     assert not gradient.any()
+
+
+def test_given_corners_are_held_at_their_places_while_the_others_are_released():
+    wanted = CORNERS + 0.01 * np.arange(24).reshape(8, 3)
+    anchors, control = anchors_on_a_ball(given_corners=wanted), unit_cube()
+    anchors.aim(control)
+    aimed = anchors.fit.points[np.isin(anchors.fit.parameters, (0.0, 1.0)).all(axis=1)]
+    np.testing.assert_array_equal(aimed, wanted)
+    anchors.release()
+    _, gradient = anchors.fit.energy_and_gradient(control)
+    downhill = -gradient[:, [0, -1]][:, :, [0, -1]][:, :, :, [0, -1]].reshape(3, 8).T.numpy()
+    np.testing.assert_allclose(downhill / np.abs(downhill).max(), (wanted - CORNERS) / 0.23, atol=1e-12)
