@@ -3,7 +3,8 @@
 No vertex of the mesh need have its parameter there, and F, which keeps a small crease along those edges, could stick
 out unseen, most of all at the eight corners, and blow up the elements there. They are for a map that is nearly there:
 on a rough one the nearest points are those of another part of the surface, and it would be held there. Corners that the
-user gives are held throughout, each at its place.
+user gives are held while those points let go; in the last rounds they may move a little: held to the end, the boundary
+crosses itself beside them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from .surface_fit import SurfaceFit
 _A_SPAN = 2
 _NEAR = 0.5  # of a span's length at volume 1
 _NEARLY_ALL = 0.99
-_GIVEN = 100.0  # weight of a given corner, where the distance along the normal has 1
+_GIVEN = 0.5  # weight of a given corner, where the distance along the normal has 1
 
 
 def edge_points(knots: tuple[Array, Array, Array]) -> Array:
@@ -66,17 +67,13 @@ class EdgeAnchors:
     def aim(self, control: Tensor) -> None:
         """Take the points of the surface nearest to F as it is, each with the normal of its triangle."""
         _, points, normals = self._nearest(control)
-        self._aim(points, normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3))
+        self.fit.aim(points, normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3))
 
     def release(self) -> None:
         """Pull on nothing but given corners until they are aimed again."""
-        self._aim(self.fit.points, np.zeros((len(self.fit.points), 3, 3)))
-
-    def _aim(self, points: Array, quadrics: Array) -> None:
-        """Aim, given corners at their own places."""
+        points, quadrics = self.fit.points.copy(), np.zeros((len(self.fit.points), 3, 3))
         if (given := self._surface.given_corners) is not None:
             corner = np.isin(self.fit.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
-            points, quadrics = points.copy(), quadrics.copy()
             points[corner], quadrics[corner] = given, _GIVEN * np.eye(3)
         self.fit.aim(points, quadrics)
 
