@@ -22,6 +22,7 @@ from .formats import export, is_volume
 from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
 
 FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--body-force", "--displacement")
+ONE_TO_ONE = {True: "proved", False: "no: the boundary meets itself", None: "not decided"}
 DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
 
 app = App(
@@ -196,6 +197,8 @@ def check(
     if as_json:
         _say(json.dumps(reports.plain(verdict), indent=2))
     else:
+        if not as_volume:
+            _say("accepted")
         _say("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
     injective = not as_volume or (verdict["bijective"] == "certified" and verdict["boundary_injective"] is not False)
     return DONE if injective else NOT_CERTIFIED
@@ -331,7 +334,8 @@ def _tell(outcome: Outcome, output: OutputOptions) -> int:
 
 def _lines(verdict: dict[str, Any]) -> list[str]:
     """The verdict for a reader, one fact a line."""
-    lines = [f"bijective        {verdict['bijective']}"]
+    one_to_one = ONE_TO_ONE[verdict["boundary_injective"]] if verdict["bijective"] == "certified" else "no proof"
+    lines = [f"det J > 0        {verdict['bijective']}", f"one-to-one       {one_to_one}"]
     for scale, arap in verdict.get("arap", {}).items():
         rms = verdict["boundary_rms"][scale]
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")

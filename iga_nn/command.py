@@ -27,6 +27,19 @@ def command_line(command: str, source: str | Path, *options: Any, **given: Any) 
     return shlex.join(words)
 
 
+def gives_the_same(one: str, other: str) -> bool:
+    """Whether two such lines lead to the same result: they differ in the output folder alone."""
+    return _without_folder(one) == _without_folder(other)
+
+
+def _without_folder(line: str) -> list[str]:
+    words = shlex.split(line)
+    if "--out" in words:
+        at = words.index("--out")
+        del words[at : at + 2]
+    return words
+
+
 def _words(name: str, value: Any) -> list[str]:
     flag = "--" + name.replace("_", "-")
     if value is True:

@@ -105,6 +105,8 @@ def open_folder(
             finished = Outcome(folder, known) if known and reports.is_finished(known) and not force else None
             if finished and not resume:
                 raise InputError(f"{folder}: holds a finished result; --force replaces it, --out names another folder")
+            if has_checkpoint(folder) and not (resume or force):
+                raise InputError(f"{folder}: holds an interrupted run; --resume goes on from it, --force starts anew")
             with _writable(folder):
                 if not finished:
                     TemporaryFile(dir=folder).close()

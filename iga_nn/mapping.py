@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import logging
 import shutil
+from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from parameterize.bspline import Array
 from parameterize.files import save_arrays
 
 from . import advice
@@ -25,6 +30,8 @@ if TYPE_CHECKING:
     from solve import Poisson
 
 log = logging.getLogger(__name__)
+
+_TRIED = 50  # points of the surface
 
 
 def load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool) -> Surface:
@@ -84,9 +91,31 @@ def map_surface(
 
 def _check_data(equation: Poisson, surface: Surface) -> None:
     """What can be known of the data before there are points inside: their values on the surface."""
+    from parameterize.surface_fit import vertex_normals
+
     x, y, z = surface.vertices.T
     for evaluate in (equation.boundary_at, equation.source_at, equation.kappa_at, equation.reaction_at):
         evaluate(x, y, z)
+    normals = vertex_normals(surface.vertices, surface.faces)
+    for face in equation.neumann:
+        _check_somewhere(partial(equation.flux_at, face), surface.vertices, normals)
+    for face in equation.robin:
+        _check_somewhere(partial(equation.robin_at, face), surface.vertices, normals)
+
+
+def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:
+    """Raise what `evaluate` raises on all of some points: one face's data need be good on that face alone."""
+    from solve import ExpressionError
+
+    refused = None
+    for row in np.linspace(0, len(points) - 1, _TRIED).astype(int):
+        try:
+            evaluate(points[row], normals[row])
+            return
+        except ExpressionError as error:
+            refused = error
+    assert refused is not None
+    raise refused
 
 
 def _announce(expected: Forecast) -> None:

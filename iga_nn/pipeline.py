@@ -16,7 +16,7 @@ from parameterize.files import save_text
 from parameterize.volume import BSplineVolume
 
 from . import studies
-from .command import command_line
+from .command import command_line, gives_the_same
 from .folder import SOLUTION_FILES, STUDY_FILES, Outcome, RunFolder, open_folder
 from .formats import load_volume
 from .mapping import load, map_surface
@@ -59,9 +59,9 @@ def run(
             raise InputError(
                 f"{finished.folder}: holds a finished volume; `iga-nn solve poisson {volume}` solves on it"
             )
-        if finished:
-            return finished
         command = command_line("run poisson", mesh, mapping, poisson, out=out)
+        if finished:
+            return _there_already(finished, command)
         result = map_surface(state, mesh, mapping, progress, command, equation, unknowns)
         solution = _solve(state, result.volume, equation, poisson)
         return _finish(state, result.volume, solution, equation)
@@ -79,9 +79,9 @@ def parameterize_to(
     """From a surface to volume.npz, boundary.npz, history.npz, report.json and figures; raises as `run` does."""
     mapping = mapping or MapOptions()
     with open_folder(mesh, out, force, mapping.resume, vector) as (state, finished):
-        if finished:
-            return finished
         command = command_line("parameterize", mesh, mapping, out=out)
+        if finished:
+            return _there_already(finished, command)
         result = map_surface(state, mesh, mapping, progress, command)
         return _finish(state, result.volume)
 
@@ -174,6 +174,17 @@ def check_surface(
 def check_volume(path: str | Path) -> dict[str, Any]:
     """The certificate of a saved volume. Raises InputError for a file that is none."""
     return certified_facts(load_volume(path))
+
+
+def _there_already(finished: Outcome, command: str) -> Outcome:
+    """The result that a resumed run finds. Raises InputError where it is another command's."""
+    made_by = finished.report.get("command", "")
+    if not gives_the_same(made_by, command):
+        raise InputError(
+            f"{finished.folder}: holds the result of `{made_by}`; --force replaces it, --out names another folder"
+        )
+    log.info("%s: finished already", finished.folder)
+    return finished
 
 
 def _solve(

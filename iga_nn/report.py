@@ -85,6 +85,7 @@ def verdict(report: Report, folder: Path) -> Report:
     """What decides whether a result is used: the `--json` answer of the command line."""
     quality = report["parameterization"]
     short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
+    short["boundary_injective"] = quality.get("boundary_injective")
     if "arap" in quality:
         short["arap"] = quality["arap"]
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}

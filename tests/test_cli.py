@@ -344,7 +344,7 @@ def small_disk(size):
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 @pytest.mark.parametrize("size", [100, 1500, 4000])
 def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training, in_folder, capsys, monkeypatch):
-    monkeypatch.setattr("iga_nn.pipeline._draw", lambda *_: None)  # figures come last and take longest
+    monkeypatch.setattr("iga_nn.folder.RunFolder.draw", lambda *_: None)  # figures come last and take longest
     formula_training()
     benchmark_volume(6).save("map.npz")
     for arguments in (["solve", "poisson", "map.npz", "--refine", "0"], ["parameterize", "cube"]):
@@ -362,7 +362,7 @@ def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training,
 
 
 def test_what_a_killed_run_left_half_written_goes(formula_training, in_folder, monkeypatch):
-    monkeypatch.setattr("iga_nn.pipeline._draw", lambda *_: None)
+    monkeypatch.setattr("iga_nn.folder.RunFolder.draw", lambda *_: None)
     formula_training()
     Path("cube").mkdir()
     Path("cube/.volume.1.part.npz").write_bytes(b"half")
@@ -397,6 +397,39 @@ def test_reader_that_has_gone_is_no_error(in_folder):
     done = python("-m", "iga_nn", "check", "bean", stdout=write)
     os.close(write)
     assert done.returncode == 0 and done.stderr == ""
+
+
+def test_a_finished_result_answers_the_same_command_alone(formula_training, in_folder, capsys):
+    formula_training()
+    assert main(["parameterize", "cube", "--out", "out"]) == 0
+    capsys.readouterr()
+    assert main(["parameterize", "bean", "--out", "out", "--resume"]) == 2
+    assert "holds the result of `iga-nn parameterize cube --out out`" in one_line(capsys.readouterr().err)
+    assert main(["parameterize", "cube", "--seed", "7", "--out", "out", "--resume"]) == 2
+    assert main(["parameterize", "cube", "--out", "./out", "--resume"]) == 0
+
+
+def test_an_interrupted_run_is_not_started_over_unasked(formula_training, in_folder, capsys):
+    formula_training()
+    Path("cube/checkpoint").mkdir(parents=True)
+    Path("cube/checkpoint/training.safetensors").touch()
+    assert main(["parameterize", "cube"]) == 2
+    assert "--resume goes on from it, --force starts anew" in one_line(capsys.readouterr().err)
+    assert Path("cube/checkpoint/training.safetensors").exists()
+    assert main(["parameterize", "cube", "--force"]) == 0
+
+
+@pytest.mark.parametrize("data", [["--robin", "w0=-3"], ["--neumann", "u0=1/0"], ["--robin", "w0=1:1/0"]])
+def test_data_of_faces_are_refused_before_the_training(formula_training, in_folder, data, capsys):
+    formula_training(error=AssertionError("trained"))
+    assert main(["run", "poisson", "cube", *data]) == 2
+    one_line(capsys.readouterr().err)
+
+
+def test_data_that_are_good_on_their_own_face_are_taken(formula_training, in_folder):
+    """x - 1/2 is negative on half of the surface, but not on the face."""
+    formula_training()
+    assert main(["run", "poisson", "cube", "--robin", "u1=x-0.5:1", "--refine", "0"]) == 0
 
 
 def test_interruption_is_130_and_names_the_way_on(formula_training, in_folder, capsys):
