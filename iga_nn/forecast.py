@@ -36,7 +36,7 @@ NEWTON_STEP, CERTIFICATE, FIT = 120.0, 250.0, 500.0
 EASY, HARD = (5, 16), (16, 32)  # rounds, and Newton steps a round
 
 # Megabytes
-LIBRARIES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 8e-3, 16e-3, 1.6e-3
+LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def forecast(
     )
     activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
     mapped = PER_CONTROL_POINT * spline.control_points**3 + PER_VERTEX * vertices
-    return Forecast((low, high), LIBRARIES + max(activations, mapped, PER_UNKNOWN * unknowns))
+    return Forecast((low, high), LIBRARIES + FIGURES + max(activations, mapped, PER_UNKNOWN * unknowns))
 
 
 def _training_points(surface: Surface, config: Config) -> int:

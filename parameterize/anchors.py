@@ -77,6 +77,11 @@ class EdgeAnchors:
             points[corner], quadrics[corner] = given, _GIVEN * np.eye(3)
         self.fit.aim(points, quadrics)
 
+    def restore(self, points: Array, yielding: Array) -> None:
+        """Take the state of a checkpoint: the next distances then round as they would have without the interruption."""
+        self.fit.aim(points, np.zeros((len(points), 3, 3)))
+        self.fit.give_way(yielding)
+
     def _nearest(self, control: Tensor) -> tuple[Array, Array, Array]:
         """F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""
         here = self.fit.residuals(control) + self.fit.points

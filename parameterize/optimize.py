@@ -138,6 +138,7 @@ def _save(
         "parameters": torch.as_tensor(energy.surface.parameters),
         "cube_faces": torch.as_tensor(energy.surface.cube_faces),
         "yielding": torch.as_tensor(energy.surface.yielding),
+        "anchors": torch.as_tensor(energy.anchors.fit.points),
         "anchors_yielding": torch.as_tensor(energy.anchors.fit.yielding),
         "active": torch.as_tensor(energy.barrier.active),
     }
@@ -151,7 +152,7 @@ def _restore(
     device = best.control.device
     energy.surface.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
     energy.surface.give_way(tensors["yielding"].numpy())
-    energy.anchors.fit.give_way(tensors["anchors_yielding"].numpy())
+    energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
     energy.barrier.activate(tensors["active"].numpy())
     control, kept = tensors["control"].to(device), tensors["best"].to(device)
     return int(state["number"]), control, Optimized(kept, certify(_as_volume(kept, knots, energy.config.degree)))
