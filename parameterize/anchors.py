@@ -3,7 +3,7 @@
 No vertex of the mesh need have its parameter there, and F, which keeps a small crease along those edges, could stick
 out unseen, most of all at the eight corners, and blow up the elements there. They are for a map that is nearly there:
 on a rough one the nearest points are those of another part of the surface, and it would be held there. Corners that the
-user gives are held while those points let go; in the last rounds they may move a little: held to the end, the boundary
+user gives are held until the map is certified; in the last rounds they may move a little: held to the end, the boundary
 crosses itself beside them.
 """
 
@@ -64,18 +64,28 @@ class EdgeAnchors:
         longest = _NEAR / (min(control.shape[1:]) - self.fit.degree)
         return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= _NEARLY_ALL
 
-    def aim(self, control: Tensor) -> None:
-        """Take the points of the surface nearest to F as it is, each with the normal of its triangle."""
+    def aim(self, control: Tensor, *, hold: bool) -> None:
+        """Take the points of the surface nearest to F as it is, each with the normal of its triangle.
+
+        hold: leave given corners at their places.
+        """
         _, points, normals = self._nearest(control)
-        self.fit.aim(points, normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3))
+        quadrics = normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3)
+        if hold:
+            self._hold(points, quadrics)
+        self.fit.aim(points, quadrics)
 
     def release(self) -> None:
         """Pull on nothing but given corners until they are aimed again."""
         points, quadrics = self.fit.points.copy(), np.zeros((len(self.fit.points), 3, 3))
+        self._hold(points, quadrics)
+        self.fit.aim(points, quadrics)
+
+    def _hold(self, points: Array, quadrics: Array) -> None:
+        """Put given corners in place of those."""
         if (given := self._surface.given_corners) is not None:
             corner = np.isin(self.fit.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
             points[corner], quadrics[corner] = given, _GIVEN * np.eye(3)
-        self.fit.aim(points, quadrics)
 
     def restore(self, points: Array, yielding: Array) -> None:
         """Take the state of a checkpoint: the next distances then round as they would have without the interruption."""

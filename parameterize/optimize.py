@@ -108,7 +108,7 @@ def _rounds(
             polished += 1
             energy.take_back(_GIVING_WAY)
         if polished or (near and number < _PATIENT_ROUNDS):
-            energy.anchors.aim(control)
+            energy.anchors.aim(control, hold=not polished)
         else:
             energy.anchors.release()
         energy.start_round(control, config.penalties[min(number, len(config.penalties) - 1)])
