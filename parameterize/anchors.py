@@ -56,7 +56,6 @@ class EdgeAnchors:
             np.zeros((0, 3), dtype=np.int64),
             device=surface.device,
         )
-        self.release()
 
     def near(self, control: Tensor) -> bool:
         """Whether F is so close to the surface all along the edges that the nearest points are the right ones."""
