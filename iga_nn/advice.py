@@ -58,6 +58,8 @@ def what_to_try(report: Report, options: MapOptions | None = None) -> list[str]:
     quality, remedies = report["parameterization"], []
     if options is not None and options.steps_factor < 1.0:
         remedies.append("the whole training: leave out --steps-factor")
+    if crossing := report.get("input", {}).get("self_intersections", {}).get("pairs", 0):
+        remedies.append(f"a surface that does not cross itself, as {crossing} pairs of its faces do (`iga-nn check`)")
     if quality["bijective"] == "certified":  # then the boundary meets itself, without a fold
         remedies.append("a surface whose parts stand farther apart there, or more faces around that gap")
     more = min(max(quality["control_points"]) + 10, MAX_CONTROL_POINTS)

@@ -7,13 +7,14 @@ that the server needs no graphics library for them.
 from __future__ import annotations
 
 import asyncio
+import logging
 import webbrowser
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from aiohttp import ClientError, web
+from aiohttp import ClientError, http_exceptions, web
 from trame.app import get_server
 
 from parameterize.bspline import Array
@@ -47,6 +48,7 @@ class Page:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._drawn: dict[int, Array] = {}  # points last sent, by job
         self.jobs = Jobs(root, self._check, self._run, self._tell)
+        logging.getLogger("aiohttp.server").addFilter(_not_the_clients)
 
     def run(self, say: Callable[[str], None], port: int, open_browser: bool) -> None:
         """Serve until interrupted."""
@@ -191,9 +193,16 @@ def _guard(port: Callable[[], int]) -> Any:
         origin = request.headers.get("Origin")
         if request.host not in own or (origin is not None and origin.removeprefix("http://") not in own):
             raise web.HTTPForbidden(text=f"this page answers at http://{HOST}:{port()}/ only")
+        if request.path == "/ws" and not web.WebSocketResponse().can_prepare(request):  # wslink would fail on it
+            raise web.HTTPBadRequest(text="this address takes web sockets only")
         return await handler(request)
 
     return guard
+
+
+def _not_the_clients(record: logging.LogRecord) -> bool:
+    """Whether an error is the server's own: one that was no HTTP at all is answered with 400, and not worth a line."""
+    return not (record.exc_info and isinstance(record.exc_info[1], http_exceptions.HttpProcessingError))
 
 
 async def _restrict(_: web.Request, response: web.StreamResponse) -> None:

@@ -39,12 +39,12 @@ class ProgressLine:
 
 
 def describe(progress: Progress) -> str:
-    """Stage, step, loss, folded samples and time left, as one line: of the training, the spline's own comes on top."""
+    """Stage, step, loss, folded samples and time left, as one line; how long the spline takes shows when it is on."""
     minutes, seconds = divmod(round(max(0.0, progress.seconds_left)), 60)
-    label = "at most" if progress.stage == "spline" else "training left"
+    left = f"{minutes}:{seconds:02d}"
     return (
         f"{progress.stage:8s} step {progress.step}/{progress.steps}  loss {progress.loss:.3e}  "
-        f"folded {progress.folded}  {label} {minutes}:{seconds:02d}"
+        f"folded {progress.folded}  " + (f"at most {left}" if progress.stage == "spline" else f"left {left} + spline")
     )
 
 

@@ -71,6 +71,8 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
 
     component, max_faces: as in load_surface. Raises MeshError saying where to get what is missing.
     """
+    if not name:
+        raise MeshError("no surface is named: give a file, or one of the samples " + ", ".join(SAMPLES))
     is_file = Path(name).is_file()  # the results' folder has the sample's name, too
     if not is_file and name in SAMPLES:
         surface = sample(name)

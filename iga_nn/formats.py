@@ -28,7 +28,7 @@ IGES and STEP know no trivariate splines, so they are not among them.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -53,6 +53,7 @@ ENDINGS = {
     "json": ".json",
 }
 BESIDE = {"gismo": "_u.xml", "mfem": ".gf", "json": "_u.json"}  # the file of a solution, after the volume's stem
+_PROBLEMS = ("poisson", "elasticity")  # sections of report.json with a solution.npz
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
 
@@ -69,10 +70,13 @@ def load_volume(path: str | Path) -> BSplineVolume:
     splinepy is needed and missing.
     """
     source = Path(path)
+    if source.is_dir():
+        raise InputError(f"{source}: is a folder: name the volume.npz in it")
     with input_errors():
-        kind = kind_of(source) if source.is_file() else None
-        foreign = kind in ("gismo", "mfem", "json")
-        volume = spline_files.read(source, str(kind)) if foreign else BSplineVolume.load(source)
+        kind = kind_of(source) if source.is_file() else "npz"
+        if kind is None and source.suffix != ".npz":
+            raise InputError(f"{source}: is no volume; of a surface `iga-nn run poisson {source}` makes one")
+        volume = BSplineVolume.load(source) if kind in ("npz", None) else spline_files.read(source, kind)
     if min(float(np.diff(np.unique(knots)).min()) for knots in volume.knots) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
     return volume
@@ -101,7 +105,10 @@ def export(
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
     loaded = load_volume(volume)
-    field = None if solution is None else _load_solution(Path(solution), loaded)
+    field = section = None
+    if solution is not None:
+        section = _section_beside(Path(solution))
+        field = _load_solution(Path(solution), loaded, section)
     try:
         if field is not None and beside is not None:
             if to == "mfem":
@@ -110,7 +117,7 @@ def export(
             with replacing(beside) as temporary:
                 _FIELD_WRITERS[to](temporary, field)
         with replacing(target) as temporary:
-            _write(temporary, to, loaded, field, _problem_beside(solution))
+            _write(temporary, to, loaded, field, None if section is None else _problem(*section))
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
     return target
@@ -151,22 +158,43 @@ def _target(volume: str | Path, to: str, out: str | Path | None) -> Path:
     return target
 
 
-def _load_solution(path: Path, volume: BSplineVolume) -> SplineField:
-    """A solution on that volume: every knot of the map is one of the solution's."""
+def _section_beside(solution: Path) -> tuple[str, dict[str, Any]] | None:
+    """What the report beside solution.npz says of it, with the section's name; None where it says nothing."""
+    report = reports.read(solution.parent) or {}
+    return next(((name, report[name]) for name in _PROBLEMS if isinstance(report.get(name), dict)), None)
+
+
+def _load_solution(path: Path, volume: BSplineVolume, section: tuple[str, dict[str, Any]] | None) -> SplineField:
+    """A solution on that volume: every knot of the map is one of its own, and its report's h is that of its mesh."""
     from solve.field import SplineField
+    from solve.space import TrialSpace, longest_edge
 
     with input_errors():
         field = SplineField.load(path)
     if not all(np.isin(own, finer).all() for own, finer in zip(volume.knots, field.knots, strict=True)):
         raise InputError(f"{path}: belongs to another volume: its knots are not those of the map, refined")
+    there = _mesh_size(section[1], field) if section else None
+    if there is not None:
+        here = longest_edge(volume, TrialSpace(field.degrees, field.knots))
+        if not np.isclose(here, there, rtol=1e-9):
+            raise InputError(
+                f"{path}: belongs to another volume: the longest edge of its elements is {there:.6g}, here {here:.6g}"
+            )
     return field
 
 
-def _problem_beside(solution: str | Path | None) -> Problem | None:
-    """A problem with the exact solution that the report beside solution.npz names."""
-    report = (None if solution is None else reports.read(Path(solution).parent)) or {}
-    name = next((name for name in ("poisson", "elasticity") if isinstance(report.get(name), dict)), None)
-    exact = report[name].get("exact") if name else None
+def _mesh_size(section: dict[str, Any], field: SplineField) -> float | None:
+    """The finest level's h; None where the section is not the field's, or was edited."""
+    try:
+        finest = section["levels"][-1]
+        return float(finest["h"]) if finest["dofs"] == field.coefficients.size else None
+    except (LookupError, TypeError, ValueError):
+        return None
+
+
+def _problem(name: str, section: dict[str, Any]) -> Problem | None:
+    """A problem with the exact solution that the section of that name knows."""
+    exact = section.get("exact")
     if not isinstance(exact, str):
         return None
     from solve import Elasticity, Poisson

@@ -281,6 +281,8 @@ def read_corners(path: Path) -> np.ndarray[Any, Any]:
         with path.open(encoding="utf-8") as stream:
             given = json.loads(stream.read(_CORNERS_BYTES))
         rows = np.array(given, dtype=np.float64)
+        if any(isinstance(number, bool) for number in np.array(given, dtype=object).flat):
+            raise TypeError
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (ValueError, TypeError, OverflowError, RecursionError):

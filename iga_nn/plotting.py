@@ -44,6 +44,18 @@ if TYPE_CHECKING:
 SAMPLES = 141  # a direction and patch
 EVERY = 14  # samples between two parameter lines: a tenth of the cube
 DISTORTION = "tanh(√ARAP / 2), scale as given"
+TERMS = {  # of the loss, as parameterize names them
+    "arap": "ARAP distortion",
+    "bij": "folds",
+    "cor": "distance at corners",
+    "dist": "distance to the target",
+    "edge": "distance along edges",
+    "fair": "curvature",
+    "norm": "normals",
+    "star": "faces seen from inside",
+    "surface": "spline's boundary",
+}
+STAGES = {"S(2)": "round cuboid S(2)", "S(1)": "sharper one S(1)"}  # the others speak for themselves
 PANEL = (900, 700)  # pixels of one view
 PNG = (".png",)
 WINDOW = 0.15  # of the cube, to every side of a meeting place
@@ -298,7 +310,7 @@ def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
     steps = np.arange(len(history["loss"]))
     figure, (upper, lower) = _blank(2, 1, (11, 6), sharex=True, height_ratios=(4, 1))
     for name in terms:
-        upper.plot(steps, _positive(history[name]), linewidth=0.8, alpha=0.8, label=name)
+        upper.plot(steps, _positive(history[name]), linewidth=0.8, alpha=0.8, label=TERMS.get(name, name))
     upper.plot(steps, _positive(history["loss"]), color="black", linewidth=1.4, label="loss")
     upper.set_yscale("log")
     upper.set_ylim(bottom=max(upper.get_ylim()[0], 1e-8 * float(np.nanmax(history["loss"]))))  # terms start at zero
@@ -314,7 +326,8 @@ def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
         for axes in (upper, lower):
             axes.axvline(start, color="grey", linewidth=0.7, linestyle=":")
         label = {"textcoords": "offset points", "rotation": 35, "fontsize": 9}  # slanted: short stages lie close
-        upper.annotate(str(stages[start]), (start, 1.0), (0, 3), xycoords=upper.get_xaxis_transform(), **label)
+        name = str(stages[start])
+        upper.annotate(STAGES.get(name, name), (start, 1.0), (0, 3), xycoords=upper.get_xaxis_transform(), **label)
     _save(figure, path)
 
 

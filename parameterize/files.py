@@ -79,10 +79,9 @@ def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[A
     except Exception as error:  # of a damaged archive: zipfile, its decompressors and numpy raise a dozen kinds
         raise ValueError(f"{source}: not a readable .npz archive ({str(error) or type(error).__name__})") from None
     if missing:
-        remedy = (
-            "" if any(entry.filename.endswith(".npy") for entry in held.values()) else "; unpack what is in it first"
-        )
-        raise ValueError(f"{source}: has no array named {', '.join(missing)}{remedy}")
+        arrays_held = sorted(name for name, entry in held.items() if entry.filename.endswith(".npy"))
+        remedy = f"it holds {', '.join(arrays_held):.100}" if arrays_held else "unpack what is in it first"
+        raise ValueError(f"{source}: has no array named {', '.join(missing)}; {remedy}")
     if refused:
         raise ValueError(f"{source}: unpacks to {unpacked} bytes, more than {MAX_UNPACKED_BYTES}")
     return arrays

@@ -33,7 +33,7 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
     sizes += f", and {len(groups) - LISTED} more" if len(groups) > LISTED else ""
     if component is not None:
         if not 0 <= component < len(groups):
-            raise MeshError(f"no component {component}: choose one of {len(groups)} ({sizes})")
+            raise MeshError(f"no component {component}: counted from 0 there are {len(groups)} ({sizes})")
         notice = [f"component {component} taken of {len(groups)} ({sizes})"] if len(groups) > 1 else []
         return faces[groups[component]], notice
     nested = _inside(vertices, faces, groups)

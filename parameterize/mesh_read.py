@@ -47,6 +47,8 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
 
     Raises MeshError, without the file's name.
     """
+    if path.is_dir():
+        raise MeshError("is a directory: name the surface file in it")
     suffixes = [suffix.lower() for suffix in path.suffixes]
     packed = suffixes[-1:] == [".gz"]
     suffix = (suffixes[:-1] if packed else suffixes)[-1:]
@@ -100,8 +102,6 @@ def check_indices(vertices: Array, faces: IntArray) -> None:
 
 
 def _read_bytes(path: Path, limit: int) -> bytes:
-    if path.is_dir():
-        raise MeshError("is a directory: name the surface file in it")
     try:
         size = path.stat().st_size
         if size > limit:

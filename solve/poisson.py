@@ -14,6 +14,7 @@ from parameterize.volume import BSplineVolume
 
 from .balance import balanced, missing_mean
 from .boundary import boundary_coefficients
+from .contradiction import contradictions
 from .failure import announce, check_solver, check_unknowns, solve_notices
 from .field import SplineField
 from .linear import LinearResult, conjugate_gradients
@@ -162,7 +163,7 @@ def _solve(
     if problem.exact is not None:
         errors = error_norms(volume, space, coefficients, problem.exact_at, threads)
     clock.append(time.process_time())
-    notices = solve_notices(volume, space, system, certified, result)
+    notices = (*contradictions(volume, problem), *solve_notices(volume, space, system, certified, result))
     return solution_of(volume, space, coefficients, result, clock, errors, notices)
 
 

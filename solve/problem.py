@@ -98,13 +98,24 @@ class Poisson:
         """Source f at points given by arrays of equal shape. Raises ExpressionError where it is not finite."""
         if "source" in self._parsed:
             return values("source", self._parsed["source"], x, y, z)
-        exact = self._parsed["exact"]
-        assert isinstance(exact, Expression)
-        value, gradient, hessian = exact.hessian(x, y, z)
+        return self.source_of_exact(x, y, z)
+
+    def source_of_exact(self, x: Array, y: Array, z: Array) -> Array:
+        """-div(kappa grad u) + c u of a formula `exact`. Raises ExpressionError where it is not finite."""
+        value, gradient, hessian = self._exact_derivatives(x, y, z)
         found = -self._divergence(gradient, hessian, x, y, z)
         if self.reaction is not None:
             found += self.reaction_at(x, y, z) * value
         return finite("source (from exact)", found, x, y, z)
+
+    def exact_hessian(self, x: Array, y: Array, z: Array) -> Array:
+        """Second derivatives (6, ...) of a formula `exact`: xx, xy, xz, yy, yz, zz."""
+        return self._exact_derivatives(x, y, z)[2]
+
+    def _exact_derivatives(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+        exact = self._parsed["exact"]
+        assert isinstance(exact, Expression)
+        return exact.hessian(x, y, z)
 
     def residual_at(self, value: Array, gradient: Array, hessian: Array, x: Array, y: Array, z: Array) -> Array:
         """Values (1, ...) of f + div(kappa grad u) - c u from u (1, ...), gradient (1, 3, ...) and Hessian (1, 6, ...).

@@ -72,6 +72,11 @@ def test_advice_knows_the_most_control_points_and_an_overlap():
     assert advice.in_words(overlapping)[0].endswith("(1, 2, 3)")
 
 
+def test_a_surface_that_crosses_itself_is_the_first_suspect():
+    crossing = failed() | {"input": {"self_intersections": {"pairs": 7}}}
+    assert "as 7 pairs of its faces do" in advice.what_to_try(crossing)[0]
+
+
 def test_a_folded_run_ends_with_places_advice_and_a_picture(formula_training, in_folder, capsys):
     formula_training(amplitude=0.4)
     assert main(["parameterize", "cube", "--out", "out"]) == 3

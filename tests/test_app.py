@@ -32,8 +32,8 @@ PATIENCE = 200.0  # seconds; on an idle machine a job takes some 15
 
 
 @pytest.fixture(scope="module")
-def page():
-    """Port of a running page; uploads up to 1 MB."""
+def page(tmp_path_factory):
+    """Port of a running page; uploads up to 1 MB. Its terminal stays silent, whatever it is asked."""
     pytest.importorskip("trame")
     environment = os.environ | {
         "PYTHONPATH": str(Path(iga_nn.__file__).parents[1]),
@@ -41,13 +41,18 @@ def page():
         "TRAME_ARGS": "--host 0.0.0.0",
     }
     command = [sys.executable, "-m", "iga_nn", "app", "--port", "0", "--max-upload", "1", *QUICK]
-    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as server:
+    terminal = tmp_path_factory.mktemp("page") / "stderr"
+    with (
+        terminal.open("w") as stderr,
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=stderr, text=True) as server,
+    ):
         try:
             said = server.stdout.readline()
             yield int(re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\n", said)[1])
         finally:
             server.terminate()
             assert server.wait(timeout=30) == 0
+            assert terminal.read_text() == ""
 
 
 def ask(port, method, path, body=None, **headers):
@@ -184,6 +189,11 @@ def test_other_sites_and_other_computers_are_not_answered(page):
     assert ask(page, "GET", "/ws", Origin="http://example.org", Upgrade="websocket")[0] == 403
     with pytest.raises(ConnectionRefusedError):  # would be answered by a server on 0.0.0.0
         socket.create_connection(("127.0.0.2", page), timeout=5)
+
+
+@pytest.mark.parametrize(("path", "headers"), [("/ws", {}), ("/upload?name=a.obj", {"Content-Length": "-5"})])
+def test_what_is_no_request_is_answered_with_400(path, headers, page):
+    assert ask(page, "POST" if headers else "GET", path, **headers)[0] == 400
 
 
 def test_only_results_are_given_out(page):

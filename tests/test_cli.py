@@ -67,7 +67,7 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
     assert set(report["versions"]) == {"python", "numpy", "scipy", "torch", "iga-nn"}
     out, err = capsys.readouterr()
     assert "certified" in out and "deep/result" in out
-    assert "S(2)" in err and "folded 0  training left 0:01" in err
+    assert "S(2)" in err and "folded 0  left 0:01 + spline" in err
 
 
 def test_json_is_the_verdict_alone(formula_training, in_folder, capsys):
@@ -287,6 +287,9 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["parameterize", "cube", "--corners", "seven.json"], "shape (7, 3)"),
         (["parameterize", "cube", "--corners", "numbers.json"], "vertex numbers"),
         (["parameterize", "cube", "--corners", "same.json"], "same vertex"),
+        (["parameterize", "cube", "--corners", "yes.json"], "eight points"),
+        (["check", ""], "no surface is named"),
+        (["check", "."], "is a directory: name the surface file in it"),
         (["parameterize", "cube", "--max-faces", "10"], "face"),
         (["parameterize", "cube", "--out", "words.txt/deeper"], "cannot be written"),
         (["solve", "poisson", "missing.npz"], "missing.npz"),
@@ -309,6 +312,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, says, in_folder, capsy
     Path("seven.json").write_text(json.dumps([[0, 0, 0]] * 7))
     Path("numbers.json").write_text(json.dumps([99999999] * 8))
     Path("same.json").write_text(json.dumps([[0, 0, 0]] * 8))
+    Path("yes.json").write_text(json.dumps([True] * 8))
     if "--max-faces" in arguments:
         main(["sample", "cube", "--out", "cube.obj"])
         arguments = ["cube.obj" if word == "cube" else word for word in arguments]

@@ -318,6 +318,18 @@ def test_a_volume_from_elsewhere_is_checked_and_solved(in_folder, capsys):
     assert largest(ours.coefficients - foreign.coefficients) < 1e-12
 
 
+def test_a_solution_of_another_volume_with_the_same_knots_is_refused(in_folder, capsys):
+    benchmark_volume(3).save("map.npz")
+    assert main(["solve", "poisson", "map.npz", "--refine", "0", "1", "--quiet"]) == 0
+    benchmark_volume(3).transformed(2.0, (0.0, 0.0, 0.0)).save("other.npz")
+    capsys.readouterr()
+    assert main(["export", "other.npz", "--to", "vtk", "--solution", "map/solution.npz"]) == 2
+    assert "belongs to another volume: the longest edge" in capsys.readouterr().err
+    assert main(["export", "map.npz", "--to", "vtk", "--solution", "map/solution.npz"]) == 0
+    Path("map/report.json").write_text('{"schema": 1, "poisson": {"levels": [{"dofs": 1}]}}')  # nothing to compare with
+    assert main(["export", "other.npz", "--to", "vtk", "--solution", "map/solution.npz"]) == 0
+
+
 def export_ending(to):
     return {"gismo": ".xml", "mfem": ".mesh", "json": ".json"}[to]
 
@@ -413,7 +425,8 @@ def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, 
     [
         (["map.npz", "--to", "step"], "'step': choose one of gismo, mfem, vtk, view, json; IGES and STEP"),
         (["missing.npz", "--to", "vtk"], "missing.npz: no such file"),
-        (["words.txt", "--to", "vtk"], "words.txt"),
+        (["words.txt", "--to", "vtk"], "words.txt: is no volume: `iga-nn run poisson words.txt`"),
+        ([".", "--to", "vtk"], "is a folder: name the volume.npz in it"),
         (["map.npz", "--to", "vtk", "--out", "."], "is a directory"),
         (["map.npz", "--to", "vtk", "--out", "map.vtk"], "vtk files end in .vtu"),
         (["map.npz", "--to", "vtk", "--out", "no/such/map.vtu"], "no folder"),
@@ -421,7 +434,7 @@ def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, 
         (["map.npz", "--to", "json", "--solution", "solution.npz"], "solution.npz: no such file"),
         (["map.npz", "--to", "gismo", "--solution", "raised.npz", "--out", "here.xml"], "here_u.xml: exists; --force"),
         (["map.npz", "--to", "mfem", "--solution", "raised.npz"], "this one has (4, 4, 4)"),
-        (["map.npz", "--to", "vtk", "--solution", "map.npz"], "coefficients"),
+        (["map.npz", "--to", "vtk", "--solution", "map.npz"], "no array named coefficients; it holds control_points,"),
         (["map.npz", "--to", "view", "--solution", "other.npz"], "another volume"),
     ],
 )

@@ -299,7 +299,7 @@ def test_lists_components_and_takes_the_one_asked_for():
     assert len(small.faces) == 80
     assert any("component 1 taken of 2" in line for line in small.notices)
     assert surface_from_arrays(*pair, component=0).center == pytest.approx([5, 0, 0], abs=0.05)
-    with pytest.raises(MeshError, match="no component 2: choose one of 2"):
+    with pytest.raises(MeshError, match="no component 2: counted from 0 there are 2"):
         surface_from_arrays(*pair, component=2)
 
 

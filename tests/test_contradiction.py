@@ -1,0 +1,39 @@
+"""Data beside an exact solution that is not theirs: said, and only then."""
+
+import pytest
+
+from solve import Poisson, benchmark_volume, solve_poisson
+from solve.contradiction import contradictions
+
+VOLUME = benchmark_volume(4)
+TWO_PROBLEMS = "the errors compare the solutions of two problems"
+
+
+@pytest.mark.parametrize(
+    ("data", "notice"),
+    [
+        ({"exact": "x", "source": "y"}, f"source is not that of exact: {TWO_PROBLEMS}"),
+        ({"exact": "x*x", "source": "-2", "kappa": "2"}, f"source is not that of exact: {TWO_PROBLEMS}"),
+        ({"exact": "x*x", "boundary": "3"}, f"boundary differs from exact: {TWO_PROBLEMS}"),
+        ({"exact": "abs(x-0.5)"}, "exact contains abs"),
+    ],
+)
+def test_data_that_contradict_the_exact_solution_are_named(data, notice):
+    notices = solve_poisson(VOLUME, Poisson(**data)).report.notices
+    assert len(notices) == 1
+    assert notices[0].startswith(notice)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"exact": "exp(x)*sin(y)", "source": "0"},  # harmonic: the second derivatives cancel
+        {"exact": "x*x", "source": "-4", "kappa": "2", "boundary": "x*x"},
+        {"exact": "1e9*x*y*z", "source": "0"},
+        {"exact": "x", "boundary": "x+7", "neumann": dict.fromkeys(("u0", "u1", "v0", "v1", "w0", "w1"))},
+        {"exact": lambda x, y, z: x, "source": "1", "boundary": "x"},
+        {"source": "1"},
+    ],
+)
+def test_data_that_agree_are_not_doubted(data):
+    assert contradictions(VOLUME, Poisson(**data)) == ()
