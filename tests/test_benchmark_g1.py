@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import io
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -196,7 +197,7 @@ def test_a_solve_that_does_not_converge_is_a_status(formula, monkeypatch):
 
 
 def test_a_process_that_dies_is_a_row(formula, monkeypatch):
-    monkeypatch.setattr(g1, "_command", lambda *_: [g1.sys.executable, "-c", "import os; os.abort()"])
+    monkeypatch.setattr(g1, "_command", lambda *_: [sys.executable, "-c", "import os; os.abort()"])
     (row,) = g1._results(replace(formula, names=("duck",)))
     assert row == g1.Row("duck", "its process ended with code -6, without a result")
 
@@ -212,3 +213,22 @@ def test_models_run_in_processes_of_their_own(tmp_path):
     assert "pig.obj" in found["pig"]["status"] and found["pig"]["verdict"] == ""
     assert found["duck"]["verdict"] in ("certified", "folded", "undecided") and found["duck"]["threads"] == "1"
     assert float(found["duck"]["seconds"]) > 0.0 and float(found["duck"]["t_cal"]) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, "bench: interrupted after 2 rows; they stay\n"),
+        (OSError(28, "No space left on device", "g1.csv"), 2, "bench: g1.csv: No space left on device\n"),
+    ],
+)
+def test_rows_before_an_interruption_are_kept(error, code, said, capsys):
+    kept = []
+
+    def rows():
+        yield from (1, 2)
+        raise error
+
+    found = g1.processes.collect("bench", rows(), lambda rows: kept.append(list(rows)), str, "they stay")
+    assert found == ([1, 2], code) and kept == [[1], [1, 2]]
+    assert capsys.readouterr() == ("1\n2\n", said)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -97,7 +98,7 @@ def test_finished_rows_are_not_run_again(tmp_path, monkeypatch):
     (tmp_path / "rows").mkdir()
     chosen.row_file(7).write_text(json.dumps(vars(replace(ROW, settings=chosen.settings))))
     chosen.row_file(8).write_text(json.dumps(vars(replace(ROW, number=8, settings="others"))))
-    monkeypatch.setattr(stress, "_command", lambda *_: [stress.sys.executable, "-c", "import os; os.abort()"])
+    monkeypatch.setattr(stress, "_command", lambda *_: [sys.executable, "-c", "import os; os.abort()"])
     done, lost = stress.results(chosen)
     assert done.number == 7 and done.certified
     assert lost.number == 8 and lost.error == "its process ended with code -6, without a result"

@@ -12,10 +12,7 @@ row, which says why; the paper's santa4 is not public, its row waits for santa4.
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import signal
-import sys
 import time
 import traceback
 from collections.abc import Callable, Generator, Sequence
@@ -140,22 +137,12 @@ def main(argv: list[str] | None = None) -> int:
     """Run the models and write the tables; 0 done, 1 a row has a failure, 2 bad arguments, 130 interrupted."""
     options, child = _options(argv)
     if child:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # without a traceback: the parent says what there is to say
-        print(json.dumps(reports.plain(asdict(run_model(child, options)))))
-        return 0
-    rows: list[Row] = []
-    try:
-        with closing(_results(options)) as results:
-            for row in results:
-                rows.append(row)
-                write_tables(rows, options)
-                print(_told(row), flush=True)
-    except KeyboardInterrupt:
-        print(f"g1.py: interrupted; {len(rows)} rows are in {options.out / 'g1.csv'}", file=sys.stderr)
-        return processes.INTERRUPTED
-    except OSError as error:  # the disk is full
-        print(f"g1.py: {one_line(error)}", file=sys.stderr)
-        return processes.BAD_INPUT
+        return processes.answer(lambda: run_model(child, options))
+    remains = f"they are in {options.out / 'g1.csv'}"
+    found = _results(options)
+    rows, failed = processes.collect("g1.py", found, lambda rows: write_tables(rows, options), _told, remains)
+    if failed:
+        return failed
     print(f"{summary(rows)}\n{options.out / 'g1.md'}")
     return int(any(row.status not in (DONE, ABSENT) for row in rows))
 
@@ -228,7 +215,7 @@ def _command(name: str, options: Options) -> list[str]:
         "steps-factor": mapping.steps_factor,
         "control-points": mapping.control_points,
     }
-    return [sys.executable, str(Path(__file__).resolve()), *(f"--{key}={value}" for key, value in values.items())]
+    return processes.script(__file__, values)
 
 
 def _results(options: Options) -> Generator[Row, None, None]:
@@ -435,5 +422,5 @@ def _machine(options: Options) -> str:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # ends the children, too
+    processes.end_children_on_term()
     raise SystemExit(main())

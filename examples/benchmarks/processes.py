@@ -7,15 +7,23 @@ import csv
 import io
 import json
 import os
+import signal
 import subprocess
+import sys
 import time
-from collections.abc import Generator, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any, NoReturn
+from typing import IO, Any, NoReturn, TypeVar
+
+from iga_nn.options import one_line
+from iga_nn.report import plain
 
 BAD_INPUT, INTERRUPTED = 2, 130
 POLL = 0.2  # seconds
+Row = TypeVar("Row")
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -87,6 +95,50 @@ class _Child:
         self.process.kill()
         self.process.wait()
         self.output.close()
+
+
+def script(file: str, options: Mapping[str, Any]) -> list[str]:
+    """The command that runs a script with these options."""
+    return [sys.executable, str(Path(file).resolve()), *(f"--{name}={value}" for name, value in options.items())]
+
+
+def end_children_on_term() -> None:
+    """Leave by an exception where this process is asked to end, so that in_processes ends its children."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+
+
+def answer(find: Callable[[], Any]) -> int:
+    """In a child: print a row, a dataclass, as the last line. Interrupted it is silent, its parent has the say."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    print(json.dumps(plain(asdict(find()))))
+    return 0
+
+
+def collect(
+    prog: str,
+    found: Generator[Row, None, None],
+    keep: Callable[[list[Row]], None],
+    told: Callable[[Row], str],
+    remains: str,
+) -> tuple[list[Row], int]:
+    """Keep all rows so far and tell the new one, as they come; return them with an exit code.
+
+    remains: what an interrupted run leaves. The code is 0, 130 interrupted, 2 where the disk is full.
+    """
+    rows: list[Row] = []
+    try:
+        with closing(found):
+            for row in found:
+                rows.append(row)
+                keep(rows)
+                print(told(row), flush=True)
+    except KeyboardInterrupt:
+        print(f"{prog}: interrupted after {len(rows)} rows; {remains}", file=sys.stderr)
+        return rows, INTERRUPTED
+    except OSError as error:
+        print(f"{prog}: {one_line(error)}", file=sys.stderr)
+        return rows, BAD_INPUT
+    return rows, 0
 
 
 def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> str:

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import signal
-import sys
 import time
 import traceback
 from collections.abc import Generator, Sequence
@@ -103,22 +101,12 @@ def main(argv: list[str] | None = None) -> int:
     """Run the surfaces and write the tables; 0 done, 2 bad arguments, 130 interrupted."""
     options, child = _options(argv)
     if child is not None:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # without a traceback: the parent says what there is to say
-        print(json.dumps(reports.plain(asdict(run_surface(child, options)))))
-        return 0
-    rows: list[Row] = []
-    try:
-        with closing(results(options)) as found:
-            for row in found:
-                rows.append(row)
-                write_tables(rows, options)
-                print(_told(row), flush=True)
-    except KeyboardInterrupt:
-        print(f"stress.py: interrupted; the same command goes on after {len(rows)} surfaces", file=sys.stderr)
-        return processes.INTERRUPTED
-    except OSError as error:  # the disk is full
-        print(f"stress.py: {one_line(error)}", file=sys.stderr)
-        return processes.BAD_INPUT
+        return processes.answer(lambda: run_surface(child, options))
+    remains = "the same command goes on"
+    found = results(options)
+    rows, failed = processes.collect("stress.py", found, lambda rows: write_tables(rows, options), _told, remains)
+    if failed:
+        return failed
     print(f"{summary(rows)}\n{options.out / 'stress.md'}")
     return 0
 
@@ -197,7 +185,7 @@ def _command(number: int, options: Options) -> list[str]:
         "steps-factor": mapping.steps_factor,
         "control-points": mapping.control_points,
     }
-    return [sys.executable, str(Path(__file__).resolve()), *(f"--{key}={value}" for key, value in values.items())]
+    return processes.script(__file__, values)
 
 
 def run_surface(number: int, options: Options) -> Row:
@@ -345,5 +333,5 @@ def _failed_cells(row: Row) -> list[str]:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # ends the children, too
+    processes.end_children_on_term()
     raise SystemExit(main())
