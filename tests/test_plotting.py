@@ -11,7 +11,7 @@ from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.image import imread
 
 import solve
-from iga_nn import octant, plotting, rendering
+from iga_nn import octant, plotting, rendering, sampling
 from iga_nn.cli import main
 from solve.study import benchmark_volume
 
@@ -54,7 +54,7 @@ def test_lines_leave_the_faces_their_colours(tmp_path, drawing):
     volume = benchmark_volume(2)
     plotting.draw_faces(tmp_path / "faces.png", volume)
     plotting.draw_lines(tmp_path / "lines.png", volume)
-    assert all(hue_share(tmp_path / "lines.png", color) > 0.01 for color in plotting.FACE_COLORS)
+    assert all(hue_share(tmp_path / "lines.png", color) > 0.01 for color in sampling.FACE_COLORS)
     faces, lines = (imread(tmp_path / name)[60:, :, :3] for name in ("faces.png", "lines.png"))  # below the titles
     assert 0.02 < np.mean(np.abs(faces - lines).max(axis=-1) > 0.1) < 0.2
 
@@ -104,7 +104,7 @@ def test_study_has_a_curve_a_degree(tmp_path):
     study = {degree: solve.convergence(benchmark_volume(2), problem, (0, 1), degree) for degree in (2, 3)}
     plotting.draw_study(tmp_path / "study.png", study)
     image = imread(tmp_path / "study.png")[..., :3]
-    for color in plotting.FACE_COLORS[:2]:
+    for color in sampling.FACE_COLORS[:2]:
         assert np.count_nonzero(np.abs(image - to_rgb(color)).max(axis=-1) < 0.02) > 100
 
 

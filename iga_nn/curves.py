@@ -1,0 +1,77 @@
+"""Figures of curves: the loss over the steps, the errors over the mesh size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .figure import blank, positive, save
+from .sampling import FACE_COLORS
+from .studies import Study
+
+TERMS = {  # of the loss, as parameterize names them
+    "arap": "ARAP distortion",
+    "bij": "folds",
+    "cor": "distance at corners",
+    "dist": "distance to the target",
+    "edge": "distance along edges",
+    "fair": "curvature",
+    "norm": "normals",
+    "star": "faces seen from inside",
+    "surface": "spline's boundary",
+}
+STAGES = {"S(2)": "round cuboid S(2)", "S(1)": "sharper one S(1)"}  # the others speak for themselves
+
+
+def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
+    """Loss and its unweighted terms over the steps, folded samples below; the stages marked."""
+    terms = [name for name in history if name not in ("stage", "step", "loss", "folded")]
+    steps = np.arange(len(history["loss"]))
+    figure, (upper, lower) = blank(2, 1, (11, 6), sharex=True, height_ratios=(4, 1))
+    for name in terms:
+        upper.plot(steps, positive(history[name]), linewidth=0.8, alpha=0.8, label=TERMS.get(name, name))
+    upper.plot(steps, positive(history["loss"]), color="black", linewidth=1.4, label="loss")
+    upper.set_yscale("log")
+    upper.set_ylim(bottom=max(upper.get_ylim()[0], 1e-8 * float(np.nanmax(history["loss"]))))  # terms start at zero
+    upper.set_ylabel("loss, and its terms without their weights")
+    upper.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    lower.plot(steps, history["folded"], color="firebrick", linewidth=1.0)
+    lower.set_yscale("symlog", linthresh=1.0)
+    lower.set_ylim(bottom=0.0)
+    lower.set_ylabel("folded")
+    lower.set_xlabel("step")
+    stages = history["stage"]
+    for start in np.flatnonzero(np.r_[True, stages[1:] != stages[:-1]]):
+        for axes in (upper, lower):
+            axes.axvline(start, color="grey", linewidth=0.7, linestyle=":")
+        label = {"textcoords": "offset points", "rotation": 35, "fontsize": 9}  # slanted: short stages lie close
+        name = str(stages[start])
+        upper.annotate(STAGES.get(name, name), (start, 1.0), (0, 3), xycoords=upper.get_xaxis_transform(), **label)
+    save(figure, path)
+
+
+def draw_study(path: Path, study: Study) -> None:
+    """L2 and H1 errors over the mesh size, a curve a degree, with the slopes that smooth solutions have."""
+    figure, panels = blank(1, 2, (11, 5))
+    for panel, (title, name, lost) in zip(panels, (("L2", "l2", 0), ("H1 seminorm", "h1_seminorm", 1)), strict=True):
+        for (degree, levels), color in zip(study.items(), FACE_COLORS * 2, strict=False):
+            sizes = np.array([level.report.elements for level in levels]) ** (-1.0 / 3.0)
+            errors = positive(np.array([getattr(level.report, name) for level in levels]))
+            panel.loglog(sizes, errors, "o-", color=color, label=f"degree {degree}")
+            order = degree + 1 - lost
+            reference = 0.6 * errors[-1] * (sizes / sizes[-1]) ** order
+            panel.loglog(sizes, reference, "--", color=color, linewidth=0.8)
+            label = {"textcoords": "offset points", "ha": "center", "color": color, "fontsize": 9}
+            panel.annotate(f"slope {order}", (sizes[-1], reference[-1]), (0, -12), **label)
+        counts = sorted({round(level.report.elements ** (1.0 / 3.0)) for levels in study.values() for level in levels})
+        panel.set_xticks([1.0 / count for count in counts], [f"1/{count}" for count in counts])
+        panel.minorticks_off()
+        panel.set_xlabel("h, the edge of an element in the unit cube")
+        panel.set_title(f"{title} error")
+        panel.grid(alpha=0.3)
+        panel.margins(x=0.12, y=0.08)
+    panels[0].legend(frameon=False)
+    save(figure, path)

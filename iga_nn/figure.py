@@ -1,0 +1,96 @@
+"""What the figures share: matplotlib's blank page, rendered views on it, colours, the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from parameterize.bspline import Array
+from parameterize.files import replacing
+
+from .rendering import Patch, View, draw, widest_view
+from .sampling import FACE_COLORS, MAP, face_labels
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SAMPLES = 141  # a direction and patch
+PANEL = (900, 700)  # pixels of one view
+
+
+def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
+    """A figure of its own, outside pyplot: nothing to close, no window system asked."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=inches, dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    height_ratios = grid.pop("height_ratios", None)
+    return figure, figure.subplots(rows, columns, height_ratios=height_ratios, **grid)
+
+
+def panels_of(rows: int, columns: int) -> tuple[Figure, Any]:
+    """A figure of empty panels for rendered views, axes (rows, columns)."""
+    figure, axes = blank(rows, columns, (4.6 * columns, 3.8 * rows + 0.8), squeeze=False)
+    for panel in axes.flat:
+        panel.set_axis_off()
+    return figure, axes
+
+
+def show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -> None:
+    """The same patches from the front and from behind."""
+    view = view_of(patches)
+    for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
+        panel.imshow(draw(patches, direction, PANEL, marks))
+        panel.set_title(title, fontsize=13)
+
+
+def view_of(patches: list[Patch]) -> View:
+    """From where the patches are widest, a little from above."""
+    return widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
+
+
+def name_faces(figure: Figure) -> None:
+    """The six colours below the panels."""
+    from matplotlib.patches import Patch as Swatch
+
+    swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
+    figure.legend(
+        handles=swatches,
+        loc="outside lower center",
+        ncols=6,
+        frameon=False,
+        fontsize=12,
+        columnspacing=1.2,
+        handlelength=1.4,
+    )
+
+
+def colors(values: Array, norm: Any) -> Array:
+    """Red, green, blue (m, n, 3) of values (m, n)."""
+    from matplotlib import colormaps
+
+    return np.asarray(colormaps[MAP](norm(values)))[..., :3]
+
+
+def color_bar(figure: Figure, panels: Any, norm: Any, title: str) -> None:
+    """One for all the panels, at their right."""
+    from matplotlib.cm import ScalarMappable
+
+    bar = figure.colorbar(ScalarMappable(norm, MAP), ax=panels, shrink=0.85, aspect=28)
+    bar.set_label(title, fontsize=13)
+
+
+def positive(values: NDArray[Any]) -> Array:
+    """What a logarithmic axis can show; the rest is left out."""
+    numbers = np.asarray(values, dtype=np.float64)
+    return np.where(numbers > 0.0, numbers, np.nan)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write it, PNG or PDF by the ending, under a temporary name, then rename it."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary)

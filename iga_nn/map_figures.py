@@ -1,0 +1,116 @@
+"""Figures of a map: faces, parameter lines, cut, distortion, and where it is not proved or meets itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from parameterize.bspline import Array
+from parameterize.injective import Meeting
+from parameterize.volume import BSplineVolume
+
+from .figure import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, view_of
+from .octant import best_cut, face_patches, octant_label, section_patches, without_octant
+from .rendering import Patch, draw, widest_view
+from .sampling import SECTIONS, all_grids, distortion_on, face_grid, face_window, points_on, section_grid
+
+EVERY = 14  # samples between two parameter lines: a tenth of the cube
+DISTORTION = "tanh(√ARAP / 2), scale as given"
+WINDOW = 0.15  # of the cube, to every side of a meeting place
+MEETING_COLORS = ("#4477aa", "#ee6677")
+
+
+def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) -> None:
+    """The images of the six faces of the cube, each in its colour, from the front and from behind.
+
+    marks: points (k, 3) shown as black balls, such as the corners that were given (the paper's Fig. 13).
+    """
+    figure, (panels,) = panels_of(1, 2)
+    show_around(panels, face_patches(volume, SAMPLES), marks)
+    name_faces(figure)
+    figure.suptitle("Images of the six faces of the unit cube", fontsize=14)
+    save(figure, path)
+
+
+def draw_lines(path: Path, volume: BSplineVolume) -> None:
+    """Lines of constant parameters, a tenth apart, on the images of the six faces, from the front and from behind."""
+    figure, (panels,) = panels_of(1, 2)
+    show_around(panels, face_patches(volume, SAMPLES, EVERY))
+    name_faces(figure)
+    figure.suptitle("Lines of constant u, v, w, a tenth apart", fontsize=14)
+    save(figure, path)
+
+
+def draw_cut(path: Path, volume: BSplineVolume) -> None:
+    """The volume without an eighth of the cube (the paper's Fig. 9): parameter lines inside, and the distortion there.
+
+    The eighth and the side it is seen from are those that show most of the cut.
+    """
+    from matplotlib.colors import Normalize
+
+    norm = Normalize(0.0, 1.0)
+    faces = face_patches(volume, SAMPLES, EVERY)
+    octant, view = best_cut([patch.points for patch in faces])
+    named = faces + section_patches(volume, SAMPLES, EVERY)
+    distorted = [
+        replace(patch, colors=colors(distortion_on(volume, grid), norm))
+        for patch, grid in zip(named, all_grids(SAMPLES), strict=True)
+    ]
+    figure, (panels,) = panels_of(1, 2)
+    for panel, patches in zip(panels, (named, distorted), strict=True):
+        panel.imshow(draw(without_octant(patches, octant), view, PANEL))
+    name_faces(figure)
+    color_bar(figure, panels, norm, DISTORTION)
+    figure.suptitle(f"Cut open: the part {octant_label(octant)} is left out", fontsize=14)
+    save(figure, path)
+
+
+def draw_distortion(path: Path, volume: BSplineVolume) -> None:
+    """tanh(sqrt(ARAP) / 2), as the paper colours it, on the images of u = 1/2, v = 1/2 and w = 1/2; units as given."""
+    from matplotlib.colors import Normalize
+
+    norm = Normalize(0.0, 1.0)
+    figure, (panels,) = panels_of(1, 3)
+    for axis, panel in enumerate(panels):
+        grid = section_grid(axis, SAMPLES)
+        points = points_on(volume, grid)
+        patch = Patch(points, colors(distortion_on(volume, grid), norm), lit=False)
+        panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
+        panel.set_title(SECTIONS[axis], fontsize=13)
+    color_bar(figure, panels, norm, DISTORTION)
+    figure.suptitle("Distortion on the mid-sections", fontsize=14)
+    save(figure, path)
+
+
+def draw_folds(path: Path, volume: BSplineVolume, places: Array) -> None:
+    """The boundary as of glass, with black balls at places (k, 3) inside: the spans where det J > 0 is not proved."""
+    figure, (panels,) = panels_of(1, 2)
+    show_around(panels, _glass(volume), places)
+    figure.suptitle(f"det J > 0 is not proved on {len(places)} spans: black balls", fontsize=14)
+    save(figure, path)
+
+
+def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
+    """The place where the boundary meets itself: in the whole, and the two parts that meet there, from two sides."""
+    from matplotlib.colors import to_rgb
+
+    mark = np.array([meeting.point])
+    parts = []
+    for parameter, color in zip(meeting.parameters, MEETING_COLORS, strict=True):
+        points = points_on(volume, face_window(parameter, WINDOW, SAMPLES))
+        parts.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape), opacity=0.7))
+    figure, (panels,) = panels_of(1, 3)
+    glass = _glass(volume)
+    panels[0].imshow(draw(glass, view_of(glass), PANEL, mark))
+    panels[0].set_title("the whole", fontsize=13)
+    show_around(panels[1:], parts, mark)
+    figure.suptitle("The boundary meets itself: black ball; the two parts near it", fontsize=14)
+    save(figure, path)
+
+
+def _glass(volume: BSplineVolume) -> list[Patch]:
+    """The six faces, seen through."""
+    points = [points_on(volume, face_grid(face, SAMPLES)) for face in range(6)]
+    return [Patch(p, np.full(p.shape, 0.6), opacity=0.25) for p in points]
