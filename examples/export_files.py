@@ -1,4 +1,4 @@
-"""Files for ParaView, MFEM and G+Smo, with the solution where the format carries one; the view, cut open.
+"""Files for ParaView, MFEM and G+Smo, with the solution; the view, cut open.
 
 On the command line: `iga-nn export volume.npz --to view --solution solution.npz`. MFEM and G+Smo need the extra
 `interop`: `pip install iga-nn[interop]`.
@@ -23,9 +23,9 @@ def main(volume: str | Path | None = None, out: str | Path = "out/export_files")
         benchmark_volume(5).save(volume)
     solution = iga_nn.solve(iga_nn.load_volume(volume), iga_nn.Poisson(exact="sin(3*x)*sin(3*y)*sin(3*z)"))
     solution.save(folder / "solution.npz")
-    for to, name in {"vtk": "exact_bezier.vtu", "view": "samples_view.vtu", "mfem": "mfem.mesh"}.items():
+    names = {"vtk": "exact_bezier.vtu", "view": "samples_view.vtu", "mfem": "mfem.mesh", "gismo": "gismo.xml"}
+    for to, name in names.items():
         print(iga_nn.export(volume, to, folder / name, solution=folder / "solution.npz", force=True))
-    print(iga_nn.export(volume, "gismo", folder / "gismo.xml", force=True))
     if can_draw():
         draw_cut(folder / "samples_view.vtu", folder / "cut.png")
     return folder / "cut.png"

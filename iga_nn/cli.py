@@ -122,7 +122,7 @@ def solve_poisson(
     under --neumann or --robin.
 
     Args:
-        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
         device: where the linear system is solved.
     """
     with console.progress_line(output.quiet):
@@ -155,7 +155,7 @@ def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = 
     Results go to STEM-study in the current folder, unless --out names another.
 
     Args:
-        volume: a file written by `iga-nn parameterize` or `iga-nn run`.
+        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
     with console.progress_line(output.quiet):
         outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force, vector=output.vector)
@@ -191,6 +191,8 @@ def check(
     """
     as_volume = is_volume(path)
     if as_volume:
+        if component is not None or max_faces != MAX_FACES or decimate or strict:
+            raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")
         verdict = pipeline.check_volume(path)
     else:
         verdict = pipeline.check_surface(path, component, max_faces, decimate, strict)
@@ -200,8 +202,8 @@ def check(
         if not as_volume:
             _say("accepted")
         _say("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
-    injective = not as_volume or (verdict["bijective"] == "certified" and verdict["boundary_injective"] is not False)
-    return DONE if injective else NOT_CERTIFIED
+    accepted = not as_volume or reports.is_certified({"parameterization": verdict})
+    return DONE if accepted else NOT_CERTIFIED
 
 
 @app.command(name="sample")

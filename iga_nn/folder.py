@@ -20,7 +20,7 @@ CHECKPOINT = "checkpoint"
 MAP_DATA, MAP_PICTURES = ("volume.npz", "boundary.npz", "history.npz"), ("faces", "lines", "cut", "distortion")
 MAP_FILES = (*MAP_DATA, "history.png", "history.pdf", *(f"{name}.png" for name in MAP_PICTURES))
 DEFECT_FILES = ("folds.png", "meeting.png")
-SOLUTION_FILES = ("solution.npz", "convergence.png", "convergence.pdf", "error.png")
+SOLUTION_FILES = ("solution.npz", "convergence.png", "convergence.pdf", "error.png", "named_faces.png")
 STUDY_FILES = ("study.csv", "study.png", "study.pdf")
 
 

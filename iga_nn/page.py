@@ -27,7 +27,11 @@ MAP_FIGURES = {
     "distortion.png": "Distortion",
     "history.png": "Loss history",
 }
-SOLUTION_FIGURES = {"convergence.png": "Errors over the mesh size", "error.png": "Error"}
+SOLUTION_FIGURES = {
+    "named_faces.png": "The faces by their names",
+    "convergence.png": "Errors over the mesh size",
+    "error.png": "Error",
+}
 FIGURES = {  # by the section of the report they belong to
     "config": MAP_FIGURES,
     "poisson": SOLUTION_FIGURES,

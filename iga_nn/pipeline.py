@@ -41,7 +41,7 @@ def run(
     vector: bool = False,
     progress: ProgressCallback | None = None,
 ) -> Outcome:
-    """From a surface to a solved problem, all files of design in `out` (default: the input's stem).
+    """From a surface to a solved problem, all files of the README's table in `out` (default: the input's stem).
 
     mesh: path of a closed surface, or a sample's or model's name.
     vector: write the plots of curves as PDF, too.
@@ -99,7 +99,7 @@ def solve_to(
 
     device: where Poisson's linear system is solved, "cpu" or "cuda".
     """
-    from solve import Poisson, check_device, check_problem
+    from solve import check_device, check_problem
 
     options = problem or PoissonOptions()
     equation = options.problem()
@@ -108,8 +108,7 @@ def solve_to(
     _check_size(loaded, options)
     with input_errors():
         check_problem(loaded, equation)
-        if isinstance(equation, Poisson):
-            check_device(device, equation)
+        check_device(device, equation)
     with open_folder(path, out, force, vector=vector) as (state, _):
         state.begin(*SOLUTION_FILES)
         elsewhere = {"device": device} if device != "cpu" else {}

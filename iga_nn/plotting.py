@@ -1,4 +1,4 @@
-"""The figures of an output folder. All values are those of the spline itself, sampled here: VTK only draws them."""
+"""The figures of an output folder. All values are those of the spline itself, sampled: VTK only draws them."""
 
 from __future__ import annotations
 
@@ -102,6 +102,6 @@ def draw_levels(folder: Path, name: str, study: Study, endings: Sequence[str] = 
 
 
 def draw_face_names(folder: Path, volume: BSplineVolume) -> None:
-    """Write faces.png, where VTK can draw."""
+    """Write named_faces.png, where VTK can draw."""
     if can_draw():
-        draw_faces(folder / "faces.png", volume)
+        draw_faces(folder / "named_faces.png", volume)

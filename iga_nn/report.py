@@ -6,7 +6,8 @@ import json
 import math
 import platform
 from collections.abc import Mapping
-from importlib.metadata import version
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,12 @@ Report = dict[str, Any]
 
 
 def versions() -> dict[str, str]:
-    """Versions of what decides the numbers."""
-    packages = {name: version(name) for name in ("numpy", "scipy", "torch")}
-    return {"python": platform.python_version(), **packages, "iga-nn": __version__}
+    """Versions of what decides the numbers, as far as it is installed: a saved volume is solved without torch."""
+    found = {"python": platform.python_version()}
+    for name in ("numpy", "scipy", "torch"):
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found | {"iga-nn": __version__}
 
 
 def plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What a report says of a saved volume: the certificate, the boundary, where it is not proved and what to try."""
+"""What a report says of a volume: the certificate, the boundary, where it is not proved and what to try."""
 
 from __future__ import annotations
 

@@ -8,12 +8,11 @@ looked at again. (Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinea
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .bezier import split
 from .bspline import Array
@@ -33,7 +32,6 @@ class Certificate:
     mean_det: integral of det J over the cube, which is the signed volume, in the volume's own units.
     witness: the parameters of a point where det J is negative; None unless folded.
     unproved: (k, 3) span numbers (i, j, l) on which det J was not proved positive.
-    seconds: wall time.
     """
 
     verdict: Literal["certified", "folded", "undecided"]
@@ -41,7 +39,6 @@ class Certificate:
     mean_det: float
     witness: tuple[float, float, float] | None
     unproved: Indices
-    seconds: float
 
 
 def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
@@ -51,7 +48,6 @@ def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
     """
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
-    start = time.perf_counter()
     form = DeterminantForm(volume)
     bounds, corners, means = form.survey()
     search = _Search(form, max_depth, float(corners.min()))
@@ -71,23 +67,7 @@ def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
         mean_det=float(np.ldexp(mean, form.exponent)),
         witness=search.witness(volume),
         unproved=form.numbers(failed),
-        seconds=time.perf_counter() - start,
     )
-
-
-def bernstein_coefficients(volume: BSplineVolume, spans: ArrayLike) -> Array:
-    """Bernstein coefficients of det J on the spans (k, 3): (k, d_u, d_v, d_w) with d = 3 * degree a direction."""
-    return coefficients_and_errors(volume, spans)[0]
-
-
-def coefficients_and_errors(volume: BSplineVolume, spans: ArrayLike) -> tuple[Array, Array]:
-    """The same, and for every span (k,) a bound of the rounding error in its coefficients."""
-    form = DeterminantForm(volume)
-    rows = np.asarray(spans, dtype=np.int64)
-    if rows.ndim != 2 or rows.shape[1] != 3 or np.any(rows < 0) or np.any(rows >= np.array(form.n_spans)):
-        raise ValueError(f"spans must be numbers of shape (k, 3) below {form.n_spans}")
-    values, permanents = form.coefficients(rows)
-    return np.ldexp(np.moveaxis(values, -1, 0), form.exponent), np.ldexp(form.errors(permanents), form.exponent)
 
 
 @dataclass(frozen=True)

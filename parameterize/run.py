@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .boundary import BoundaryMap
 from .bspline import Array, open_uniform_knots
-from .certificate import Certificate
+from .certificate import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .corners import PathError, choose_corners
@@ -49,7 +49,8 @@ class Parameterization:
     """What `parameterize` returns; lengths in the user's units.
 
     volume: F. boundary: every surface vertex with its parameter. certificate, quality: what is proved and measured.
-    history: columns of equal length, one row a step. seconds: wall seconds of train, fit, optimize and certify.
+    history: columns of equal length, one row a step. seconds: wall seconds of train, fit, optimize and certify, the
+    last with quality, at the end: the certificates on the way count as optimize.
     """
 
     volume: BSplineVolume
@@ -118,10 +119,9 @@ def parameterize(
     with _timed(seconds, "optimize"):
         volume, boundary = _in_users_units(found, surface, task, fit)
     with _timed(seconds, "certify"):
-        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, found.certificate)
-    return Parameterization(
-        volume, boundary, found.certificate, quality, history.arrays(), seconds, place.type, seed, config
-    )
+        certificate = certify(volume)  # of the volume in the user's units: bringing it there rounds
+        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, certificate)
+    return Parameterization(volume, boundary, certificate, quality, history.arrays(), seconds, place.type, seed, config)
 
 
 def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config, int]:

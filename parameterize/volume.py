@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,40 @@ from .files import load_arrays, save_arrays
 AXES = "uvw"
 FACE_NAMES = ("u0", "u1", "v0", "v1", "w0", "w1")
 LARGEST = 1e100  # coordinate: determinants of larger ones leave double precision
+
+Knots = tuple[Array, Array, Array]
+
+
+def checked_knots(degrees: Sequence[int], knots: Sequence[ArrayLike], counts: Sequence[int], what: str) -> Knots:
+    """The three knot vectors of as many functions a direction, as float arrays.
+
+    Raises ValueError where one is not open from 0 to 1, or does not fit its degree and count.
+    """
+    checked = []
+    for axis, degree, row, n in zip(AXES, degrees, knots, counts, strict=True):
+        values = check_knots(row, int(degree))
+        if len(values) != n + degree + 1:
+            raise ValueError(f"direction {axis}: {n} {what} of degree {degree} need {n + degree + 1} knots")
+        if values[0] != 0.0 or values[-1] != 1.0:
+            raise ValueError(f"direction {axis}: knots must run from 0 to 1, got {values[0]} to {values[-1]}")
+        checked.append(values)
+    u, v, w = checked
+    return u, v, w
+
+
+def save_spline(path: str | Path, degrees: Sequence[int], knots: Sequence[Array], **content: Array) -> None:
+    """Write an .npz of degrees, knots_u, knots_v, knots_w and the named content; atomic."""
+    named = {f"knots_{a}": k for a, k in zip(AXES, knots, strict=True)}
+    save_arrays(path, degrees=np.array(degrees), **named, **content)
+
+
+def load_spline(path: str | Path, content: str) -> tuple[tuple[int, int, int], Knots, Array]:
+    """Degrees, knots and the array of that name. Raises FileNotFoundError, ValueError for another file."""
+    data = load_arrays(path, ("degrees", "knots_u", "knots_v", "knots_w", content))
+    if data["degrees"].shape != (3,) or data["degrees"].dtype.kind not in "iu":
+        raise ValueError(f"{path}: degrees must be three integers")
+    p_u, p_v, p_w = data["degrees"].tolist()
+    return (p_u, p_v, p_w), (data["knots_u"], data["knots_v"], data["knots_w"]), data[content]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,16 +86,9 @@ class BSplineVolume:
             raise ValueError("control_points must be finite")
         if np.abs(points).max(initial=0.0) > LARGEST:
             raise ValueError(f"control_points must not exceed {LARGEST:g} in magnitude; choose other units")
-        checked = []
-        for axis, degree, knots, n in zip(AXES, self.degrees, self.knots, points.shape, strict=False):
-            values = check_knots(knots, int(degree))
-            if len(values) != n + degree + 1:
-                raise ValueError(f"direction {axis}: {n} control points of degree {degree} need {n + degree + 1} knots")
-            if values[0] != 0.0 or values[-1] != 1.0:
-                raise ValueError(f"direction {axis}: knots must run from 0 to 1, got {values[0]} to {values[-1]}")
-            checked.append(values)
+        knots = checked_knots(self.degrees, self.knots, points.shape[:3], "control points")
         object.__setattr__(self, "degrees", tuple(int(p) for p in self.degrees))
-        object.__setattr__(self, "knots", tuple(checked))
+        object.__setattr__(self, "knots", knots)
         object.__setattr__(self, "control_points", points)
 
     @classmethod
@@ -124,18 +152,14 @@ class BSplineVolume:
         return BSplineVolume(self.degrees, self.knots, scale * self.control_points + np.asarray(offset))
 
     def save(self, path: str | Path) -> None:
-        """Write volume.npz (design: degrees, knots_u, knots_v, knots_w, control_points); atomic."""
-        named = {f"knots_{a}": k for a, k in zip(AXES, self.knots, strict=True)}
-        save_arrays(path, degrees=np.array(self.degrees), **named, control_points=self.control_points)
+        """Write volume.npz (degrees, knots_u, knots_v, knots_w, control_points); atomic."""
+        save_spline(path, self.degrees, self.knots, control_points=self.control_points)
 
     @classmethod
     def load(cls, path: str | Path) -> BSplineVolume:
         """Read volume.npz. Raises FileNotFoundError, or ValueError naming what is wrong with the file."""
-        data = load_arrays(path, ("degrees", "knots_u", "knots_v", "knots_w", "control_points"))
-        degrees = data["degrees"]
-        if degrees.shape != (3,) or degrees.dtype.kind not in "iu":
-            raise ValueError(f"{path}: degrees must be three integers")
+        degrees, knots, points = load_spline(path, "control_points")
         try:
-            return cls(tuple(degrees.tolist()), tuple(data[f"knots_{a}"] for a in AXES), data["control_points"])  # type: ignore[arg-type]
+            return cls(degrees, knots, points)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: {error}") from None

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.bspline import Array, check_knots, evaluate_at, evaluate_grid
-from parameterize.files import load_arrays, save_arrays
-from parameterize.volume import AXES
+from parameterize.bspline import Array, evaluate_at, evaluate_grid
+from parameterize.volume import checked_knots, load_spline, save_spline
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +31,7 @@ class SplineField:
             raise ValueError(
                 "a field has three degrees, three knot vectors, coefficients (m_u, m_v, m_w) or with (, 3)"
             )
-        for axis, degree, knots, n in zip(AXES, self.degrees, self.knots, shape[:3], strict=True):
-            if len(check_knots(knots, degree)) != n + degree + 1:
-                raise ValueError(f"direction {axis}: {n} coefficients of degree {degree} need {n + degree + 1} knots")
+        object.__setattr__(self, "knots", checked_knots(self.degrees, self.knots, shape[:3], "coefficients"))
 
     def __call__(self, points: ArrayLike) -> Array:
         """Values (m,) or (m, 3) at parameters (m, 3)."""
@@ -46,8 +43,7 @@ class SplineField:
 
     def save(self, path: str | Path) -> None:
         """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients); atomic."""
-        named = {f"knots_{a}": k for a, k in zip(AXES, self.knots, strict=True)}
-        save_arrays(path, degrees=np.array(self.degrees), **named, coefficients=self.coefficients)
+        save_spline(path, self.degrees, self.knots, coefficients=self.coefficients)
 
     @staticmethod
     def load(path: str | Path) -> SplineField:
@@ -55,14 +51,10 @@ class SplineField:
 
         Raises FileNotFoundError, or ValueError naming what is wrong with the file.
         """
-        data = load_arrays(path, ("degrees", "knots_u", "knots_v", "knots_w", "coefficients"))
-        if data["degrees"].shape != (3,) or data["degrees"].dtype.kind not in "iu":
-            raise ValueError(f"{path}: degrees must be three integers")
-        if data["coefficients"].dtype.kind != "f" or not np.all(np.isfinite(data["coefficients"])):
+        degrees, knots, coefficients = load_spline(path, "coefficients")
+        if coefficients.dtype.kind != "f" or not np.all(np.isfinite(coefficients)):
             raise ValueError(f"{path}: coefficients must be finite numbers")
-        p_u, p_v, p_w = data["degrees"].tolist()
-        knots = (data["knots_u"], data["knots_v"], data["knots_w"])
         try:
-            return SplineField((p_u, p_v, p_w), knots, data["coefficients"])
+            return SplineField(degrees, knots, coefficients)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: {error}") from None

@@ -61,30 +61,6 @@ def contract_uv(
 
 
 @compiled
-def spread_uv(fields: Array, first_u: int, u: Array, first_v: Index, v: Array, planes: Array, result: Array) -> None:
-    """Transpose of `contract_uv`: adds fields (3, n_w, q_v) to result (n_u, n_v, n_w)."""
-    _, n_v, n_w = planes.shape
-    planes[:] = 0.0
-    rows = np.empty((3, n_w))
-    row, row_u, row_v = rows[0], rows[1], rows[2]
-    for q in range(v.shape[1]):
-        for k in range(n_w):
-            row[k], row_u[k], row_v[k] = fields[0, k, q], fields[1, k, q], fields[2, k, q]
-        for j in range(v.shape[2]):
-            value, slope = v[0, q, j], v[1, q, j]
-            plane, plane_u = planes[0, first_v[q] + j], planes[1, first_v[q] + j]
-            for k in range(n_w):
-                plane[k] += value * row[k] + slope * row_v[k]
-                plane_u[k] += value * row_u[k]
-    for i in range(u.shape[1]):
-        value, slope = u[0, i], u[1, i]
-        for j in range(n_v):
-            target, plane, plane_u = result[first_u + i, j], planes[0, j], planes[1, j]
-            for k in range(n_w):
-                target[k] += value * plane[k] + slope * plane_u[k]
-
-
-@compiled
 def evaluate_plane(
     coefficients: Array, first_u: int, u: Array, first_v: Index, v: Array, first_w: Index, w: Array, out: Array
 ) -> None:

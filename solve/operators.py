@@ -113,16 +113,11 @@ class Operator:
             in_parallel(add, pieces, self.threads)
         return result
 
-    def mean_coefficients(self) -> tuple[float, float, float]:
-        """The averages over the cube of G_uu, G_vv and G_ww."""
-        return self._mean(0), self._mean(3), self._mean(5)
-
     def mean_mass(self) -> float:
         """The average over the cube of c det J."""
-        return self._mean(6) if self.factors.shape[3] == 7 else 0.0
-
-    def _mean(self, index: int) -> float:
-        return float(sum(plane[:, :, index].sum() for plane in self.factors))
+        if self.factors.shape[3] < 7:
+            return 0.0
+        return float(sum(plane[:, :, 6].sum() for plane in self.factors))
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,15 +212,6 @@ def from_blocks(blocks: Array, q_v: int) -> Array:
     """The plane (q_w, q_v) that `to_blocks` has cut, in memory of its own."""
     plane = blocks.transpose(1, 0, 2).reshape(blocks.shape[1], -1)
     return np.ascontiguousarray(plane[:, :q_v])
-
-
-def _tensor(values: Array) -> Array:
-    """A symmetric tensor (6, q_w, q_v) at the points of a plane, from itself or from a scalar (q_w, q_v)."""
-    if values.ndim == 3:
-        return np.ascontiguousarray(values)
-    tensor = np.zeros((6, *values.shape))
-    tensor[[0, 3, 5]] = values
-    return tensor
 
 
 def _count_folded(measure: Array, rule: GaussRule, q: int) -> int:

@@ -15,6 +15,7 @@ from parameterize.volume import BSplineVolume
 from .balance import balanced, missing_mean
 from .boundary import boundary_coefficients
 from .contradiction import contradictions
+from .elastic_problem import Elasticity
 from .failure import announce, check_solver, check_unknowns, solve_notices
 from .field import SplineField
 from .linear import LinearResult, conjugate_gradients
@@ -108,11 +109,13 @@ def _assemble(volume: BSplineVolume, space: TrialSpace, problem: Poisson, rule: 
     )
 
 
-def check_device(device: str, problem: Poisson) -> None:
+def check_device(device: str, problem: Poisson | Elasticity) -> None:
     """Raise ValueError for a device that is unknown or absent, or that cannot solve the problem."""
     if device not in DEVICES:
         raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
     if device != "cpu":
+        if isinstance(problem, Elasticity):
+            raise ValueError(f"device {device!r} does not know elasticity; use device='cpu'")
         if problem.robin:
             raise ValueError(f"device {device!r} does not know Robin faces; use device='cpu'")
         from .cuda import check_available  # torch comes in here only

@@ -37,7 +37,7 @@ def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
         "arap": 0.3 * np.exp(-0.05 * steps),
         "cor": np.where(steps < 30, np.nan, 1e-3),
     }
-    seconds = {"train": 1.0, "fit": 0.5, "optimize": 0.5, "certify": certificate.seconds}
+    seconds = {"train": 1.0, "fit": 0.5, "optimize": 0.5, "certify": 0.1}
     return Parameterization(
         volume=volume,
         boundary=boundary,

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 import torch
+from bernstein import bernstein_coefficients
 
 from parameterize.barrier import SpanBarrier, edge_spans
 from parameterize.bspline import greville, open_uniform_knots
-from parameterize.certificate import bernstein_coefficients
 from parameterize.volume import BSplineVolume
 
 CPU = torch.device("cpu")

@@ -70,7 +70,7 @@ def test_end_to_end(surface, undisturbed):
     assert np.array_equal(result.boundary.vertices[:n], surface.vertices)
     gaps = np.linalg.norm(result.volume(result.boundary.parameters[:n]) - surface.vertices, axis=1)
     assert np.sqrt((gaps**2).mean()) < 0.1  # of a body two units wide
-    assert result.certificate.mean_det == pytest.approx(surface.volume * surface.scale**3, rel=0.1)
+    assert result.certificate.mean_det == pytest.approx(surface.volume, rel=0.1)
     assert result.device == "cpu" and result.seed == 3 and result.config == tiny_config()
     assert set(result.seconds) == {"train", "fit", "optimize", "certify"}
     assert isinstance(result.boundary, BoundaryMap) and len(result.boundary.cube_faces) == len(result.boundary.faces)
