@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.bspline import Array, breakpoints
+from parameterize.arrays import Array
+from parameterize.bspline import breakpoints
 from parameterize.certificate import Certificate
 from parameterize.volume import BSplineVolume
 

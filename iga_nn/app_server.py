@@ -17,7 +17,7 @@ from typing import Any
 from aiohttp import ClientError, http_exceptions, web
 from trame.app import get_server
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.mesh import Surface
 
 from . import job_process

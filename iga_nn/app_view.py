@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.mesh import Surface
 
 from .folder import has_checkpoint

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.files import replacing
 
 from .rendering import Patch, View, draw, widest_view

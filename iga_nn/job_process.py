@@ -18,7 +18,7 @@ from pathlib import Path
 from threading import Event
 from typing import Literal
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.mesh import MeshError
 from parameterize.progress import Progress
 from solve.expressions import ExpressionError

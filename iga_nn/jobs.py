@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event, Lock
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.mesh import MeshError, Surface
 from parameterize.progress import Progress
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.injective import Meeting
 from parameterize.volume import BSplineVolume
 

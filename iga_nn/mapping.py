@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.files import save_arrays
 
 from . import advice
@@ -91,7 +91,7 @@ def map_surface(
 
 def _check_data(equation: Poisson, surface: Surface) -> None:
     """What can be known of the data before there are points inside: their values on the surface."""
-    from parameterize.surface_fit import vertex_normals
+    from parameterize.surface_measures import vertex_normals
 
     x, y, z = surface.vertices.T
     for evaluate in (equation.boundary_at, equation.source_at, equation.kappa_at, equation.reaction_at):

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import AXES, BSplineVolume
 
 from .rendering import Patch, View, widest_view

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 
 log = logging.getLogger(__name__)
 

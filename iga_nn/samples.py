@@ -6,14 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from parameterize.arrays import Array, IntArray
 from parameterize.files import save_text
 from parameterize.mesh import Surface, surface_from_arrays
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 SAMPLES = {

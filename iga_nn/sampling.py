@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.quality import arap
 from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
 

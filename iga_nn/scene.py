@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import BSplineVolume
 
 from .rendering import widest_view

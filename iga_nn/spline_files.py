@@ -25,7 +25,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.bspline import Array, apply_along, insert_knots
+from parameterize.arrays import Array
+from parameterize.bspline import apply_along, insert_knots
 from parameterize.volume import BSplineVolume
 
 from .options import InputError, one_line

@@ -24,8 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from parameterize.arrays import Array
 from parameterize.bezier import elevation, extraction
-from parameterize.bspline import Array, apply_along, breakpoints, insert_knots
+from parameterize.bspline import apply_along, breakpoints, insert_knots
 from parameterize.quality import arap
 from parameterize.volume import BSplineVolume
 

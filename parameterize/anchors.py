@@ -14,7 +14,8 @@ from itertools import product
 import numpy as np
 from torch import Tensor
 
-from .bspline import Array, breakpoints
+from .arrays import Array
+from .bspline import breakpoints
 from .distances import nearest_on_mesh
 from .layout import sides
 from .surface_fit import SurfaceFit

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from torch import Tensor
 
+from .arrays import Array
 from .bezier import extraction
-from .bspline import Array, basis_derivatives, breakpoints
+from .bspline import basis_derivatives, breakpoints
 from .conjugate import Operator
 from .rotation import cofactor
 from .tensor_grid import to_torch

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from .bspline import Array
+from .arrays import Array
 
 
 def extraction(knots: Array, degree: int) -> tuple[NDArray[np.int64], Array]:

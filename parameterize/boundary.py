@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .bspline import Array, real_array
+from .arrays import Array
+from .bspline import real_array
 from .files import load_arrays, save_arrays
 from .volume import FACE_NAMES
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from .bspline import Array
-
-Pairs = NDArray[np.int64]
+from .arrays import Array, IntArray
 
 
-def overlapping_boxes(low: Array, high: Array) -> Pairs:
+def overlapping_boxes(low: Array, high: Array) -> IntArray:
     """All pairs (k, 2) of closed boxes low, high (n, 3) that share a point; i != j, each pair once."""
     if len(low) == 0:
         return np.empty((0, 2), dtype=np.int64)
@@ -26,7 +23,7 @@ def overlapping_boxes(low: Array, high: Array) -> Pairs:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _sweep(low: Array, high: Array, out: Pairs) -> int:
+def _sweep(low: Array, high: Array, out: IntArray) -> int:
     """Write overlapping pairs into `out` as far as it reaches; return how many there are.
 
     `low` is sorted by its first column.

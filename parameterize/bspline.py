@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array, identity
 
-Array = NDArray[np.float64]
+from .arrays import Array
 
 
 def open_uniform_knots(n_control_points: int, degree: int) -> Array:

@@ -14,9 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, IntArray
 from .bezier import split
-from .bspline import Array
-from .determinant import CHUNK, DeterminantForm, Indices, corners_of
+from .determinant import CHUNK, DeterminantForm, corners_of
 from .volume import BSplineVolume
 
 _PIECES = 64  # pieces at a time
@@ -38,7 +38,7 @@ class Certificate:
     lower_bound: float
     mean_det: float
     witness: tuple[float, float, float] | None
-    unproved: Indices
+    unproved: IntArray
 
 
 def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
@@ -75,8 +75,8 @@ class _Pieces:
     """Parts of spans, all cut equally often: their edges are 2**-depth of their spans' edges."""
 
     depth: int
-    spans: Indices  # (k,) flat span numbers
-    origins: Indices  # (k, 3) place inside the span, in edges of the piece
+    spans: IntArray  # (k,) flat span numbers
+    origins: IntArray  # (k, 3) place inside the span, in edges of the piece
     values: Array  # (k, d_u, d_v, d_w)
     permanents: Array  # (k,)
 
@@ -111,9 +111,9 @@ class _Search:
         self.unproved = np.zeros(form.span_count, dtype=bool)
         self.closed = np.zeros(form.span_count, dtype=bool)  # folded or given up: not to be looked at further
         self.deepest = 0.0  # det J at the worst fold
-        self.worst_piece: tuple[int, int, Indices, Indices] | None = None  # depth, span, origin (3,), corner (3,)
+        self.worst_piece: tuple[int, int, IntArray, IntArray] | None = None  # depth, span, origin (3,), corner (3,)
 
-    def examine(self, spans: Indices) -> None:
+    def examine(self, spans: IntArray) -> None:
         """Look at whole spans (k,), flat numbers, until each is proved, folded or given up."""
         values, permanents = self.form.coefficients(self.form.numbers(spans))
         whole = np.ascontiguousarray(np.moveaxis(values, -1, 0))

@@ -9,8 +9,9 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from .bspline import Array
-from .cutting import CutMesh, IntArray, cut_along_rays, mesh_edges
+from .arrays import Array, IntArray
+from .cutting import CutMesh, cut_along_rays
+from .edges import directed_edges, edge_table
 
 CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)  # (8, 3), (0,0,0) ... (1,1,1)
 EDGES = [(i, j) for i in range(8) for j in range(i + 1, 8) if np.abs(CORNERS[i] - CORNERS[j]).sum() == 1.0]
@@ -80,7 +81,7 @@ def _trace_in_order(
     position: Array, faces: IntArray, corners: IntArray, order: list[int]
 ) -> tuple[dict[int, IntArray], int | None]:
     """Shortest paths, made dear away from the cube edge they stand for; and the first edge that found no way."""
-    edges = mesh_edges(faces)
+    edges = edge_table(faces)[0]
     length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
     radial = 0.5 + (position - 0.5) / (2.0 * np.abs(position - 0.5).max(axis=1, keepdims=True))
     free = np.ones(len(position), dtype=bool)
@@ -116,7 +117,7 @@ def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntAr
     on_path = {
         tuple(sorted(pair)) for path in paths for pair in zip(path[:-1].tolist(), path[1:].tolist(), strict=True)
     }
-    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    sides = np.sort(directed_edges(faces), axis=1)
     order = np.lexsort(sides.T)
     pairs, owners = sides[order][::2], order.reshape(-1, 2) // 3  # closed mesh: every edge has two triangles
     open_sides = np.array([tuple(p) not in on_path for p in pairs.tolist()])
@@ -140,7 +141,7 @@ def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntAr
 
 def _mirrored(faces: IntArray, labels: IntArray, path: IntArray) -> bool:
     """Whether the face to the left of the path from corner (0,0,0) to (0,0,1), seen from outside, is not u0."""
-    sides = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    sides = directed_edges(faces)
     left = np.flatnonzero((sides == path[:2]).all(axis=1))[0] // 3
     return bool(labels[left] != 0)
 

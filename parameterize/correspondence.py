@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from .arrays import Array, IntArray
 from .boundary import BoundaryMap
-from .bspline import Array
-from .cutting import CutMesh, IntArray, cut_along_rays
+from .cutting import CutMesh, cut_along_rays
 from .layout import snap, untangle
 from .volume import BSplineVolume
 

@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .bspline import Array
+from .arrays import Array, IntArray
+from .edges import edge_table
 
-IntArray = NDArray[np.int64]
 _PLANES = [(a, b, sign) for a, b in ((0, 1), (0, 2), (1, 2)) for sign in (1.0, -1.0)]
 
 
@@ -64,25 +63,13 @@ def cut_along_rays(mapped: Array, faces: IntArray, snap: float) -> CutMesh:
 def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tuple[Array, IntArray]:
     """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface the same."""
     while True:
-        edges = mesh_edges(faces)
+        edges = edge_table(faces)[0]
         ends = vertices[edges]
         long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > longest
         if not long.any():
             return vertices, faces
         faces = split_edges(faces, edges[long], len(vertices))
         vertices = np.concatenate([vertices, ends[long].mean(axis=1)])
-
-
-def mesh_edges(faces: IntArray) -> IntArray:
-    """Every edge of the triangles once, smaller vertex first: (k, 2)."""
-    return edge_uses(faces)[0]
-
-
-def edge_uses(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Every edge once, smaller vertex first (k, 2), and how many triangles have it (k,)."""
-    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    keys, count = np.unique(sides[:, 0] * (int(faces.max()) + 1) + sides[:, 1], return_counts=True)  # quicker than rows
-    return np.stack(np.divmod(keys, int(faces.max()) + 1), axis=1), count
 
 
 def _crossings(

@@ -7,13 +7,11 @@ product rule for Bernstein polynomials: of degree 3 p - 1 a direction. No interp
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array, IntArray
 from .bezier import add_products, binomials, extraction
-from .bspline import Array, breakpoints
+from .bspline import breakpoints
 from .volume import BSplineVolume
-
-Indices = NDArray[np.int64]
 
 CHUNK = 256  # spans at a time: a few MB, near the cache
 
@@ -36,7 +34,7 @@ class DeterminantForm:
         points, self.exponent = _to_unit_magnitude(np.moveaxis(volume.control_points, -1, 0))
         self.exponent *= 3
         self.nets: list[Array] = []  # for each derivative: (3, N_0, N_1, N_2)
-        self.bases: list[list[tuple[Indices, Array]]] = []  # for each derivative and direction: first, weights
+        self.bases: list[list[tuple[IntArray, Array]]] = []  # for each derivative and direction: first, weights
         for b in range(3):
             net, exponent = _to_unit_magnitude(_differences(points, volume.knots[b], self.degrees[b], b))
             self.exponent += exponent
@@ -45,7 +43,7 @@ class DeterminantForm:
         weights = [1.0 / binomials(3 * p - 1) for p in self.degrees]
         self.unscale = np.einsum("i,j,k->ijk", *weights)[..., None]  # (d_u, d_v, d_w, 1)
 
-    def numbers(self, flat: Indices) -> Indices:
+    def numbers(self, flat: IntArray) -> IntArray:
         """Flat span numbers (k,) as rows (i, j, l): (k, 3)."""
         return np.stack(np.unravel_index(flat, self.n_spans), axis=-1).astype(np.int64)
 
@@ -67,7 +65,7 @@ class DeterminantForm:
             means[chunk] = values.mean(axis=(0, 1, 2))
         return bounds, corners, means
 
-    def coefficients(self, spans: Indices) -> tuple[Array, Array]:
+    def coefficients(self, spans: IntArray) -> tuple[Array, Array]:
         """Bernstein coefficients on spans (k, 3): (d_u, d_v, d_w, k); and the permanents (k,) that bound them."""
         local, sizes = zip(*(self._derivative(b, spans) for b in range(3)), strict=True)
         f_u, f_v, f_w = local  # (3, n_0, n_1, n_2, k) each, scaled Bernstein form
@@ -90,7 +88,7 @@ class DeterminantForm:
         """
         return _gamma(self.roundings + depth * sum(3 * p for p in self.degrees)) * permanents + _UNDERFLOW
 
-    def _derivative(self, b: int, spans: Indices) -> tuple[Array, Array]:
+    def _derivative(self, b: int, spans: IntArray) -> tuple[Array, Array]:
         """The b-th derivative on spans (k, 3): scaled Bernstein form (3, n_0, n_1, n_2, k), magnitudes (3, k)."""
         (first_u, to_u), (first_v, to_v), (first_w, to_w) = self.bases[b]
         row, column, layer = spans.T
@@ -132,7 +130,7 @@ def _differences(points: Array, knots: Array, degree: int, axis: int) -> Array:
     return net
 
 
-def _scaled_extraction(knots: Array, degree: int, derivative: bool) -> tuple[Indices, Array]:
+def _scaled_extraction(knots: Array, degree: int, derivative: bool) -> tuple[IntArray, Array]:
     """Extraction to scaled Bernstein form for the basis, or for the basis of its derivative."""
     lowered = int(derivative)
     first, weights = extraction(knots[lowered : len(knots) - lowered], degree - lowered)

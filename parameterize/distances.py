@@ -8,7 +8,8 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from .bspline import Array
+from .arrays import Array
+from .surface_measures import doubled_areas
 from .volume import BSplineVolume
 
 SAMPLES = 160  # a direction and cube face
@@ -73,7 +74,7 @@ def nearest_on_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) ->
     """The nearest point of a triangle mesh to each point (m, 3), and the normal of its triangle, of length 1."""
     _, triangle, weights = _closest(points, vertices, faces)
     corners = vertices[faces[triangle]]  # (m, 3, 3)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = doubled_areas(vertices, faces[triangle])
     normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     return np.einsum("mk,mka->ma", weights, corners), normals
 

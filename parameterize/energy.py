@@ -12,11 +12,10 @@ import torch
 from torch import Tensor
 
 from .anchors import EdgeAnchors
+from .arrays import Array, IntArray
 from .barrier import SpanBarrier
-from .bspline import Array
 from .config import SplineConfig
 from .conjugate import Operator, conjugate_gradients
-from .cutting import IntArray
 from .rotation import closest_rotation, cofactor, cross, least_eigenvalue
 from .surface_fit import SurfaceFit
 from .tensor_grid import FastDiagonalization, SmoothnessOperator, gauss_grid, grams

@@ -14,9 +14,8 @@ import torch
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from .bspline import Array
+from .arrays import Array, IntArray
 from .conjugate import Operator
-from .cutting import IntArray
 from .rotation import cross
 from .tensor_grid import to_torch
 

@@ -7,7 +7,8 @@ import torch
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from .bspline import Array, basis_derivatives
+from .arrays import Array
+from .bspline import basis_derivatives
 from .conjugate import conjugate_gradients
 from .tensor_grid import FastDiagonalization, SmoothnessOperator, grams, to_torch
 

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .boxes import Pairs, overlapping_boxes
-from .bspline import Array, breakpoints
+from .arrays import Array, IntArray
+from .boxes import overlapping_boxes
+from .bspline import breakpoints
 from .patch_pieces import TANGENTS, Pieces, as_rows, boundary_pieces, contact, halved
 from .patch_proofs import settled
 from .volume import BSplineVolume
@@ -94,7 +95,7 @@ def _rounding(volume: BSplineVolume, max_depth: int) -> float:
     return 1.01 * roundings * 2.0**-53 * float(np.abs(volume.control_points).max())
 
 
-def _search(volume: BSplineVolume, pieces: Pieces, pairs: Pairs) -> Meeting | None:
+def _search(volume: BSplineVolume, pieces: Pieces, pairs: IntArray) -> Meeting | None:
     """A common point of two pieces that do not touch in the cube, by Newton's method from the middle of some pairs."""
     some = pairs[:: 1 + len(pairs) // _MOST_PAIRS[0]]
     touching, _ = contact(pieces, some[:, 0], some[:, 1])

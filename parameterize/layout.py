@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from .bspline import Array
-from .cutting import IntArray
+from .arrays import Array, IntArray
 
 NEAR_EDGE = 1e-5  # places closer than this to an edge of the cube are put on it: no slivers from later cuts
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped

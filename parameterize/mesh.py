@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import Array, IntArray
 from .mesh_check import check_genus, check_manifold, check_volume, choose_component, slivers
 from .mesh_clean import orient, signed_volume, weld_and_drop
-from .mesh_common import Array, IntArray, MeshError
+from .mesh_common import MeshError
 from .mesh_cross import SHOWN, crossing_faces, crossing_places, describe_crossings
 from .mesh_headers import check_face_count
 from .mesh_place import deepest_point

@@ -12,8 +12,10 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from .mesh_clean import components, edge_table, signed_volume
-from .mesh_common import Array, IntArray, MeshError
+from .arrays import Array, IntArray
+from .edges import edge_table
+from .mesh_clean import components, signed_volume
+from .mesh_common import MeshError
 
 Where = Callable[[int], str]
 LEAST_VOLUME = 1e-12  # of the cube over the box's longest side

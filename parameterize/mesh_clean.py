@@ -9,23 +9,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from .mesh_common import Array, IntArray
+from .arrays import Array, IntArray
+from .edges import directed_edges, edge_table
 
 WELD_TOLERANCE = 1e-7  # of the box's longest side: what single precision cannot tell apart
 FLAT = 1e-14  # twice a face's area over its longest edge squared, below which it counts as degenerate
-
-
-def edge_table(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Undirected edges (e, 2), sorted, and the number of faces at each (e,)."""
-    pairs = np.sort(directed_edges(faces), axis=1)
-    base = int(faces.max()) + 1 if len(faces) else 1
-    keys, counts = np.unique(pairs[:, 0] * base + pairs[:, 1], return_counts=True)
-    return np.stack([keys // base, keys % base], axis=1), counts
-
-
-def directed_edges(faces: IntArray) -> IntArray:
-    """Edges (3 m, 2) in the direction of each face; edge k of face i is row 3 i + k."""
-    return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
 def is_closed(faces: IntArray) -> bool:

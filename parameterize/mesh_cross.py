@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from igl.predicates import find_self_intersections
 
-from .mesh_common import Array, IntArray
+from .arrays import Array, IntArray
 
 SHOWN = 5  # pairs that the summary lists
 

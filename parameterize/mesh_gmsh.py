@@ -9,7 +9,8 @@ import re
 
 import numpy as np
 
-from .mesh_common import IntArray, MeshError
+from .arrays import IntArray
+from .mesh_common import MeshError
 
 NUMBERS_PER_NODE = 100  # the highest node number, over the number of nodes
 NUMBERS_AT_LEAST = 10_000_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import igl
 import numpy as np
 
-from .mesh_common import Array, IntArray
+from .arrays import Array, IntArray
 
 CELLS = 16  # along the box's longest side, to start with
 TOLERANCE = 1e-3  # of the depth

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .mesh_common import Array, IntArray, MeshError
+from .arrays import Array, IntArray
+from .mesh_common import MeshError
 
 MAX_CORNERS = 256
 

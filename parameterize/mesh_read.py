@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .mesh_common import Array, IntArray, MeshError
+from .arrays import Array, IntArray
+from .mesh_common import MeshError
 from .mesh_gmsh import trim_gmsh
 from .mesh_headers import DAMAGED, check_header, plain_ply
 from .mesh_obj import trim_obj

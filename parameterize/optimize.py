@@ -22,8 +22,8 @@ from .certificate import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import SplineConfig
 from .energy import Knots, SplineEnergy
+from .history import History
 from .progress import Progress, ProgressCallback, ignore
-from .stages import History
 from .surface_fit import SurfaceFit
 from .volume import BSplineVolume
 

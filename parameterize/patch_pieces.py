@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, IntArray
 from .bezier import elevation, extraction, halving
-from .boxes import Pairs
-from .bspline import Array, breakpoints
+from .bspline import breakpoints
 from .volume import BSplineVolume
 
 Mask = NDArray[np.bool_]
@@ -64,7 +64,7 @@ def _face_pieces(
     return np.full(len(place), axis, dtype=np.int64), low, nets
 
 
-def halved(pieces: Pieces, pairs: Pairs) -> tuple[Pieces, Pairs]:
+def halved(pieces: Pieces, pairs: IntArray) -> tuple[Pieces, IntArray]:
     """The pieces that are left as four each, and the pairs of those."""
     used, compact = np.unique(pairs, return_inverse=True)
     q = pieces.nets.shape[1] - 1
@@ -88,7 +88,7 @@ def halved(pieces: Pieces, pairs: Pairs) -> tuple[Pieces, Pairs]:
     )
 
 
-def _children(pairs: Pairs, places: NDArray[np.int64]) -> Pairs:
+def _children(pairs: IntArray, places: NDArray[np.int64]) -> IntArray:
     """Pairs (k, 2) of pieces, and which of the four of each: (k * len(places), 2)."""
     return (4 * pairs[:, None] + places).reshape(-1, 2)
 

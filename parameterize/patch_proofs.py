@@ -15,15 +15,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .boxes import Pairs
-from .bspline import Array
+from .arrays import Array, IntArray
 from .patch_pieces import TANGENTS, Mask, Pieces, as_rows, contact
 
 _CHUNK = 4096  # pairs at a time
 _PLANES = 64  # steps towards a separating plane
 
 
-def settled(pieces: Pieces, pairs: Pairs, error: float) -> Mask:
+def settled(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
     """For each pair (k, 2): is it proved that the two meet only where they are joined."""
     done = np.zeros(len(pairs), dtype=bool)
     for start in range(0, len(pairs), _CHUNK):

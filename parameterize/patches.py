@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, eye_array
 from scipy.sparse.linalg import splu
 
-from .bspline import Array
+from .arrays import Array, IntArray
 from .corners import cut_surface, edge_targets
-from .cutting import IntArray, edge_uses, split_edges
+from .cutting import split_edges
+from .edges import edge_table
 
 _FLAT = 1e-12  # area of a triangle on the square that counts as turned over
 _TINY = 1e-12
@@ -56,7 +57,7 @@ def lay_out(mapped: Array, vertices: Array, faces: IntArray, corners: IntArray) 
 
 def _bridges(patch: IntArray, fixed: NDArray[np.bool_]) -> IntArray:
     """Inner edges (k, 2) between two vertices of the rim: a triangle of such edges could end up flat."""
-    edges, count = edge_uses(patch)
+    edges, count = edge_table(patch)
     return edges[(count == 2) & fixed[edges].all(axis=1)]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from .bspline import Array
+from .arrays import Array
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import Array
 from .boundary import BoundaryMap
-from .bspline import Array, gauss_points
+from .bspline import gauss_points
 from .certificate import Certificate
 from .distances import SAMPLES, Distances, SampledBoundary, to_boundary, to_mesh
 from .injective import BoundaryCheck, check_boundary

@@ -15,15 +15,17 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import Array, IntArray
 from .boundary import BoundaryMap
-from .bspline import Array, open_uniform_knots
+from .bspline import open_uniform_knots
 from .certificate import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .corners import PathError, choose_corners
 from .correspondence import boundary_map
-from .cutting import IntArray, subdivide_long_edges
+from .cutting import subdivide_long_edges
 from .fit import fit_pairs
+from .history import History
 from .layout import flipped, sides, untangle
 from .mesh import Surface
 from .network import InverseMap
@@ -32,8 +34,9 @@ from .patches import Layout, lay_out
 from .progress import ProgressCallback, ignore
 from .quality import QualityReport, measure
 from .sample import interior_points
-from .stages import History, Trainer, map_points
-from .surface_fit import SurfaceFit, vertex_quadrics, vertex_weights
+from .stages import Trainer, map_points
+from .surface_fit import SurfaceFit
+from .surface_measures import vertex_quadrics, vertex_weights
 from .targets import nearest_on_cube
 from .volume import BSplineVolume
 

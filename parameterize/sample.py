@@ -10,7 +10,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from .bspline import Array
+from .arrays import Array
+from .surface_measures import doubled_areas
 
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
 OFFSETS = (
@@ -88,8 +89,7 @@ class TriangleSampler:
     """Draws triangles with probability proportional to area; all of them where `count` covers the mesh."""
 
     def __init__(self, vertices: Array, faces: NDArray[np.int64], count: int, device: torch.device) -> None:
-        corners = vertices[faces]
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        area = np.linalg.norm(doubled_areas(vertices, faces), axis=1)
         self._cumulative = torch.as_tensor(np.cumsum(area / area.sum()))
         self._count = min(count, len(faces))
         self._device = device

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from . import losses
-from .bspline import Array
+from .arrays import Array, IntArray
 from .checkpoint import Checkpoints
 from .config import Config, StageConfig
 from .corners import CORNERS, CubeSurface, PathError, choose_corners, cut_surface, edge_targets
-from .cutting import IntArray
+from .history import History
 from .network import InverseMap
 from .progress import Progress, ProgressCallback, ignore
 from .sample import Stencils, TriangleSampler, gather, interior_points, stencils
@@ -42,30 +42,6 @@ class BoundarySamples:
     path: Tensor | None = None  # (k,) vertices on the edge paths
     path_target: Tensor | None = None  # (k, 3)
     path_following: Tensor | None = None  # (s, 2)
-
-
-@dataclass
-class History:
-    """Loss, folded samples and unweighted terms of every step, over all stages."""
-
-    rows: list[tuple[str, int, float, int, dict[str, float]]] = field(default_factory=list)
-
-    def add(self, stage: str, step: int, loss: float, folded: int, terms: dict[str, float]) -> None:
-        """Append a row."""
-        self.rows.append((stage, step, loss, folded, terms))
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Columns of equal length; NaN where a term is not used."""
-        names = sorted({name for row in self.rows for name in row[4]})
-        columns: dict[str, np.ndarray] = {
-            "stage": np.array([row[0] for row in self.rows]),
-            "step": np.array([row[1] for row in self.rows]),
-            "loss": np.array([row[2] for row in self.rows]),
-            "folded": np.array([row[3] for row in self.rows]),
-        }
-        for name in names:
-            columns[name] = np.array([row[4].get(name, math.nan) for row in self.rows])
-        return columns
 
 
 @dataclass

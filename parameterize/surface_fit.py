@@ -9,6 +9,8 @@ network's correspondence; letting them slide lowers boundary error and distortio
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -16,11 +18,12 @@ from scipy.ndimage import binary_dilation
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from .bspline import Array, basis_derivatives, breakpoints
+from .arrays import Array, IntArray
+from .bspline import basis_derivatives, breakpoints
 from .conjugate import Operator
-from .cutting import IntArray
 from .facing import FacingPenalty, facing_penalty
 from .layout import new_flips, sides, untangle
+from .surface_measures import vertex_normals
 from .tensor_grid import to_torch
 
 _HALVINGS = 3
@@ -60,7 +63,7 @@ class SurfaceFit:
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
         """Take these parameters (N, 3) on these cube faces (N,)."""
         self.parameters, self.cube_faces = parameters, cube_faces
-        indices, values, _, _ = self._rows(derivatives=False)
+        indices, values = self._values()
         count = int(np.prod([len(k) - self.degree - 1 for k in self.knots]))
         starts = np.arange(0, indices.size + 1, indices.shape[1])
         rows = csr_array((values.ravel(), indices.ravel(), starts), shape=(len(values), count))
@@ -110,7 +113,7 @@ class SurfaceFit:
 
     def watch_facing(self, control: Tensor, floor: float) -> None:
         """Penalise from now on where F's boundary, at the present parameters, hardly faces the way the mesh does."""
-        rows = self._rows(derivatives=True)
+        rows = self._slopes()
         indices, _, d_a, d_b = rows
         _, ta, tb = _contracted(rows, control)
         normals = np.where(self.cube_faces % 2 == 1, 1.0, -1.0)[:, None] * self._normals
@@ -146,7 +149,7 @@ class SurfaceFit:
         that would end up farther away stay where they are; with `keep_layout` steps that would turn a triangle are
         shortened.
         """
-        values, ta, tb = _contracted(self._rows(derivatives=True), control)
+        values, ta, tb = _contracted(self._slopes(), control)
         residual = values - self.points
         step = -_solve_2x2(ta, tb, residual)
         step *= np.minimum(1.0, max_step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
@@ -191,8 +194,8 @@ class SurfaceFit:
     def _apply_transposed(self, dual: Tensor, like: Tensor) -> Tensor:
         return (self._transposed @ dual).T.reshape(like.shape)
 
-    def _rows(self, derivatives: bool) -> tuple[IntArray, Array, Array, Array]:
-        """Control point numbers (N, k) and weights of F and its two derivatives within the face, k = (p + 1)^2."""
+    def _window(self) -> _Window:
+        """The functions that are not zero at the points."""
         tables = [basis_derivatives(k, self.degree, self.parameters[:, d], 1) for d, k in enumerate(self.knots)]
         first = np.stack([t[0] for t in tables])  # (3, N)
         values = np.stack([t[1] for t in tables])  # (3, 2, N, p + 1)
@@ -206,14 +209,30 @@ class SurfaceFit:
         along_a = (first[a, rows][:, None] + window) * stride[a][:, None]
         along_b = (first[b, rows][:, None] + window) * stride[b][:, None]
         indices = base[:, None, None] + along_a[:, :, None] + along_b[:, None, :]
-        va, vb = values[a, 0, rows], values[b, 0, rows]
-        flat = (len(rows), -1)
-        plain = (va[:, :, None] * vb[:, None, :]).reshape(flat)
-        if not derivatives:
-            return indices.reshape(flat), plain, plain, plain
-        d_a = (values[a, 1, rows][:, :, None] * vb[:, None, :]).reshape(flat)
-        d_b = (va[:, :, None] * values[b, 1, rows][:, None, :]).reshape(flat)
-        return indices.reshape(flat), plain, d_a, d_b
+        return _Window(indices.reshape(len(rows), -1), values[a, :, rows], values[b, :, rows])
+
+    def _values(self) -> tuple[IntArray, Array]:
+        """Control point numbers (N, k) and weights of F, k = (p + 1)^2."""
+        window = self._window()
+        return window.indices, window.weights(0, 0)
+
+    def _slopes(self) -> tuple[IntArray, Array, Array, Array]:
+        """Control point numbers (N, k) and weights of F and of its two derivatives within the face."""
+        window = self._window()
+        return window.indices, window.weights(0, 0), window.weights(1, 0), window.weights(0, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Window:
+    """indices (N, k) of control points; in_a, in_b (N, 2, p + 1): values and derivatives in the face's directions."""
+
+    indices: IntArray
+    in_a: Array
+    in_b: Array
+
+    def weights(self, a: int, b: int) -> Array:
+        """Of the derivative of order a and b: (N, k)."""
+        return (self.in_a[:, a, :, None] * self.in_b[:, b, None, :]).reshape(len(self.indices), -1)
 
 
 def _contracted(rows: tuple[IntArray, Array, Array, Array], control: Tensor) -> tuple[Array, Array, Array]:
@@ -254,39 +273,3 @@ def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, Int
     parameters[crossed, old_axis] = inwards
     cube_faces[crossed] = 2 * axis[crossed] + (parameters[crossed, axis[crossed]] > 0.5)
     return np.clip(parameters, 0.0, 1.0), cube_faces
-
-
-def vertex_normals(vertices: Array, faces: IntArray) -> Array:
-    """Area-weighted mean of the normals of the triangles at each vertex, of length 1 (n, 3)."""
-    corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = np.zeros((len(vertices), 3))
-    for k in range(3):
-        np.add.at(sums, faces[:, k], cross)
-    return sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
-
-
-def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float) -> Array:
-    """Area-weighted mean of n n^T over the triangles at each vertex, plus `tangential` times the identity (n, 3, 3)."""
-    corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(cross, axis=1)
-    normal = cross / np.maximum(area, 1e-300)[:, None]
-    share = area[:, None, None] * normal[:, :, None] * normal[:, None, :]
-    sums, total = np.zeros((len(vertices), 3, 3)), np.zeros(len(vertices))
-    for k in range(3):
-        np.add.at(sums, faces[:, k], share)
-        np.add.at(total, faces[:, k], area)
-    return sums / np.maximum(total, 1e-300)[:, None, None] + tangential * np.eye(3)
-
-
-def vertex_weights(vertices: Array, faces: IntArray, own: int) -> Array:
-    """Half by count, half by area: the report counts vertices, the surface is made of area; sums to 1 (n,).
-
-    own: how many vertices count, the first ones; those that a subdivision added do not.
-    """
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    share = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
-    counted = np.arange(len(vertices)) < own
-    return np.asarray(0.5 * counted / own + 0.5 * share / share.sum())

@@ -14,7 +14,8 @@ import torch
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from .bspline import Array, collocation, gauss_points
+from .arrays import Array
+from .bspline import collocation, gauss_points
 
 _END_SPANS = 1
 

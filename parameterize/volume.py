@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .arrays import Array
 from .bspline import (
-    Array,
     apply_along,
     check_knots,
     evaluate_at,

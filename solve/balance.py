@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import BSplineVolume
 
 from .planes import PlaneField, map_planes

@@ -11,7 +11,8 @@ from itertools import product
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from parameterize.bspline import Array, apply_along, collocation, gauss_points
+from parameterize.arrays import Array
+from parameterize.bspline import apply_along, collocation, gauss_points
 from parameterize.volume import FACE_NAMES, BSplineVolume
 
 from .operators import ScalarFunction

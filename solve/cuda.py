@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 
 from .linear import LinearResult, conjugate_gradients
 from .operators import Operator

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import FACE_NAMES
 
 from .expressions import Expression, ExpressionError

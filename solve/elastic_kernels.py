@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array, IntArray
 
-from .kernels import Index, compiled
+from .kernels import compiled
 
 
 @compiled
@@ -35,7 +35,7 @@ def plane_stress(fields: Array, factors: Array, lam: float, mu: float) -> None:
 
 @compiled
 def spread_plane(
-    field: Array, first_u: int, u: Array, first_v: Index, v: Array, first_w: Index, w: Array, result: Array
+    field: Array, first_u: int, u: Array, first_v: IntArray, v: Array, first_w: IntArray, w: Array, result: Array
 ) -> None:
     """Transpose of `kernels.evaluate_plane` for the gradient: adds field (4, q_w, q_v), its first entry left out.
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import BSplineVolume
 
 from . import elastic_kernels, kernels

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import BSplineVolume
 
 from .boundary import boundary_coefficients

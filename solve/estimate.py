@@ -15,7 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
-from parameterize.bspline import Array, apply_along, breakpoints, collocation
+from parameterize.arrays import Array
+from parameterize.bspline import apply_along, breakpoints, collocation
 from parameterize.volume import BSplineVolume
 
 from .expressions import PAIRS

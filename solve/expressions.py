@@ -13,9 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from parameterize.arrays import Array
+
 Number = float | Array  # constants stay NumPy scalars (a kind of float): products with 0.0 and 1.0 are then free
 Numbers = tuple[Number, ...]
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six second derivatives

@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.quality import scaled_jacobian
 from parameterize.volume import AXES, BSplineVolume
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.bspline import Array, evaluate_at, evaluate_grid
+from parameterize.arrays import Array
+from parameterize.bspline import evaluate_at, evaluate_grid
 from parameterize.volume import checked_knots, load_spline, save_spline
 
 

@@ -12,11 +12,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array, IntArray
 
-Index = NDArray[np.int64]
 LANES = 32  # points of direction v in a block of factors
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -30,7 +28,7 @@ def compiled(function: Kernel) -> Kernel:
 
 @compiled
 def contract_uv(
-    coefficients: Array, first_u: int, u: Array, first_v: Index, v: Array, planes: Array, out: Array
+    coefficients: Array, first_u: int, u: Array, first_v: IntArray, v: Array, planes: Array, out: Array
 ) -> None:
     """Contract directions u and v: out (3, n_w, q_v) = value, u derivative, v derivative.
 
@@ -62,7 +60,7 @@ def contract_uv(
 
 @compiled
 def evaluate_plane(
-    coefficients: Array, first_u: int, u: Array, first_v: Index, v: Array, first_w: Index, w: Array, out: Array
+    coefficients: Array, first_u: int, u: Array, first_v: IntArray, v: Array, first_w: IntArray, w: Array, out: Array
 ) -> None:
     """A spline and its parametric gradient on a plane: out (4, q_w, q_v) = value, d/du, d/dv, d/dw."""
     _, n_v, n_w = coefficients.shape
@@ -82,7 +80,7 @@ def evaluate_plane(
 
 
 @compiled
-def integrate_plane(field: Array, first_v: Index, v: Array, first_w: Index, w: Array, out: Array) -> None:
+def integrate_plane(field: Array, first_v: IntArray, v: Array, first_w: IntArray, w: Array, out: Array) -> None:
     """Integrate field (q_w, q_v), weights included, against products of functions: out (n_v, n_w).
 
     v: (q_v, degree_v + 1) and w: (q_w, degree_w + 1) hold the functions' values.

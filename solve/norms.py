@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import BSplineVolume
 
 from . import kernels

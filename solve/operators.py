@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import FACE_NAMES, BSplineVolume
 
 from . import kernels, product

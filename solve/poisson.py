@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import BSplineVolume
 
 from .balance import balanced, missing_mean

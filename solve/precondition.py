@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from parameterize.bspline import Array, breakpoints
+from parameterize.arrays import Array
+from parameterize.bspline import breakpoints
 from parameterize.volume import FACE_NAMES
 
 from .operators import Operator, from_blocks

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import FACE_NAMES
 
 from .data import Data, Parsed, check_faces, demand, finite, parse, values

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array, IntArray
 
-from .kernels import LANES, Index, compiled
+from .kernels import LANES, compiled
 
 ROWS = 16
 Sizes = tuple[int, ...]  # only its length counts
@@ -49,12 +49,12 @@ def unpack(packed: Array, start_u: int, start_v: int, start_w: int, values: Arra
 @compiled
 def multiply_layers(
     packed: Array,
-    layers: Index,
-    first_u: Index,
+    layers: IntArray,
+    first_u: IntArray,
     u: Array,
-    first_v: Index,
+    first_v: IntArray,
     v: Array,
-    first_w: Index,
+    first_w: IntArray,
     w: Array,
     counts_v: Sizes,
     order_v: Sizes,
@@ -123,7 +123,7 @@ def _gather_from_two(planes: Array, value: float, slope: float, target: Array) -
 
 @compiled
 def _contract_v(
-    planes: Array, w_blocks: int, first_v: Index, v: Array, counts: Sizes, order: Sizes, rows: Array, lines: Array
+    planes: Array, w_blocks: int, first_v: IntArray, v: Array, counts: Sizes, order: Sizes, rows: Array, lines: Array
 ) -> None:
     n_w, size = lines.shape[1], planes.shape[1] // w_blocks
     for block in range(w_blocks):
@@ -161,7 +161,7 @@ def _contract_span(plane: Array, plane_u: Array, table: Array, counts: Sizes, or
 
 @compiled
 def _spread_v(
-    sums: Array, w_blocks: int, first_v: Index, v: Array, counts: Sizes, order: Sizes, rows: Array, planes: Array
+    sums: Array, w_blocks: int, first_v: IntArray, v: Array, counts: Sizes, order: Sizes, rows: Array, planes: Array
 ) -> None:
     n_w, size = sums.shape[1], planes.shape[1] // w_blocks
     for block in range(w_blocks):
@@ -199,7 +199,7 @@ def _spread_span(rows: Array, table: Array, counts: Sizes, order: Sizes, plane: 
 def _line_product(
     lines: Array,
     factors: Array,
-    first_w: Index,
+    first_w: IntArray,
     w: Array,
     counts: Sizes,
     order: Sizes,

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from parameterize.bspline import Array, basis_derivatives, breakpoints, gauss_points
+from parameterize.arrays import Array
+from parameterize.bspline import basis_derivatives, breakpoints, gauss_points
 
 from .space import TrialSpace
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.volume import BSplineVolume
 
 from .estimate import Problem, error_estimate

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from parameterize.bspline import Array, apply_along, breakpoints, insert_knots, midpoints
+from parameterize.arrays import Array
+from parameterize.bspline import apply_along, breakpoints, insert_knots, midpoints
 from parameterize.volume import BSplineVolume
 
 

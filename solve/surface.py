@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from parameterize.bspline import Array, apply_along, collocation, gauss_points
+from parameterize.arrays import Array
+from parameterize.bspline import apply_along, collocation, gauss_points
 from parameterize.volume import FACE_NAMES, BSplineVolume
 
 from .operators import Operator

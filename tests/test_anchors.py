@@ -7,7 +7,8 @@ from parameterize.anchors import EdgeAnchors, edge_points
 from parameterize.bspline import greville, open_uniform_knots
 from parameterize.corners import CORNERS
 from parameterize.layout import sides, snap
-from parameterize.surface_fit import SurfaceFit, vertex_quadrics, vertex_weights
+from parameterize.surface_fit import SurfaceFit
+from parameterize.surface_measures import vertex_quadrics, vertex_weights
 
 KNOTS = (open_uniform_knots(6, 3),) * 3  # three spans a direction
 TANGENTIAL = 1e-3

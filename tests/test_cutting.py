@@ -3,7 +3,8 @@ import pytest
 from scipy.spatial import ConvexHull
 from shapes import area, ball, enclosed_volume, is_closed, turned
 
-from parameterize.cutting import cut_along_rays, mesh_edges, split_edges, subdivide_long_edges
+from parameterize.cutting import cut_along_rays, split_edges, subdivide_long_edges
+from parameterize.edges import edge_table
 
 
 def surrounding(seed):
@@ -79,7 +80,7 @@ def test_no_edge_stays_too_long():
     points, faces = ball(60)
     longest = 0.15
     finer, triangles = subdivide_long_edges(points, faces, longest)
-    ends = finer[mesh_edges(triangles)]
+    ends = finer[edge_table(triangles)[0]]
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max() <= longest
     assert np.array_equal(finer[:60], points)
     assert is_closed(triangles)
@@ -95,4 +96,4 @@ def test_short_edges_are_left_alone():
 
 def test_edges_of_a_tetrahedron():
     faces = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
-    assert mesh_edges(faces).tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+    assert edge_table(faces)[0].tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]

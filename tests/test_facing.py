@@ -4,7 +4,8 @@ import torch
 
 from parameterize.bspline import greville, open_uniform_knots
 from parameterize.facing import facing_penalty
-from parameterize.surface_fit import SurfaceFit, vertex_normals
+from parameterize.surface_fit import SurfaceFit
+from parameterize.surface_measures import vertex_normals
 
 CPU = torch.device("cpu")
 FLOOR = 0.3

@@ -10,10 +10,11 @@ from parameterize.certificate import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
 from parameterize.energy import Distortion, SplineEnergy
+from parameterize.history import History
 from parameterize.optimize import optimize
 from parameterize.quality import arap
-from parameterize.stages import History
-from parameterize.surface_fit import SurfaceFit, vertex_quadrics, vertex_weights
+from parameterize.surface_fit import SurfaceFit
+from parameterize.surface_measures import vertex_quadrics, vertex_weights
 from parameterize.volume import BSplineVolume
 
 CPU = torch.device("cpu")

@@ -6,7 +6,8 @@ from shapes import ball, rounded_cube
 from iga_nn.samples import sample
 from parameterize.bspline import greville, open_uniform_knots
 from parameterize.layout import flipped, snap
-from parameterize.surface_fit import SurfaceFit, fold_over_edges, vertex_quadrics, vertex_weights
+from parameterize.surface_fit import SurfaceFit, fold_over_edges
+from parameterize.surface_measures import vertex_quadrics, vertex_weights
 from parameterize.targets import nearest_on_cube
 from parameterize.volume import BSplineVolume
 

@@ -31,7 +31,7 @@ from iga_nn.machine import calibrate, processor
 from iga_nn.options import InputError, MapOptions, one_line
 from iga_nn.rendering import can_draw, widest_view
 from iga_nn.samples import write_obj
-from parameterize.bspline import Array
+from parameterize.arrays import Array
 from parameterize.files import replacing, save_text
 from parameterize.mesh import Surface
 
