@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, in_brackets
 from parameterize.bspline import breakpoints
 from parameterize.certificate import Certificate
 from parameterize.volume import BSplineVolume
@@ -78,9 +78,8 @@ def in_words(report: Report) -> list[str]:
     """The places and the remedies, one a line; none for a certified map."""
     quality, lines = report["parameterization"], []
     if found := quality.get("unproved"):
-        places = ", ".join("({:.6g}, {:.6g}, {:.6g})".format(*place) for place in found["places"])
+        places = ", ".join(map(in_brackets, found["places"]))
         lines.append(f"not proved       on {found['spans']} spans, near {places}")
     if meeting := quality.get("boundary_meeting"):
-        place = "({:.6g}, {:.6g}, {:.6g})".format(*meeting["point"])
-        lines.append(f"meets itself     at {place}")
+        lines.append(f"meets itself     at {in_brackets(meeting['point'])}")
     return lines + [f"try              {remedy}" for remedy in report.get("advice", [])]

@@ -7,6 +7,7 @@ import logging
 from pathlib import Path
 from typing import Any
 
+from parameterize.arrays import in_brackets
 from parameterize.volume import BSplineVolume
 
 from . import advice
@@ -55,7 +56,7 @@ def tell(state: RunFolder, options: MapOptions | None = None) -> None:
     quality = state.report["parameterization"]
     log.info("certificate: %s", quality["bijective"])
     if meeting := quality["boundary_meeting"]:  # not one-to-one, although perhaps nowhere folded
-        place = ", ".join(f"{x:.6g}" for x in meeting["point"])
-        log.warning("the volume overlaps itself: its boundary passes twice through (%s)", place)
+        place = in_brackets(meeting["point"])
+        log.warning("the volume overlaps itself: its boundary passes twice through %s", place)
     if remedies := advice.what_to_try(state.report, options):
         state.write(advice=remedies)

@@ -1,7 +1,16 @@
-"""The two kinds of arrays that most functions take and return."""
+"""What most functions take and return: two kinds of arrays; and how a point is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+
+def in_brackets(point: Iterable[float]) -> str:
+    """The three coordinates of a point for a reader: "(0.25, 1, -3.5e-07)"."""
+    return "({:.6g}, {:.6g}, {:.6g})".format(*point)

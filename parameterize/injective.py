@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array, IntArray
+from .arrays import Array, IntArray, in_brackets
 from .boxes import overlapping_boxes
 from .bspline import breakpoints
 from .patch_pieces import TANGENTS, Pieces, as_rows, boundary_pieces, contact, halved
@@ -35,7 +35,7 @@ class Meeting:
     point: Point
 
     def __str__(self) -> str:
-        first, second, place = ("({:.6g}, {:.6g}, {:.6g})".format(*row) for row in (*self.parameters, self.point))
+        first, second, place = map(in_brackets, (*self.parameters, self.point))
         return f"meets itself at {place}, parameters {first} and {second}"
 
 

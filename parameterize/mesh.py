@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, IntArray
+from .arrays import Array, IntArray, in_brackets
 from .mesh_check import check_genus, check_manifold, check_volume, choose_component, slivers
 from .mesh_clean import orient, signed_volume, weld_and_drop
 from .mesh_common import MeshError
@@ -172,7 +172,7 @@ def _gate(
         raise MeshError(f"{len(triangles)} faces that are not degenerate, at least 4 are needed: export it again")
 
     def where(vertex: int) -> str:
-        return "({:.6g}, {:.6g}, {:.6g})".format(*vertices[kept[vertex]])
+        return in_brackets(vertices[kept[vertex]])
 
     triangles, chosen = choose_component((vertices[kept] - middle) / size, triangles, component)
     used, compact = np.unique(triangles, return_inverse=True)

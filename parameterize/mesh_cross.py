@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from igl.predicates import find_self_intersections
 
-from .arrays import Array, IntArray
+from .arrays import Array, IntArray, in_brackets
 
 SHOWN = 5  # pairs that the summary lists
 
@@ -30,6 +30,6 @@ def crossing_places(vertices: Array, faces: IntArray, pairs: IntArray) -> Array:
 def describe_crossings(vertices: Array, faces: IntArray, pairs: IntArray) -> str:
     """How many, and the first with its place: one line."""
     first, second = pairs[0].tolist()
-    place = "({:.6g}, {:.6g}, {:.6g})".format(*crossing_places(vertices, faces, pairs[:1])[0])
+    place = in_brackets(crossing_places(vertices, faces, pairs[:1])[0])
     count = "1 pair" if len(pairs) == 1 else f"{len(pairs)} pairs"
     return f"self-intersection: {count} of faces, the first are faces {first} and {second} near {place}"

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array
+from .arrays import Array, in_brackets
 from .boundary import BoundaryMap
 from .bspline import gauss_points
 from .certificate import Certificate
@@ -93,7 +93,7 @@ class QualityReport:
         certificate = self.certificate
         verdict = f"{certificate.verdict}, det J >= {certificate.lower_bound:.3g} of its mean"
         if certificate.witness is not None:
-            verdict = "folded at ({:.6g}, {:.6g}, {:.6g})".format(*certificate.witness)
+            verdict = f"folded at {in_brackets(certificate.witness)}"
         if self.boundary_check.meeting is not None:
             verdict += f"; the boundary {self.boundary_check.meeting}"
         size = " x ".join(str(n) for n in self.control_points)
