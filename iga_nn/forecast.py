@@ -119,13 +119,13 @@ def _product_seconds(spline: SplineConfig, device: torch.device, clock: Clock) -
     import torch
 
     from parameterize.bspline import greville, open_uniform_knots
-    from parameterize.energy import Distortion
+    from parameterize.energy import DistortionEnergy
 
     count = min(spline.control_points, LARGEST)
     knots = open_uniform_knots(count, spline.degree)
     rows = greville(knots, spline.degree)
     control = torch.as_tensor(np.stack(np.meshgrid(rows, rows, rows, indexing="ij")), device=device)
-    product = Distortion((knots, knots, knots), spline, device=device).curvature(control, 1.0)
+    product = DistortionEnergy((knots, knots, knots), spline, device=device).curvature(control, 1.0)
     rough = control.float()
     seconds = _fastest(lambda: float(product(rough).sum()), clock)
     return seconds * (spline.control_points / count) ** 3

@@ -18,14 +18,14 @@ from .config import SplineConfig
 from .conjugate import Operator, conjugate_gradients
 from .rotation import closest_rotation, cofactor, cross, least_eigenvalue
 from .surface_fit import SurfaceFit
-from .tensor_grid import FastDiagonalization, SmoothnessOperator, gauss_grid, grams
+from .tensor_grid import BendingOperator, FastDiagonalization, gauss_grid, grams
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
 _PULL = 3e-4  # share of the boundary's weight in the preconditioner: more would hold back what slides along the surface
 Knots = tuple[Array, Array, Array]
 
 
-class Distortion:
+class DistortionEnergy:
     """int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over the cube with a = |J - R|^2, R the closest rotation.
 
     a is the ARAP energy of F; the second part keeps its maximum down; the third, like the paper's bijectivity term,
@@ -116,9 +116,9 @@ class SplineEnergy:
         self.config, self.surface = config, surface
         self.anchors = EdgeAnchors(surface, config.tangential)
         self.penalty = config.penalties[0]
-        self._distortion = Distortion(knots, config, device=device)
+        self._distortion = DistortionEnergy(knots, config, device=device)
         mass, slope, curve = grams(knots, config.degree, device)
-        self._bending = SmoothnessOperator(mass, slope, curve, stiffness=0.0, bending=2.0 * config.fairness)
+        self._bending = BendingOperator(mass, slope, curve, 2.0 * config.fairness)
         self._rough_bending = self._bending.to(_ROUGH)
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient, device=device)
         ends = torch.zeros_like(mass[0])

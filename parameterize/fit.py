@@ -10,7 +10,7 @@ from torch import Tensor
 from .arrays import Array
 from .bspline import basis_derivatives
 from .conjugate import conjugate_gradients
-from .tensor_grid import FastDiagonalization, SmoothnessOperator, grams, to_torch
+from .tensor_grid import BendingOperator, FastDiagonalization, grams, to_torch
 
 
 def fit_pairs(
@@ -32,7 +32,7 @@ def fit_pairs(
     scaled = csr_array(rows * weights[:, None])
     matrix, transposed = (to_torch(m, device) for m in (rows, csr_array(scaled.T)))
     mass, slope, curve = grams(knots, degree, device)
-    smooth = SmoothnessOperator(mass, slope, curve, stiffness=0.0, bending=fairness)
+    smooth = BendingOperator(mass, slope, curve, fairness)
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
     shape = (3, *(len(k) - degree - 1 for k in knots))
 

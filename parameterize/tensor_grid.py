@@ -121,30 +121,28 @@ def grams(knots: tuple[Array, ...], degree: int, device: torch.device) -> list[t
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothnessOperator:
-    """x -> stiffness * K x + bending * H x, with x^T K x = int |grad F|^2 and x^T H x = int |Hessian F|^2 (exact)."""
+class BendingOperator:
+    """x -> weight * H x with x^T H x = int |Hessian F|^2 (exact)."""
 
     mass: tuple[Tensor, ...]
     slope: tuple[Tensor, ...]
     curve: tuple[Tensor, ...]
-    stiffness: float
-    bending: float
+    weight: float
 
-    def to(self, dtype: torch.dtype) -> SmoothnessOperator:
+    def to(self, dtype: torch.dtype) -> BendingOperator:
         """The same in another precision."""
         mass, slope, curve = (tuple(m.to(dtype) for m in part) for part in (self.mass, self.slope, self.curve))
-        return SmoothnessOperator(mass, slope, curve, self.stiffness, self.bending)
+        return BendingOperator(mass, slope, curve, self.weight)
 
     def __call__(self, x: Tensor) -> Tensor:
         """(3, n_u, n_v, n_w) -> the same shape."""
         (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = self.mass, self.slope, self.curve
-        s, b = self.stiffness, self.bending
         xm, xk, xh = along(m2, x, 2), along(k2, x, 2), along(h2, x, 2)
         mm = along(m1, xm, 1)
         first = along(k1, xm, 1) + along(m1, xk, 1)
         second = along(h1, xm, 1) + along(m1, xh, 1) + 2.0 * along(k1, xk, 1)
-        result = along(s * k0 + b * h0, mm, 0) + along(m0, s * first + b * second, 0)
-        return result + along(2.0 * b * k0, first, 0)
+        result = along(self.weight * h0, mm, 0) + along(m0, self.weight * second, 0)
+        return result + along(2.0 * self.weight * k0, first, 0)
 
 
 class FastDiagonalization:

@@ -289,6 +289,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["parameterize", "cube", "--corners", "same.json"], "same vertex"),
         (["parameterize", "cube", "--corners", "yes.json"], "eight points"),
         (["check", ""], "no surface is named"),
+        (["check", "good.npz", "--strict"], "good.npz: is a volume; --component"),
         (["check", "."], "is a directory: name the surface file in it"),
         (["parameterize", "cube", "--max-faces", "10"], "face"),
         (["parameterize", "cube", "--out", "words.txt/deeper"], "cannot be written"),

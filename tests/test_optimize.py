@@ -9,7 +9,7 @@ from parameterize.bspline import gauss_points, greville, open_uniform_knots
 from parameterize.certificate import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
-from parameterize.energy import Distortion, SplineEnergy
+from parameterize.energy import DistortionEnergy, SplineEnergy
 from parameterize.history import History
 from parameterize.optimize import optimize
 from parameterize.quality import arap
@@ -66,7 +66,7 @@ def mean_arap(volume, n_gauss=3):
 def test_distortion_is_the_quadrature_of_the_arap_energy():
     control = wavy_control(0.02)
     config = replace(CONFIG, inner_gauss=CONFIG.gauss)
-    energy, _, folded = Distortion(KNOTS, config, device=CPU).energy_and_gradient(control, penalty=0.0)
+    energy, _, folded = DistortionEnergy(KNOTS, config, device=CPU).energy_and_gradient(control, penalty=0.0)
     assert energy == pytest.approx(mean_arap(as_volume(control), CONFIG.gauss), rel=1e-9)
     assert folded == 0
 
@@ -74,7 +74,7 @@ def test_distortion_is_the_quadrature_of_the_arap_energy():
 def test_folded_points_are_counted():
     control = wavy_control(0.0)
     control[0] *= -1.0
-    _, _, folded = Distortion(KNOTS, CONFIG, device=CPU).energy_and_gradient(control, penalty=1.0)
+    _, _, folded = DistortionEnergy(KNOTS, CONFIG, device=CPU).energy_and_gradient(control, penalty=1.0)
     assert folded == (2 * CONFIG.gauss + 2 * CONFIG.inner_gauss) ** 3  # four spans a direction
 
 
@@ -99,7 +99,7 @@ def test_gradients_against_finite_differences(amplitude):
 
 @pytest.mark.parametrize("limit", [100.0, 0.3])  # nothing above it; most points above it
 def test_curvature_is_the_second_derivative_where_the_map_stretches(limit):
-    distortion = Distortion(KNOTS, replace(CONFIG, arap_limit=limit), device=CPU)
+    distortion = DistortionEnergy(KNOTS, replace(CONFIG, arap_limit=limit), device=CPU)
     control, step = 1.6 * wavy_control(0.02), wavy_control(0.5, seed=4) - wavy_control(0.0)
     ahead, behind = (distortion.energy_and_gradient(control + s * 1e-5 * step, 0.0)[1] for s in (1.0, -1.0))
     expected = (ahead - behind) / 2e-5
@@ -108,7 +108,7 @@ def test_curvature_is_the_second_derivative_where_the_map_stretches(limit):
 
 
 def test_curvature_stays_positive_where_the_energy_bends_down():
-    distortion, control = Distortion(KNOTS, CONFIG, device=CPU), 0.4 * wavy_control(0.05)
+    distortion, control = DistortionEnergy(KNOTS, CONFIG, device=CPU), 0.4 * wavy_control(0.05)
     for seed in range(5):
         step = (wavy_control(0.5, seed) - wavy_control(0.0)).float()
         assert float((step * distortion.curvature(control, 20.0)(step)).sum()) > 0.0

@@ -9,8 +9,10 @@ import pytest
 
 import iga_nn
 from iga_nn import pipeline
-from iga_nn.options import InputError, MapOptions, PoissonOptions
+from iga_nn.options import ElasticityOptions, InputError, MapOptions, PoissonOptions
+from iga_nn.rendering import can_draw
 from parameterize.volume import BSplineVolume
+from solve import benchmark_volume
 
 MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).resolve().parents[2] / "shared" / "models"))
 
@@ -60,6 +62,28 @@ def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, mo
     pipeline.parameterize_to("cube", "out", mapping=MapOptions(corners=Path("corners.json")))
     pipeline.parameterize_to("cube", "out", force=True)
     assert np.array_equal(seen[0], iga_nn.sample("cube").vertices[7::-1]) and seen[1] is None
+
+
+def test_the_faces_that_a_solve_names_are_shown_until_the_next_solve(in_folder):
+    benchmark_volume(3).save("map.npz")
+    mixed = PoissonOptions(neumann=("u1",), refine=(0,))
+    outcome = pipeline.solve_to("map.npz", "out", problem=mixed)
+    picture = outcome.folder / "named_faces.png"
+    if can_draw():
+        assert picture.is_file()
+    picture.touch()
+    assert "The faces by their names" in (outcome.folder / "report.html").read_text() or not can_draw()
+    pipeline.solve_to("map.npz", "out", problem=PoissonOptions(refine=(0,)), force=True)
+    assert not picture.exists()
+
+
+def test_a_device_that_cannot_solve_the_problem_costs_no_file(in_folder):
+    benchmark_volume(3).save("map.npz")
+    pipeline.solve_to("map.npz", "out", problem=PoissonOptions(refine=(0,)))
+    before = {file.name: file.read_bytes() for file in Path("out").iterdir()}
+    with pytest.raises(InputError, match="'cuda' does not know elasticity"):
+        pipeline.solve_to("map.npz", "out", problem=ElasticityOptions(exact="x;0;0"), force=True, device="cuda")
+    assert {file.name: file.read_bytes() for file in Path("out").iterdir()} == before
 
 
 def test_unknown_problem_is_refused():

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 
@@ -23,6 +24,17 @@ def test_write_is_whole_and_read_takes_only_ours(tmp_path):
     (tmp_path / "report.json").write_text("{half")
     assert reports.read(tmp_path) is None
     assert reports.read(tmp_path / "nowhere") is None
+
+
+def test_versions_are_those_of_what_is_installed(monkeypatch):
+    def version(name):
+        if name == "torch":
+            raise PackageNotFoundError(name)
+        return "1.2.3"
+
+    assert "torch" in reports.versions()
+    monkeypatch.setattr(reports, "version", version)
+    assert {"python", "numpy", "scipy", "iga-nn"} == set(reports.versions())
 
 
 def test_finished_means_that_the_total_was_written():
