@@ -18,7 +18,6 @@ of one coordinate, or of three for displacements (`geoDim`, `dim`).
 from __future__ import annotations
 
 import logging
-from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -26,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.bspline import apply_along, insert_knots
+from parameterize.bspline import apply_along, insertion_into
 from parameterize.volume import BSplineVolume
 
 from .options import InputError, one_line
@@ -69,13 +68,10 @@ def on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
             f"an MFEM mesh carries a solution of its own degrees {volume.degrees}, this one has {field.degrees}: "
             "export it --to vtk"
         )
-    points, knots = volume.control_points, []
+    points = volume.control_points
     for axis, (own, finer) in enumerate(zip(volume.knots, field.knots, strict=True)):
-        new = Counter(finer.tolist()) - Counter(own.tolist())
-        inserted, matrix = insert_knots(own, volume.degrees[axis], list(new.elements()))
-        points = apply_along(matrix, points, axis)
-        knots.append(inserted)
-    return BSplineVolume(volume.degrees, (knots[0], knots[1], knots[2]), points)
+        points = apply_along(insertion_into(own, volume.degrees[axis], finer), points, axis)
+    return BSplineVolume(volume.degrees, field.knots, points)
 
 
 def write_json(path: Path, spline: BSplineVolume | SplineField) -> None:

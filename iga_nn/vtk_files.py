@@ -26,7 +26,7 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
 from parameterize.bezier import elevation, extraction
-from parameterize.bspline import apply_along, breakpoints, insert_knots
+from parameterize.bspline import apply_along, divided_spans, insert_knots
 from parameterize.quality import arap
 from parameterize.volume import BSplineVolume
 
@@ -66,7 +66,7 @@ def write_view(
     """Write samples of the map and of what is known on it; `problem` knows the exact solution."""
     import pyvista
 
-    u, v, w = (_sample_points(knots) for knots in volume.knots)
+    u, v, w = (divided_spans(knots, SAMPLES) for knots in volume.knots)
     points = volume.grid(u, v, w)  # (m_u, m_v, m_w, 3)
     jacobians = volume.grid_jacobian(u, v, w)
     fields = {"arap": arap(jacobians), "det J": np.linalg.det(jacobians)}
@@ -86,11 +86,6 @@ def _mark_active(mark: Callable[[Any], object], name: str, values: NDArray[Any])
     array = numpy_to_vtk(np.asarray(values, dtype=np.float64), deep=True)
     array.SetName(name)
     mark(array)
-
-
-def _sample_points(knots: Array) -> Array:
-    breaks = breakpoints(knots)
-    return np.interp(np.arange(SAMPLES * (len(breaks) - 1) + 1) / SAMPLES, np.arange(len(breaks)), breaks)
 
 
 def _bernstein(

@@ -15,7 +15,7 @@ import numpy as np
 from torch import Tensor
 
 from .arrays import Array
-from .bspline import breakpoints
+from .bspline import divided_spans
 from .distances import nearest_on_mesh
 from .layout import sides
 from .surface_fit import SurfaceFit
@@ -30,8 +30,7 @@ def edge_points(knots: tuple[Array, Array, Array]) -> Array:
     """Parameters (k, 3): the corners of the cube, the ends of the spans along its edges and their middles."""
     points = []
     for axis in range(3):
-        breaks = breakpoints(knots[axis])
-        along = np.interp(np.arange(_A_SPAN * (len(breaks) - 1) + 1) / _A_SPAN, np.arange(len(breaks)), breaks)
+        along = divided_spans(knots[axis], _A_SPAN)
         for side in product((0.0, 1.0), repeat=2):
             rows: list[Array | float] = [*side]
             rows.insert(axis, along)

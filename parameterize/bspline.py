@@ -6,6 +6,7 @@ functions. Recurrences are those of Piegl and Tiller, *The NURBS Book* (2nd ed.)
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -161,6 +162,23 @@ def insert_knots(knots: Array, degree: int, new: ArrayLike) -> tuple[Array, csr_
         current = np.insert(current, k + 1, t)
     matrix.eliminate_zeros()
     return current, matrix
+
+
+def insertion_into(knots: Array, degree: int, finer: Array) -> csr_array:
+    """The matrix (n_finer, n) of inserting what a finer knot vector has more.
+
+    Raises ValueError where that lacks one of the knots, or its ends differ.
+    """
+    own, wanted = Counter(knots.tolist()), Counter(finer.tolist())
+    if own - wanted:
+        raise ValueError("the finer knot vector lacks a knot of the other")
+    return insert_knots(knots, degree, list((wanted - own).elements()))[1]
+
+
+def divided_spans(knots: Array, parts: int) -> Array:
+    """The ends of the spans and of `parts` equal parts of each, in order."""
+    breaks = breakpoints(knots)
+    return np.interp(np.arange(parts * (len(breaks) - 1) + 1) / parts, np.arange(len(breaks)), breaks)
 
 
 def midpoints(knots: Array) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.bspline import apply_along, breakpoints, insert_knots, midpoints
+from parameterize.bspline import apply_along, breakpoints, insert_knots, insertion_into, midpoints
 from parameterize.volume import BSplineVolume
 
 
@@ -93,13 +93,15 @@ def embedded(
 
     Raises ValueError where the smaller space is not contained in the larger.
     """
-    for axis, (own, wanted) in enumerate(zip(knots, space.knots, strict=True)):
-        values, counts = np.unique(wanted, return_counts=True)
-        extra = counts - np.array([np.count_nonzero(own == value) for value in values])
-        if degrees[axis] != space.degrees[axis] or extra.min() < 0 or len(own) + extra.sum() != len(wanted):
-            raise ValueError("start: its space is not contained in the trial space; refine it by halving, same degree")
-        _, matrix = insert_knots(own, degrees[axis], np.repeat(values, extra))
-        coefficients = apply_along(matrix, coefficients, axis)
+    try:
+        if degrees != space.degrees:
+            raise ValueError("other degrees")
+        for axis, (own, wanted) in enumerate(zip(knots, space.knots, strict=True)):
+            coefficients = apply_along(insertion_into(own, degrees[axis], wanted), coefficients, axis)
+    except ValueError as error:
+        raise ValueError(
+            f"start: its space is not contained in the trial space ({error}); refine it by halving, same degree"
+        ) from None
     return coefficients
 
 

@@ -12,12 +12,14 @@ from parameterize.bspline import (
     breakpoints,
     check_knots,
     collocation,
+    divided_spans,
     evaluate_at,
     evaluate_grid,
     find_spans,
     gauss_points,
     greville,
     insert_knots,
+    insertion_into,
     midpoints,
     open_uniform_knots,
 )
@@ -180,3 +182,20 @@ def test_points_and_grid_agree_with_nested_scipy_splines():
 def test_points_of_the_wrong_shape_are_refused():
     with pytest.raises(ValueError, match=r"shape \(m, 3\), got \(1, 2\)"):
         evaluate_at((1, 1, 1), (UNEVEN[1],) * 3, np.zeros((5, 5, 5)), [0.1, 0.2])
+
+
+def test_insertion_into_a_finer_knot_vector_keeps_the_spline():
+    knots = open_uniform_knots(6, 3)
+    finer = np.sort(np.concatenate([knots, [0.1, knots[4], 0.5]]))  # one of them a second time
+    matrix = insertion_into(knots, 3, finer)
+    assert matrix.shape == (9, 6)
+    points = np.random.default_rng(0).standard_normal((6, 2))
+    t = np.linspace(0.0, 1.0, 31)
+    np.testing.assert_allclose(BSpline(finer, matrix @ points, 3)(t), BSpline(knots, points, 3)(t), atol=1e-13)
+    with pytest.raises(ValueError, match="lacks a knot"):
+        insertion_into(finer, 3, knots)
+
+
+def test_spans_are_divided_equally_between_their_own_ends():
+    knots = np.array([0.0, 0.0, 0.2, 0.2, 1.0, 1.0])
+    np.testing.assert_allclose(divided_spans(knots, 2), [0.0, 0.1, 0.2, 0.6, 1.0])
