@@ -207,38 +207,37 @@ def check(
 
 
 @app.command(name="sample")
-def write_sample(name: str, /, *, out: Path | None = None) -> int:
+def write_sample(name: str, /, *, out: Path | None = None, force: bool = False) -> int:
     """Write a surface made by formula as an OBJ file.
 
     Args:
         name: one of the samples.
         out: file to write; NAME.obj in the current folder by default.
+        force: replace that file where it exists with other content.
     """
-    from .data import obj_path
-    from .samples import sample, write_obj
+    from .data import obj_path, save_new
+    from .samples import obj_text, sample
 
     with input_errors():
         surface = sample(name)
     target = obj_path(name, out)
-    try:
-        write_obj(surface, target)
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
+    save_new(target, obj_text(surface).encode(), force)
     _say(str(target))
     return DONE
 
 
 @app.command(name="fetch")
-def fetch_model(name: str, /, *, out: Path | None = None) -> int:
+def fetch_model(name: str, /, *, out: Path | None = None, force: bool = False) -> int:
     """Write a published model as an OBJ file, downloading it where it is not at hand.
 
     Args:
         name: one of the models, or g1 for all those of the set G1.
         out: file to write; NAME.obj in the current folder by default.
+        force: replace that file where it exists with other content.
     """
     from .data import fetch_all
 
-    for path in fetch_all(name, out):
+    for path in fetch_all(name, out, force=force):
         _say(str(path))
     return DONE
 

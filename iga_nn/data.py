@@ -10,7 +10,7 @@ from pathlib import Path
 from parameterize.files import save_bytes
 from parameterize.mesh import MAX_FACES, MeshError, Surface, load_surface
 
-from .samples import SAMPLES, sample, write_obj
+from .samples import SAMPLES, obj_text, sample
 
 DATA_FOLDER = "IGA_NN_DATA"
 RAW = "https://raw.githubusercontent.com"
@@ -94,39 +94,45 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
     raise MeshError(f"{name}: no such file and no sample; the samples are {', '.join(SAMPLES)}")
 
 
-def fetch_all(name: str, out: str | Path | None = None) -> Iterator[Path]:
+def fetch_all(name: str, out: str | Path | None = None, *, force: bool = False) -> Iterator[Path]:
     """Write the model of that name, or, for "g1", one after the other those of the set G1; yield the paths.
 
     Raises as `fetch` does, and where `out` is given for the whole set.
     """
     if name != "g1":
-        yield fetch(name, out)
+        yield fetch(name, out, force=force)
         return
     if out is not None:
         raise MeshError("g1: is a set of models, each written to NAME.obj: leave --out out")
     for model in sorted(name for name in MODELS if "/G1/" in MODELS[name].path):
-        yield fetch(model)
+        yield fetch(model, force=force)
 
 
-def fetch(name: str, out: str | Path | None = None) -> Path:
+def fetch(name: str, out: str | Path | None = None, *, force: bool = False) -> Path:
     """Write the model of that name as OBJ (default: NAME.obj in the current folder) and return the path.
 
     From IGA_NN_DATA where it is there, else downloaded once, checked by its sha256 and kept in the user's cache.
-    Raises MeshError for an unknown name, and, without a network, saying where to put the file.
+    Raises MeshError for an unknown name, where the file is there with other content (unless `force`), and, without a
+    network, saying where to put the file.
     """
     if name not in MODELS:
         raise MeshError(f"{name}: no such model; the models are {', '.join(sorted(MODELS))}; g1 is all but conch")
     target = obj_path(name, out)
     source = _in_data_folder(name) or _download(name)
+    is_obj = source.suffix == ".obj"
+    save_new(target, source.read_bytes() if is_obj else obj_text(load_surface(source)).encode(), force)
+    return target
+
+
+def save_new(target: Path, content: bytes, force: bool) -> None:
+    """Write a file that is not there yet, or has that content; any other one only where `force`. Raises MeshError."""
     try:
-        if source.suffix == ".obj":
-            if not (target.exists() and target.samefile(source)):
-                save_bytes(target, source.read_bytes())
-        else:
-            write_obj(load_surface(source), target)
+        if not target.exists() or force:
+            save_bytes(target, content)
+        elif target.read_bytes() != content:
+            raise MeshError(f"{target}: exists; --force replaces it, --out names another file")
     except OSError as error:
         raise MeshError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
-    return target
 
 
 def obj_path(name: str, out: str | Path | None) -> Path:

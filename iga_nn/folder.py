@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -77,15 +78,18 @@ class RunFolder:
         reports.write(self.folder, self.report | {"seconds": self.seconds})
 
     def finish(self) -> Outcome:
-        """Write the total: the result is finished."""
+        """Write the total: the result is finished, and needs no checkpoint any more."""
         self.seconds["total"] = time.perf_counter() - self.started
         self.write(seconds=self.seconds)
+        if "config" in self.report:  # of a training here
+            shutil.rmtree(self.folder / CHECKPOINT, ignore_errors=True)
         return Outcome(self.folder, reports.plain(self.report))
 
 
 def default_folder(source: str | Path) -> Path:
     """Where results go unless `--out` says so: the input's stem, in the current folder."""
-    return Path(Path(source).name.split(".")[0])
+    name = Path(source).name
+    return Path(name.split(".")[0] or Path(name).stem)  # the stem of a hidden file starts with its dot
 
 
 @contextmanager

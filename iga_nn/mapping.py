@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import shutil
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
@@ -171,4 +170,3 @@ def _write(
         parameterization=result.quality.as_dict() | advice.unproved(result.volume, result.certificate),
     )
     tell(state, options)
-    shutil.rmtree(state.folder / CHECKPOINT, ignore_errors=True)  # the files above replace it

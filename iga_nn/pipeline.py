@@ -176,12 +176,15 @@ def check_volume(path: str | Path) -> dict[str, Any]:
 
 
 def _there_already(finished: Outcome, command: str) -> Outcome:
-    """The result that a resumed run finds. Raises InputError where it is another command's."""
+    """The result that a resumed run finds. Raises InputError where it is another command's, or not whole."""
     made_by = finished.report.get("command", "")
     if not gives_the_same(made_by, command):
         raise InputError(
             f"{finished.folder}: holds the result of `{made_by}`; --force replaces it, --out names another folder"
         )
+    wanted = ["volume.npz"] + ["solution.npz"] * ("poisson" in finished.report)
+    if gone := [name for name in wanted if not (finished.folder / name).is_file()]:
+        raise InputError(f"{finished.folder}: {gone[0]} is gone from this finished result; --force makes it anew")
     log.info("%s: finished already", finished.folder)
     return finished
 

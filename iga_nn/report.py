@@ -66,7 +66,7 @@ def read(folder: Path) -> Report | None:
 
 def is_finished(report: Report | None) -> bool:
     """Whether the run that wrote this report came to its end."""
-    return report is not None and "total" in report.get("seconds", {})
+    return report is not None and "total" in (report.get("seconds") or {})
 
 
 def is_certified(report: Report) -> bool:

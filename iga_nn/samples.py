@@ -35,12 +35,17 @@ def sample(name: str) -> Surface:
 
 
 def write_obj(surface: Surface, path: str | Path) -> None:
-    """Write a surface as OBJ, user's units, every digit of its coordinates; atomic."""
+    """Write a surface as OBJ; atomic."""
+    save_text(path, obj_text(surface))
+
+
+def obj_text(surface: Surface) -> str:
+    """A surface as OBJ, user's units, every digit of its coordinates."""
     # trimesh's exporter writes a fixed number of decimals and so loses digits, of small surfaces all of them
     rows = [f"# {surface.name}: {len(surface.vertices)} vertices, {len(surface.faces)} faces"]
     rows += [f"v {x!r} {y!r} {z!r}" for x, y, z in surface.vertices.tolist()]
     rows += [f"f {a} {b} {c}" for a, b, c in (surface.faces + 1).tolist()]
-    save_text(path, "\n".join(rows) + "\n")
+    return "\n".join(rows) + "\n"
 
 
 def ball(count: int) -> tuple[Array, IntArray]:

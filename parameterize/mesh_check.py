@@ -38,23 +38,26 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
             raise MeshError(f"no component {component}: counted from 0 there are {len(groups)} ({sizes})")
         notice = [f"component {component} taken of {len(groups)} ({sizes})"] if len(groups) > 1 else []
         return faces[groups[component]], notice
-    nested = _inside(vertices, faces, groups)
+    outer, nested = _inside(vertices, faces, groups)
     if nested:
         raise MeshError(
-            f"{len(groups)} nested shells ({sizes}), component {nested[0]} lies inside component 0: one cube has no "
-            "cavity; remove the inner shell, or fill it by choosing --component 0"
+            f"{len(groups)} nested shells ({sizes}), component {nested[0]} lies inside component {outer}: one cube has "
+            f"no cavity; remove the inner shell, or fill it by choosing --component {outer}"
         )
     raise MeshError(f"{len(groups)} components ({sizes}): choose one with --component N, or join them")
 
 
-def _inside(vertices: Array, faces: IntArray, groups: list[IntArray]) -> list[int]:
-    """Numbers of the components that lie inside the largest with every vertex: one that only overlaps it does not."""
+def _inside(vertices: Array, faces: IntArray, groups: list[IntArray]) -> tuple[int, list[int]]:
+    """Number of the widest component, and of those that lie inside it with every vertex, not only overlap it."""
+    listed = [vertices[np.unique(faces[group])] for group in groups[: LISTED + 1]]
+    outer = int(np.argmax([np.linalg.norm(np.ptp(points, axis=0)) for points in listed]))
     nested = []
-    for i, group in enumerate(groups[1 : LISTED + 1], start=1):
-        winding = igl.fast_winding_number(vertices, faces[groups[0]], vertices[np.unique(faces[group])])
-        if np.all(np.abs(winding) > 0.5):
-            nested.append(i)
-    return nested
+    for i, points in enumerate(listed):
+        if i != outer:
+            winding = igl.fast_winding_number(vertices, faces[groups[outer]], points)
+            if np.all(np.abs(winding) > 0.5):
+                nested.append(i)
+    return outer, nested
 
 
 def check_manifold(faces: IntArray, where: Where) -> None:

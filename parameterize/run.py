@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import operator
 import time
@@ -93,7 +94,7 @@ def parameterize(
     place = choose_device(device)
     given = None if corners is None else corner_vertices(surface, corners)
     identity = {
-        "surface": surface.sha256,
+        "surface": _digest(surface),
         "config": asdict(config),
         "seed": seed,
         "device": place.type,
@@ -135,6 +136,11 @@ def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config
     if operator.index(seed) < 0:
         raise ValueError(f"seed must not be negative, got {seed}")
     return config or preset("fast"), operator.index(seed)
+
+
+def _digest(surface: Surface) -> str:
+    """SHA-256 of the triangles that are taken: one file may hold several bodies."""
+    return hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest()
 
 
 def choose_device(name: str) -> torch.device:

@@ -217,6 +217,12 @@ def test_sample_writes_a_file_the_gate_accepts(in_folder, capsys):
     assert main(["sample", "bean", "--out", "other.obj"]) == 0
     assert iga_nn.load_surface("bean.obj").volume == pytest.approx(iga_nn.sample("bean").volume)
     assert Path("other.obj").read_bytes() == Path("bean.obj").read_bytes()
+    Path("other.obj").write_text("mine\n")
+    assert main(["sample", "bean"]) == 0  # the same is there already
+    assert main(["sample", "bean", "--out", "other.obj"]) == 2
+    assert Path("other.obj").read_text() == "mine\n"
+    assert main(["sample", "bean", "--out", "other.obj", "--force"]) == 0
+    assert Path("other.obj").read_bytes() == Path("bean.obj").read_bytes()
 
 
 def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):

@@ -98,6 +98,10 @@ def test_fetch_copies_from_the_data_folder(data_folder):
     assert path == Path("conch.obj")
     assert path.read_bytes() == (data_folder / "conch.obj").read_bytes()
     assert fetch("conch", data_folder / "conch.obj").is_file()  # onto itself
+    path.write_text("mine\n")
+    with pytest.raises(MeshError, match=r"conch\.obj: exists; --force"):
+        fetch("conch")
+    assert fetch("conch", force=True).read_bytes() == (data_folder / "conch.obj").read_bytes()
 
 
 def test_fetch_takes_the_boundary_of_tetrahedra(data_folder):

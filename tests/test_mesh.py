@@ -309,6 +309,12 @@ def test_refuses_nested_shells():
         surface_from_arrays(*joined(outer, (vertices, faces[:, ::-1])))
 
 
+def test_the_shell_inside_may_have_more_faces():
+    outer, (vertices, faces) = ball(2.0, subdivisions=1), ball(subdivisions=3)
+    with pytest.raises(MeshError, match=r"component 0 lies inside component 1: .* by choosing --component 1"):
+        surface_from_arrays(*joined(outer, (vertices, faces[:, ::-1])))
+
+
 def test_refuses_a_pinched_vertex():
     vertices, faces = TETRAHEDRON
     pinched = np.concatenate([faces, np.where(faces == 0, 0, faces + 3)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import iga_nn
-from iga_nn import pipeline
+from iga_nn import folder, pipeline
 from iga_nn.options import ElasticityOptions, InputError, MapOptions, PoissonOptions
 from iga_nn.rendering import can_draw
 from parameterize.volume import BSplineVolume
@@ -47,11 +47,34 @@ def test_broken_input_leaves_an_earlier_result_alone(formula_training, in_folder
     assert (in_folder / "out" / "report.json").read_bytes() == before
 
 
-def test_checkpoint_folder_goes_once_the_files_stand(formula_training, in_folder):
+def test_the_checkpoint_stays_until_all_is_solved(formula_training, in_folder, monkeypatch):
     formula_training()
-    (in_folder / "out" / "checkpoint").mkdir(parents=True)
-    pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True))
-    assert not (in_folder / "out" / "checkpoint").exists()
+    checkpoint = in_folder / "out" / "checkpoint" / "spline.safetensors"
+    checkpoint.parent.mkdir(parents=True)
+    checkpoint.touch()
+    again = MapOptions(resume=True)
+    with monkeypatch.context() as patched:
+        patched.setattr("solve.solve_problem", lambda *_, **__: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            iga_nn.run("poisson", "cube", "out", mapping=again)
+    assert checkpoint.exists()
+    with pytest.raises(InputError, match="holds an interrupted run"):
+        iga_nn.run("poisson", "cube", "out")
+    iga_nn.run("poisson", "cube", "out", mapping=again, poisson=PoissonOptions(refine=(0,)))
+    assert not checkpoint.parent.exists()
+
+
+def test_a_finished_result_without_its_files_is_no_answer(formula_training, in_folder):
+    formula_training()
+    pipeline.parameterize_to("cube", "out")
+    Path("out/volume.npz").unlink()
+    with pytest.raises(InputError, match="volume.npz is gone"):
+        pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True))
+
+
+def test_a_hidden_file_has_a_folder_of_its_own():
+    assert folder.default_folder("models/.bean.obj") == Path(".bean")
+    assert folder.default_folder("models/bean.obj.gz") == Path("bean")
 
 
 def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, monkeypatch):
