@@ -111,7 +111,7 @@ def corners_of(values: Array, first: int = 0) -> Array:
 def _differences(points: Array, knots: Array, degree: int, axis: int) -> tuple[Array, IntArray]:
     """Control points (3, ...) of the derivative along a parametric axis (The NURBS Book, eq. 3.7): m, e of m * 2**e.
 
-    Every m is 0 or in [1/4, 1): as in a difference, nothing is lost to underflow.
+    Every m is 0 or in [1/4, 1), so that no product underflows.
     """
     n = points.shape[axis + 1]
     width = knots[degree + 1 : degree + n] - knots[1:n]
