@@ -25,6 +25,7 @@ Point = tuple[float, float, float]
 _MOST_PAIRS = 50_000, 10  # in all, and for each patch in addition: more are not looked at
 _TRIED = 64  # pairs a level from which a common point is searched for
 _NEWTON_STEPS = 12
+_DISTINCT = 1e3  # times their errors the two parameters of a meeting must differ
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,9 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryChe
     """
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
-    pieces = boundary_pieces(volume)
-    error = _rounding(volume, max_depth)
+    local = _local(volume)
+    pieces = boundary_pieces(local)
+    error = _rounding(local, max_depth)
     own = np.repeat(np.arange(len(pieces.nets))[:, None], 2, axis=1)
     points = as_rows(pieces.nets)
     pairs = np.concatenate([own, overlapping_boxes(points.min(axis=1) - error, points.max(axis=1) + error)])
@@ -75,8 +77,9 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryChe
         pairs = pairs if hopeless else pairs[~settled(pieces, pairs, error)]
         if not len(pairs):
             return BoundaryCheck(True, None, 0)
-        meeting = _search(volume, pieces, pairs)
-        if meeting is not None:
+        met = _search(local, pieces, pairs, error)
+        if met is not None:
+            meeting = Meeting((_as_point(met[0]), _as_point(met[1])), _as_point(volume(met[0])[0]))
             return BoundaryCheck(False, meeting, len(pairs))
         if hopeless or depth == max_depth:
             break
@@ -84,19 +87,35 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryChe
     return BoundaryCheck(None, None, len(pairs))
 
 
-def _rounding(volume: BSplineVolume, max_depth: int) -> float:
+def _local(volume: BSplineVolume) -> BSplineVolume:
+    """The volume with its middle moved to the origin, and scaled by a power of two to magnitude 1.
+
+    That is one rounding for each coordinate, relative to the difference from the middle, however far away that is.
+    """
+    points = volume.control_points
+    moved = points - (points.min(axis=(0, 1, 2)) + points.max(axis=(0, 1, 2))) / 2.0
+    exponent = int(np.frexp(np.abs(moved).max())[1])
+    return BSplineVolume(volume.degrees, volume.knots, np.ldexp(moved, -exponent))
+
+
+def _rounding(local: BSplineVolume, max_depth: int) -> float:
     """Bound of the rounding error of a Bezier control point's coordinate.
 
     No weight is negative and all sum to 1, so that each rounding changes a sum by at most the unit roundoff times the
-    largest coordinate: 6 p + 2 a direction for the extraction (bezier.py), 2 p + 2 for the elevation, p + 1 a halving.
+    largest coordinate: 6 p + 2 a direction for the extraction (bezier.py), 2 p + 2 for the elevation, p + 1 a halving,
+    and 1 for the move to the origin. All that underflows is below 2**-1000, and the largest coordinate at least 1/2.
     """
-    degree = max(volume.degrees)
-    roundings = 2 * (8 * degree + 4 + max_depth * (degree + 1)) + 8
-    return 1.01 * roundings * 2.0**-53 * float(np.abs(volume.control_points).max())
+    degree = max(local.degrees)
+    roundings = 2 * (8 * degree + 4 + max_depth * (degree + 1)) + 8 + 1
+    return 1.01 * roundings * 2.0**-53 * float(np.abs(local.control_points).max())
 
 
-def _search(volume: BSplineVolume, pieces: Pieces, pairs: IntArray) -> Meeting | None:
-    """A common point of two pieces that do not touch in the cube, by Newton's method from the middle of some pairs."""
+def _search(local: BSplineVolume, pieces: Pieces, pairs: IntArray, error: float) -> tuple[Array, Array] | None:
+    """Two parameters of a common point of pieces that do not touch in the cube.
+
+    Newton's method starts from the middle of some pairs. Beside an edge of the cube it tends to two equal parameters:
+    so the gap must be rounding, and the parameters farther apart than their errors, gap / (least slope), can explain.
+    """
     some = pairs[:: 1 + len(pairs) // _MOST_PAIRS[0]]
     touching, _ = contact(pieces, some[:, 0], some[:, 1])
     open_pairs = some[~touching]
@@ -105,24 +124,23 @@ def _search(volume: BSplineVolume, pieces: Pieces, pairs: IntArray) -> Meeting |
     chosen = open_pairs[np.unique(np.linspace(0, len(open_pairs) - 1, _TRIED).astype(np.int64))]
     rows = np.arange(len(chosen))[:, None]
     tangents = [TANGENTS[pieces.axes[part]] for part in chosen.T]
-    where = [_middles(volume, pieces, part) for part in chosen.T]  # two (k, 3)
+    where = [_middles(local, pieces, part) for part in chosen.T]  # two (k, 3)
     for _ in range(_NEWTON_STEPS):
-        gap = volume(where[0]) - volume(where[1])
-        slopes = _slopes(volume, where, tangents)
+        gap = local(where[0]) - local(where[1])
+        slopes = _slopes(local, where, tangents)
         step = np.einsum("kab,kb->ka", np.linalg.pinv(slopes, rcond=1e-9), gap)  # (k, 4)
         for side in range(2):
             where[side][rows, tangents[side]] -= step[:, 2 * side : 2 * side + 2]
             np.clip(where[side], 0.0, 1.0, out=where[side])
-    gap = np.linalg.norm(volume(where[0]) - volume(where[1]), axis=1)
-    singular = np.linalg.svd(_slopes(volume, where, tangents), compute_uv=False)
-    size = float(np.abs(volume.control_points).max())
-    met = (gap < 1e-11 * size) & (singular[:, 2] > 1e-4 * singular[:, 0])  # the surfaces cross, they do not just touch
-    met &= np.abs(where[0] - where[1]).max(axis=1) > 1e-6
+    gap = np.linalg.norm(local(where[0]) - local(where[1]), axis=1)
+    singular = np.linalg.svd(_slopes(local, where, tangents), compute_uv=False)
+    met = (gap < error) & (singular[:, 2] > 1e-4 * singular[:, 0])  # the surfaces cross, they do not just touch
+    distance = np.abs(where[0] - where[1]).max(axis=1)
+    met &= (distance > 1e-6) & (distance * singular[:, 2] > _DISTINCT * (gap + error))
     if not met.any():
         return None
     best = int(np.flatnonzero(met)[0])
-    first, second = (_as_point(side[best]) for side in where)
-    return Meeting((first, second), _as_point(volume(where[0][best])[0]))
+    return where[0][best], where[1][best]
 
 
 def _slopes(volume: BSplineVolume, where: list[Array], tangents: list[NDArray[np.int64]]) -> Array:

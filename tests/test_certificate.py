@@ -336,3 +336,46 @@ def test_the_largest_coordinates_stay_within_double_precision():
     cube = BSplineVolume((3, 3, 3), knots, grid_of(knots, (3, 3, 3)))
     found = certify(cube.transformed(2e100, [-1e100] * 3))
     assert found.verdict == "certified" and found.mean_det == pytest.approx(8e300)
+
+
+def axes_scaled(volume, exponents):
+    return BSplineVolume(volume.degrees, volume.knots, np.ldexp(volume.control_points, exponents))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("case", range(len(CASES)))
+def test_powers_of_two_along_the_axes_change_nothing(case):
+    degrees, n_spans, amplitude = CASES[case]
+    rng = np.random.default_rng(100 + case)
+    for factor in (0.5, 1.0, 1.5):
+        volume = random_volume(rng, degrees, n_spans, factor * amplitude)
+        exponents = rng.integers(-300, 301, 3)
+        expected, found = certify(volume), certify(axes_scaled(volume, exponents))
+        assert (found.verdict, found.lower_bound) == (expected.verdict, expected.lower_bound)
+        assert found.unproved.tolist() == expected.unproved.tolist()
+        assert found.mean_det == np.ldexp(expected.mean_det, int(exponents.sum()))
+
+
+def test_scales_of_all_magnitudes_against_rational_arithmetic():
+    """Up to the limits of double precision: each digit that is kept in a coordinate counts."""
+    rng = np.random.default_rng(5)
+    seen = set()
+    for amplitude in (0.08, 0.12, 0.16, 0.2, 0.24, 0.28, 0.32, 0.36):
+        volume = random_volume(rng, (1, 1, 1), (2, 1, 1), amplitude)
+        volume = axes_scaled(volume, rng.permutation([330, rng.integers(-300, 300), -740]))
+        truth = {exact_verdict(c) for c in exact_coefficients(volume).values()}
+        verdict = certify(volume).verdict
+        assert verdict == ("folded" if False in truth else "certified") and None not in truth
+        seen.add(verdict)
+    assert seen == {"certified", "folded"}
+
+
+@pytest.mark.parametrize(("heights", "verdict"), [([0, 100.49, -0.49, 100.51], "folded"), ([0, 1, 2, 3], "certified")])
+def test_a_component_near_the_least_numbers_keeps_its_digits(heights, verdict):
+    """x up to 1e100, z near 1e-223: scaled by one factor z would lose the digits that tell a fold."""
+    knots = open_uniform_knots(2, 1), open_uniform_knots(2, 1), open_uniform_knots(4, 3)
+    points = np.stack(np.meshgrid([0.0, 2.0**332], [0.0, 1.0], np.ldexp(heights, -741), indexing="ij"), axis=-1)
+    volume = BSplineVolume((1, 1, 3), knots, points)
+    found = certify(volume)
+    assert found.verdict == verdict
+    assert found.mean_det == pytest.approx(np.ldexp(heights[-1], 332 - 741))

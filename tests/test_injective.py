@@ -89,16 +89,52 @@ def test_knife_edges(sharpness):
     assert check_boundary(mapped(place)).injective is True
 
 
-@pytest.mark.parametrize("factor", [1e-30, 1e-6, 1e30])
+@pytest.mark.parametrize("factor", [1e-300, 1e-120, 1e-6, 1e30, 1e99])
 def test_the_answer_does_not_depend_on_units(factor):
     for turns, injective in ((0.98, True), (1.02, False)):
         assert check_boundary(bent(turns).transformed(factor, np.zeros(3))).injective is injective
 
 
-def test_far_from_the_origin_digits_are_lost_but_nothing_is_claimed():
-    far = bent(0.98).transformed(1.0, np.full(3, 1e6))
-    assert check_boundary(far).injective is True
+@pytest.mark.parametrize("offset", [1e6, 1e9, 1e11])
+def test_far_from_the_origin_the_coordinates_are_taken_as_they_are(offset):
+    """Rounding to what is left of their digits moves the control points; the proofs are of those moved points."""
+    assert check_boundary(bent(0.98).transformed(1.0, np.full(3, offset))).injective is True
+    far = bent(1.02).transformed(1.0, np.full(3, offset))
+    found = check_boundary(far)
+    assert found.injective is False
+    first, second = np.array(found.meeting.parameters)
+    assert np.abs(first - second).max() > 0.5
+    assert np.abs(far(first) - far(second)).max() <= 4.0 * np.spacing(offset)
+
+
+def test_where_hardly_a_digit_is_left_nothing_is_claimed():
     assert check_boundary(bent(1.02).transformed(1.0, np.full(3, 1e14)), max_depth=3).injective is not True
+
+
+def disturbed(rng):
+    """A turned cube with random control points, one corner of it flattened or not."""
+    degree = int(rng.integers(1, 4))
+    knots = open_uniform_knots(int(rng.integers(max(3, degree + 1), 6)), degree)
+    rows = greville(knots, degree)
+    points = np.stack(np.meshgrid(rows, rows, rows, indexing="ij"), axis=-1)
+    points += 10.0 ** rng.uniform(-2.0, -0.5) * np.diff(rows).min() * rng.normal(size=points.shape)
+    if rng.random() < 0.5:
+        points[..., 2] -= 0.9 * points[..., 0] * points[..., 2]
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return BSplineVolume.uniform(points @ (np.linalg.det(turn) * turn).T, degree)
+
+
+def test_far_from_the_origin_neighbours_beside_an_edge_are_no_meeting():
+    """Two points beside an edge of the cube differ by less than the last digit of such coordinates."""
+    rng = np.random.default_rng(0)
+    answers = []
+    while len(answers) < 24:
+        volume = disturbed(rng)
+        if certify(volume, max_depth=3).verdict == "certified" and check_boundary(volume).injective is True:
+            direction = rng.normal(size=3)
+            for offset in (1e6, 1e9, 1e11):
+                answers.append(check_boundary(volume.transformed(1.0, offset * direction)).injective)
+    assert answers.count(True) == len(answers)
 
 
 def test_collapsed_faces_are_undecided():
