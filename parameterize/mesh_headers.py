@@ -143,6 +143,11 @@ def _check_vtu(data: bytes) -> Header:
         raise MeshError(f"not a whole .vtu: no <VTKFile> ... </VTKFile>; {DAMAGED}")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise MeshError("the .vtu declares a document type: entities are not expanded here, take the declaration out")
+    pieces = len(re.findall(rb"<Piece\b", data))
+    if pieces > 1:
+        raise MeshError(
+            f"the .vtu holds {pieces} pieces: merge them into one, in ParaView with Merge Blocks, and save it"
+        )
     for name in (b"NumberOfPoints", b"NumberOfCells"):
         for match in re.findall(name + rb"\s*=\s*[\"'](\d+)[\"']", data):
             count = _count(match)  # at least a byte each, compressed or not

@@ -55,8 +55,9 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     suffix = (suffixes[:-1] if packed else suffixes)[-1:]
     if not suffix or suffix[0] not in FORMATS:
         raise MeshError(f"unknown format: expected a name ending in one of {' '.join(FORMATS)}, or these with .gz")
-    stored = _read_bytes(path, BYTES_AT_LEAST + BYTES_PER_FACE * max_faces)
-    data = _unpack(stored, BYTES_AT_LEAST + BYTES_PER_FACE * max_faces) if packed else stored
+    limit = BYTES_AT_LEAST + BYTES_PER_FACE * max_faces
+    stored = _read_bytes(path, limit)
+    data = _unpack(stored, limit) if packed else stored
     if not data.strip():
         raise MeshError("the file is empty: export it again")
     header = check_header(data, suffix[0], max_faces)
@@ -72,7 +73,7 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
         vertices, faces = _parse_trimesh(data, suffix[0])
         count = min(len(faces), promised)
     else:
-        vertices, faces, count = _parse_meshio(plain or data, suffix[0], BYTES_AT_LEAST + BYTES_PER_FACE * max_faces)
+        vertices, faces, count = _parse_meshio(plain or data, suffix[0], limit)
     if count < promised:
         raise MeshError(f"{promised} faces promised, {count} read; {DAMAGED}")
     if len(faces) > count:

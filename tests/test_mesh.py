@@ -203,6 +203,12 @@ REFUSED = {
         '<VTKFile type="UnstructuredGrid"><Piece NumberOfPoints="1000000000" NumberOfCells="1"></Piece></VTKFile>',
         "NumberOfPoints=1000000000",
     ),
+    "pieces.vtu": (
+        '<VTKFile type="UnstructuredGrid"><UnstructuredGrid>'
+        + 2 * '<Piece NumberOfPoints="4" NumberOfCells="1"></Piece>'
+        + "</UnstructuredGrid></VTKFile>",
+        "holds 2 pieces: merge them",
+    ),
     "entities.vtu": (
         '<!DOCTYPE a [<!ENTITY b "c">]><VTKFile type="UnstructuredGrid">&b;</VTKFile>',
         "declares a document type",
@@ -457,6 +463,9 @@ def test_the_deepest_point_of_an_angle_is_in_its_elbow():
     [
         [[0, 0], [2, 1], [0, 0.5], [-2, 1]],  # a dart
         [[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]],  # a U: no corner sees all of it
+        [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0], [1, 1], [1, 3], [3, 3], [3, 1], [1, 1]],  # a slit to a hole
+        [[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [2, 1], [1, 1], [0, 1]],  # corners in a row
+        [[0, 0], [1, 0], [1, 1], [1 - 1e-6, 1], [0, 1]],
     ],
 )
 def test_concave_polygons_are_cut_inside(outline, size):
@@ -470,6 +479,25 @@ def test_concave_polygons_are_cut_inside(outline, size):
     assert len(areas) == len(points) - 2
     assert areas.min() > 0
     assert areas.sum() == pytest.approx(area)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_polygons_not_quite_plane_keep_their_sides(seed):
+    """An L, turned in space and rounded as files are: 4 triangles that turn like it."""
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    outline = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]], dtype=float)
+    points = np.round(outline @ turn.T, 3)
+    corners = points[triangulate(points, [[0, 1, 2, 3, 4, 5]])]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ np.cross(*turn.T[:2]) / 2
+    assert len(areas) == 4
+    assert areas.min() > 0.1
+    assert areas.sum() == pytest.approx(3.0, abs=0.01)
+
+
+def test_repeated_corners_leave_no_hole():
+    surface = surface_from_arrays(CUBE, triangulate(CUBE, [[*quad, quad[-1], quad[0]] for quad in QUADS]))
+    assert is_unit_cube(surface)
+    assert surface.notices == ("dropped 12 degenerate faces",)
 
 
 def test_polygons_keep_their_order():
