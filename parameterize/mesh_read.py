@@ -19,13 +19,16 @@ from .arrays import Array, IntArray
 from .mesh_common import MeshError
 from .mesh_gmsh import trim_gmsh
 from .mesh_headers import DAMAGED, check_header, plain_ply
+from .mesh_medit import trim_medit
 from .mesh_obj import trim_obj
+from .mesh_off import off_to_obj
 from .mesh_polygons import triangulate
+from .mesh_stl import trim_stl
 from .mesh_unpack import unpacking_at_most
 
-TRIMESH_FORMATS = (".stl", ".ply", ".off")
-MESHIO_FORMATS = {".obj": "obj", ".ply": "ply", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
-FORMATS = (".obj", *TRIMESH_FORMATS, ".mesh", ".msh", ".vtu")
+TRIMESH_FORMATS = (".stl", ".ply")
+MESHIO_FORMATS = {".obj": "obj", ".off": "obj", ".ply": "ply", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
+FORMATS = (".obj", ".stl", ".ply", ".off", ".mesh", ".msh", ".vtu")
 POLYGONS = ("triangle", "quad", "polygon")
 BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
 BYTES_AT_LEAST = 64 << 20
@@ -60,13 +63,17 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     data = _unpack(stored, limit) if packed else stored
     if not data.strip():
         raise MeshError("the file is empty: export it again")
+    if suffix[0] == ".stl":
+        data = trim_stl(data)
     header = check_header(data, suffix[0], max_faces)
     notices = [*(["unpacked from .gz"] if packed else []), *header.notices]
-    if suffix[0] == ".obj":
-        data, remarks = trim_obj(data, max_faces)
+    if suffix[0] in (".obj", ".off"):
+        data, remarks = trim_obj(off_to_obj(data) if suffix[0] == ".off" else data, max_faces)
         notices += remarks
     elif suffix[0] == ".msh":
         data = trim_gmsh(data)
+    elif suffix[0] == ".mesh":
+        data = trim_medit(data)
     promised = header.polygons or 0
     plain = plain_ply(data) if suffix[0] == ".ply" else None
     if suffix[0] in TRIMESH_FORMATS and plain is None:

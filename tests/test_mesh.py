@@ -74,6 +74,12 @@ def ply(vertices=CUBE, faces=TRIANGLES, counts=None, binary=False):
     return (head + "\n".join(rows) + "\n").encode()
 
 
+def medit(version="MeshVersionFormatted 2\nDimension 3", more=""):
+    rows = [version, "Vertices\n8", *("{} {} {} 0".format(*v) for v in CUBE)]
+    rows += [more, "Triangles\n12", *("{} {} {} 0".format(*(face + 1)) for face in TRIANGLES)]
+    return "\n".join([*rows, "Tetrahedra\n0", "End", ""])
+
+
 def flagged_ply():
     """Faces with a property beside the corners."""
     head, mark, body = ply().decode().partition("end_header\n")
@@ -105,6 +111,7 @@ ACCEPTED = {
     "negative.obj": (obj(faces=[[i - 9 for i in quad] for quad in QUADS]), "negative (relative) vertex numbers"),
     "seams.obj": (obj(CUBE[np.ravel(QUADS)], np.arange(24).reshape(6, 4)), "welded 16 duplicate vertices"),
     "texture.obj": (obj().replace("f 1 3", "vt 0 0\nvn 0 0 1\nf 1/1/1 3//1"), "6 polygons"),
+    "ends.obj": (obj().replace("f 1 3", "# C:\\\ng C:\\\nf 1 \\ \n3", 1), "6 polygons"),
     "colours.obj": (obj().replace("v 0.0 0.0 0.0", "v 0.0 0.0 0.0 0.5 0.5 0.5"), "6 polygons"),
     "groups.obj": (obj().replace("f 1", "o cube\ng side\nusemtl grey\nf 1", 1) + "l 1 2\n", "6 polygons"),
     "mixed.obj": (obj(faces=MIXED), "9 polygons cut into 12 triangles"),
@@ -116,6 +123,8 @@ ACCEPTED = {
     "binary.stl": (binary_stl(), "welded 28 duplicate vertices"),
     "solid.stl": (binary_stl(header=b"solid but binary"), "although it starts with 'solid'"),
     "text.stl": (text_stl(), "welded 28"),
+    "names.stl": ("; comment\n" + text_stl().replace("cube", "facet normal vertex 1"), "welded 28"),
+    "cr.stl": (b"\xef\xbb\xbf" + text_stl().replace("\n", "\r").encode(), "welded 28"),
     "UPPER.STL": (text_stl().upper(), "welded 28"),
     "packed.stl.gz": (gzip.compress(binary_stl()), "unpacked from .gz"),
     "text.ply": (ply(), None),
@@ -126,6 +135,14 @@ ACCEPTED = {
     "index.ply": (ply(faces=MIXED).replace(b"vertex_indices", b"vertex_index"), "9 polygons cut"),
     "flags.ply": (flagged_ply(), None),
     "quads.off": (off(), "6 polygons cut"),
+    "colours.off": (off().replace("OFF", "COFF").replace("\n4 ", " 1 0 0 1 # red\n4 "), "6 polygons cut"),
+    "one_word.off": ("\ufeff# a cube\n" + off().replace("OFF\n", "off"), "6 polygons cut"),
+    "surface.mesh": (medit(), None),
+    "lines.mesh": (
+        "# a cube\n" + medit("MeshVersionFormatted\n2\nDimension\n3").replace("Vertices\n", "Vertices "),
+        None,
+    ),
+    "more.mesh": ("\ufeff" + medit(more="RequiredTriangles\n2\n1\n2\nNormals 1\n0 0 1\nRequiredEdges 1\n1"), None),
     "comments.off": (off().replace("OFF\n", "OFF\n# a cube\n\n").replace("\n", "\r\n"), "6 polygons cut"),
 }
 
@@ -173,7 +190,13 @@ REFUSED = {
     "nan.ply": (ply(NOT_A_NUMBER, binary=True), "with NaN or infinite"),
     "range.obj": (obj() + "f 1 2 99\n", "1 vertex numbers out of range, the first is 98"),
     "below.obj": (obj() + "f 1 2 -20\n", "1 vertex numbers out of range, the first is -12"),
-    "range.off": (off(faces=[*QUADS, [0, 1, 77]]), "not readable as .off"),
+    "range.off": (off(faces=[*QUADS, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
+    "binary.off": ("OFF BINARY\n", "a binary OFF is not read: save it as text"),
+    "pair.off": (off(faces=[*QUADS, [0, 1]]), "line 17: a face has 2 corners"),
+    "corner.off": (off().replace("4 0 2 3 1", "4 0 2 -3 1"), "line 11: a face needs its number of corners"),
+    "line.obj": (obj().replace("f 1 3", "f 1 \\\n3", 1) + "f 1 two 3\n", "line 16: a face needs vertex numbers"),
+    "flat.mesh": ("MeshVersionFormatted 2\nDimension 2\n", "not of dimension 3"),
+    "short.mesh": (medit().replace(" 0\nTetra", "\nTetra"), "promises 12 Triangles, 48 numbers, 47 follow"),
     "range.ply": (ply(faces=[*TRIANGLES, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
     "few.obj": (obj(faces=QUADS[:1]), "2 faces, a closed surface needs at least 4"),
     "cut.stl": (binary_stl()[:-20], "must have 684 bytes, this one has 664"),
