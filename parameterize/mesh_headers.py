@@ -102,6 +102,8 @@ def _check_ply(data: bytes) -> Header:
             least += 2 * counts[element] if is_text else 0
         elif words[:1] == ["property"] and len(words) >= 3 and counts and not is_text:
             least += counts[element] * PLY_BYTES.get(words[2] if words[1] == "list" else words[1], 1)
+    if counts.get("tristrips"):
+        raise MeshError("PLY with triangle strips (element tristrips): save its faces as triangles")
     if not counts.get("vertex") or not counts.get("face"):
         found = f"{counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces"
         raise MeshError(f"PLY with {found} is no surface: export the faces too")

@@ -109,6 +109,8 @@ def files():
     yield "cube.zip", refused(_archive(), "unpack what is in it first")
     yield "zipped.obj", refused(_archive(), "unpack what is in it first")
     yield "zipped.npz", refused(_archive(), "has no array named")
+    yield "scene.gltf", refused('{"asset": {"version": "2.0"}}', "unknown format: expected")
+    yield "model.3mf", refused(_archive(), "unknown format: expected")
     yield "limit.obj", accepted(obj(faces=TRIANGLES), "", "--max-faces", "12")
     yield "over.obj", refused(obj(faces=TRIANGLES), "12 faces, more than max_faces=11", "--max-faces", "11")
     yield "over.stl", refused(binary_stl(), "12 faces, more than max_faces=11", "--max-faces", "11")

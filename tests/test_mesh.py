@@ -206,6 +206,7 @@ REFUSED = {
     "cut_binary.ply": (ply(binary=True)[:-30], "truncated or damaged"),
     "cut.off": (off()[:-30], "rows follow"),
     "points.ply": (ply(faces=np.empty((0, 3), int)), "8 vertices and 0 faces is no surface"),
+    "strips.ply": (ply().replace(b"element face", b"element tristrips"), "triangle strips"),
     "billion.ply": (ply(counts=(10**9, 12)), "at least 2000000024 bytes"),
     "billion_binary.ply": (ply(counts=(8, 500_000), binary=True), "at least 500096 bytes"),
     "billion.off": (off(counts=(10**9, 6)), "promises 1000000000 vertices"),
