@@ -88,7 +88,7 @@ def _check_ascii_stl(data: bytes) -> Header:
 
 def _check_ply(data: bytes) -> Header:
     head, mark, _ = data.partition(b"end_header")
-    if not data.startswith(b"ply") or not mark:
+    if not data.removeprefix(b"\xef\xbb\xbf").startswith(b"ply") or not mark:
         raise MeshError(f"not a PLY: no header from 'ply' to 'end_header'; {DAMAGED}")
     body = data[len(head) + len(mark) :]
     lines = [line.split() for line in head.decode("latin-1").splitlines()]

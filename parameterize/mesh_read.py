@@ -8,7 +8,7 @@ import io
 import logging
 import tempfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,13 +22,19 @@ from .mesh_headers import DAMAGED, check_header, plain_ply
 from .mesh_medit import trim_medit
 from .mesh_obj import trim_obj
 from .mesh_off import off_to_obj
+from .mesh_ply import text_ply_to_obj
 from .mesh_polygons import triangulate
 from .mesh_stl import trim_stl
 from .mesh_unpack import unpacking_at_most
 
 TRIMESH_FORMATS = (".stl", ".ply")
-MESHIO_FORMATS = {".obj": "obj", ".off": "obj", ".ply": "ply", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
+MESHIO_FORMATS = {".obj": "obj", ".ply": "ply", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
 FORMATS = (".obj", ".stl", ".ply", ".off", ".mesh", ".msh", ".vtu")
+REWRITTEN: dict[str, Callable[[bytes], bytes | None]] = {
+    ".obj": bytes,
+    ".off": off_to_obj,
+    ".ply": text_ply_to_obj,
+}  # as OBJ records, where a file is text
 POLYGONS = ("triangle", "quad", "polygon")
 BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
 BYTES_AT_LEAST = 64 << 20
@@ -67,20 +73,21 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
         data = trim_stl(data)
     header = check_header(data, suffix[0], max_faces)
     notices = [*(["unpacked from .gz"] if packed else []), *header.notices]
-    if suffix[0] in (".obj", ".off"):
-        data, remarks = trim_obj(off_to_obj(data) if suffix[0] == ".off" else data, max_faces)
+    as_obj = REWRITTEN[suffix[0]](data) if suffix[0] in REWRITTEN else None
+    if as_obj is not None:
+        data, remarks = trim_obj(as_obj, max_faces)
         notices += remarks
     elif suffix[0] == ".msh":
         data = trim_gmsh(data)
     elif suffix[0] == ".mesh":
         data = trim_medit(data)
     promised = header.polygons or 0
-    plain = plain_ply(data) if suffix[0] == ".ply" else None
-    if suffix[0] in TRIMESH_FORMATS and plain is None:
+    plain = plain_ply(data) if suffix[0] == ".ply" and as_obj is None else None
+    if suffix[0] in TRIMESH_FORMATS and plain is None and as_obj is None:
         vertices, faces = _parse_trimesh(data, suffix[0])
         count = min(len(faces), promised)
     else:
-        vertices, faces, count = _parse_meshio(plain or data, suffix[0], limit)
+        vertices, faces, count = _parse_meshio(plain or data, ".obj" if as_obj is not None else suffix[0], limit)
     if count < promised:
         raise MeshError(f"{promised} faces promised, {count} read; {DAMAGED}")
     if len(faces) > count:
