@@ -18,7 +18,7 @@ import numpy as np
 from .arrays import Array, IntArray
 from .mesh_common import MeshError
 from .mesh_gmsh import trim_gmsh
-from .mesh_headers import DAMAGED, check_header, plain_ply
+from .mesh_headers import DAMAGED, check_face_count, check_header, plain_ply
 from .mesh_medit import trim_medit
 from .mesh_obj import trim_obj
 from .mesh_off import off_to_obj
@@ -87,7 +87,7 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
         vertices, faces = _parse_trimesh(data, suffix[0])
         count = min(len(faces), promised)
     else:
-        vertices, faces, count = _parse_meshio(plain or data, ".obj" if as_obj is not None else suffix[0], limit)
+        vertices, faces, count = _parse_meshio(plain or data, ".obj" if as_obj is not None else suffix[0], max_faces)
     if count < promised:
         raise MeshError(f"{promised} faces promised, {count} read; {DAMAGED}")
     if len(faces) > count:
@@ -154,7 +154,7 @@ def _parse_trimesh(data: bytes, suffix: str) -> tuple[Array, IntArray]:
     return vertices, faces
 
 
-def _parse_meshio(data: bytes, suffix: str, limit: int) -> tuple[Array, IntArray, int]:
+def _parse_meshio(data: bytes, suffix: str, max_faces: int) -> tuple[Array, IntArray, int]:
     """Vertices, triangles, and the number of polygons they were cut from."""
     import meshio
 
@@ -162,7 +162,7 @@ def _parse_meshio(data: bytes, suffix: str, limit: int) -> tuple[Array, IntArray
         copy = Path(folder, f"mesh{suffix}")
         copy.write_bytes(data)
         try:
-            with _quiet(), unpacking_at_most(limit):
+            with _quiet(), unpacking_at_most(BYTES_AT_LEAST + BYTES_PER_FACE * max_faces):
                 mesh = meshio.read(copy, file_format=MESHIO_FORMATS[suffix])
         except (Exception, SystemExit) as error:  # meshio exits the process on some files
             raise MeshError(f"not readable as {suffix} ({_first_line(error)}); {DAMAGED}") from None
@@ -188,6 +188,7 @@ def _parse_meshio(data: bytes, suffix: str, limit: int) -> tuple[Array, IntArray
     polygons = [polygon for kind, rows in blocks if kind in POLYGONS for polygon in rows.tolist()]
     if not polygons:
         raise MeshError("no tetrahedra and no triangles in the file: export the volume or its surface")
+    check_face_count(sum(map(len, polygons)) - 2 * len(polygons), max_faces)  # before the time is spent on them
     return vertices, triangulate(vertices, polygons), len(polygons)
 
 
