@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.files import replacing
+from parameterize.mesh_read import FORMATS
 from parameterize.volume import BSplineVolume
 
 from . import report as reports
@@ -52,15 +53,20 @@ ENDINGS = {
     "view": "_view.vtu",
     "json": ".json",
 }
+_READ = ("", ".npz", ".xml", ".mesh", ".json", ".zip", *FORMATS)  # a .zip, or a surface's name, may hold a volume
 BESIDE = {"gismo": "_u.xml", "mfem": ".gf", "json": "_u.json"}  # the file of a solution, after the volume's stem
 _PROBLEMS = ("poisson", "elasticity")  # sections of report.json with a solution.npz
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
 
 def is_volume(path: str | Path) -> bool:
-    """Whether a file is a volume (rather than a surface) by its beginning, or by the ending .npz."""
+    """Whether a file is a volume (rather than a surface) by its beginning, or by the ending .npz.
+
+    Other programs' files begin alike (glTF as JSON, 3MF as a ZIP archive): with an ending not read here, it is none.
+    """
     source = Path(path)
-    return source.suffix == ".npz" or (source.is_file() and kind_of(source) is not None)
+    is_read = source.suffix.lower() in _READ and source.is_file()
+    return source.suffix == ".npz" or (is_read and kind_of(source) is not None)
 
 
 def load_volume(path: str | Path) -> BSplineVolume:

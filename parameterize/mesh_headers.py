@@ -33,7 +33,7 @@ class Header:
 
 
 def check_header(data: bytes, suffix: str, max_faces: int) -> Header:
-    """Check the bytes of a file by its format (".stl", ".ply", ".off", ".mesh", ".vtu").
+    """Check the bytes of a file by its format (".stl", ".ply", ".vtu"; the others are checked where they are trimmed).
 
     Raises MeshError, without the file's name, for a file that is no such format, promises more than it holds, or has
     more than max_faces faces.
@@ -52,6 +52,14 @@ def check_face_count(count: int, max_faces: int) -> None:
         raise MeshError(
             f"{count} faces, more than max_faces={max_faces}: raise --max-faces, or bring them down with --decimate"
         )
+
+
+def header_count(word: bytes | str) -> int:
+    """The number of elements that a header's word gives; raises MeshError where it is none."""
+    text = word.decode("latin-1") if isinstance(word, bytes) else word
+    if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
+        raise MeshError(f"the header's count {text[:20]!r} is no number of elements; {DAMAGED}")
+    return int(text)
 
 
 def _check_stl(data: bytes) -> Header:
@@ -80,7 +88,7 @@ def _check_ascii_stl(data: bytes) -> Header:
 
 def _check_ply(data: bytes) -> Header:
     head, mark, _ = data.partition(b"end_header")
-    if not data.startswith(b"ply") or not mark:
+    if not data.removeprefix(b"\xef\xbb\xbf").startswith(b"ply") or not mark:
         raise MeshError(f"not a PLY: no header from 'ply' to 'end_header'; {DAMAGED}")
     body = data[len(head) + len(mark) :]
     lines = [line.split() for line in head.decode("latin-1").splitlines()]
@@ -90,10 +98,12 @@ def _check_ply(data: bytes) -> Header:
     for words in lines:
         if words[:1] == ["element"] and len(words) == 3:
             element = words[1]
-            counts[element] = _count(words[2])
+            counts[element] = header_count(words[2])
             least += 2 * counts[element] if is_text else 0
         elif words[:1] == ["property"] and len(words) >= 3 and counts and not is_text:
             least += counts[element] * PLY_BYTES.get(words[2] if words[1] == "list" else words[1], 1)
+    if counts.get("tristrips"):
+        raise MeshError("PLY with triangle strips (element tristrips): save its faces as triangles")
     if not counts.get("vertex") or not counts.get("face"):
         found = f"{counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces"
         raise MeshError(f"PLY with {found} is no surface: export the faces too")
@@ -111,50 +121,21 @@ def plain_ply(data: bytes) -> bytes | None:
     return re.sub(rb"\bvertex_index\b", b"vertex_indices", head) + mark + body if PLAIN_PLY.search(head) else None
 
 
-def _check_off(data: bytes) -> Header:
-    rows = [line.split(b"#")[0].split() for line in data.splitlines()]
-    rows = [row for row in rows if row]
-    if not rows or not re.fullmatch(rb"(ST)?C?N?OFF", rows[0][0].upper()):
-        raise MeshError(f"not an OFF: the first word must be OFF; {DAMAGED}")
-    numbers = rows[0][1:] or (rows[1] if len(rows) > 1 else [])
-    if len(numbers) < 2:
-        raise MeshError(f"OFF without the counts of vertices and faces; {DAMAGED}")
-    vertices, faces = _count(numbers[0]), _count(numbers[1])
-    present = len(rows) - (1 if len(rows[0]) > 1 else 2)
-    if present < vertices + faces:
-        raise MeshError(f"OFF promises {vertices} vertices and {faces} faces, {present} rows follow; {DAMAGED}")
-    return Header(faces)
-
-
-def _check_medit(data: bytes) -> Header:
-    sections = re.findall(rb"(?m)^\s*(Vertices|Triangles|Quadrilaterals|Tetrahedra|Hexahedra|Edges)\s+(\d+)", data)
-    if not data.lstrip().startswith(b"MeshVersionFormatted") or not sections:
-        raise MeshError("not a .mesh: expected the text format that starts with MeshVersionFormatted")
-    rows = data.count(b"\n") + 1
-    promised = sum(_count(count) for _, count in sections)
-    if promised > rows:
-        names = " and ".join(f"{count.decode()} {name.decode()}" for name, count in sections)
-        raise MeshError(f".mesh promises {names}, the file has {rows} rows; {DAMAGED}")
-    return Header()
-
-
 def _check_vtu(data: bytes) -> Header:
     if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
         raise MeshError(f"not a whole .vtu: no <VTKFile> ... </VTKFile>; {DAMAGED}")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise MeshError("the .vtu declares a document type: entities are not expanded here, take the declaration out")
+    pieces = len(re.findall(rb"<Piece\b", data))
+    if pieces > 1:
+        raise MeshError(
+            f"the .vtu holds {pieces} pieces: merge them into one, in ParaView with Merge Blocks, and save it"
+        )
     for name in (b"NumberOfPoints", b"NumberOfCells"):
         for match in re.findall(name + rb"\s*=\s*[\"'](\d+)[\"']", data):
-            count = _count(match)  # at least a byte each, compressed or not
+            count = header_count(match)  # at least a byte each, compressed or not
             _check_room(f"{name.decode()}={count}", count, len(data))
     return Header()
-
-
-def _count(word: bytes | str) -> int:
-    text = word.decode("latin-1") if isinstance(word, bytes) else word
-    if not re.fullmatch(r"\d{1,18}", text):
-        raise MeshError(f"the header's count {text[:20]!r} is no number of elements; {DAMAGED}")
-    return int(text)
 
 
 def _check_room(promised: str, needed: int, available: int) -> None:
@@ -165,7 +146,5 @@ def _check_room(promised: str, needed: int, available: int) -> None:
 CHECKS: dict[str, Callable[[bytes], Header]] = {
     ".stl": _check_stl,
     ".ply": _check_ply,
-    ".off": _check_off,
-    ".mesh": _check_medit,
     ".vtu": _check_vtu,
 }

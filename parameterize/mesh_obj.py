@@ -6,6 +6,7 @@ Texture and normal references go: at a seam they would split a vertex. Corners g
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from .mesh_common import MeshError
 from .mesh_headers import check_face_count
@@ -14,21 +15,22 @@ NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[-+]?(?:nan|inf|infinity)"
 VERTEX = re.compile(rf"(?:(?:{NUMBER})(?: |$)){{3}}", re.ASCII | re.IGNORECASE)
 FACE = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*", re.ASCII)
 
+RECORDS = ("v", "f", "fo")
+
 
 def trim_obj(data: bytes, max_faces: int) -> tuple[bytes, list[str]]:
     r"""The records `v x y z` and `f a b c ...`, relative (negative) numbers resolved, and notices.
 
-    Byte order mark, comments, line ends (\r\n, \r) and continued lines are taken as meant.
+    Byte order mark, comments, line ends (\r\n, \r) and continued records are taken as meant.
     Raises MeshError, without the file's name, naming the line.
     """
     if b"\0" in data:
         raise MeshError("not an OBJ: it holds binary data; export as OBJ text")
-    text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
+    text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     vertices: list[str] = []
     faces: list[str] = []
     relative = False
-    for number, line in enumerate(text.split("\n"), 1):
-        words = line.split("#", 1)[0].split()
+    for number, words in _records(text):
         if words[:1] == ["v"]:
             vertices.append("v " + _vertex(words, number))
         elif words[:1] in (["f"], ["fo"]):
@@ -43,6 +45,21 @@ def trim_obj(data: bytes, max_faces: int) -> tuple[bytes, list[str]]:
     notices = ["byte order mark skipped"] if data.startswith(b"\xef\xbb\xbf") else []
     notices += ["negative (relative) vertex numbers resolved"] if relative else []
     return "\n".join([*vertices, *faces, ""]).encode(), notices
+
+
+def _records(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and words of each record; a vertex or a face that ends in a backslash goes on in the next line."""
+    lines = enumerate(text.split("\n"), 1)
+    for number, line in lines:
+        words = _words(line)
+        while words and words[-1][-1] == "\\" and words[0].rstrip("\\") in RECORDS:
+            words[-1] = words[-1].rstrip("\\")
+            words = [word for word in words if word] + _words(next(lines, (0, ""))[1])
+        yield number, words
+
+
+def _words(line: str) -> list[str]:
+    return line.split("#", 1)[0].split()
 
 
 def _vertex(words: list[str], number: int) -> str:

@@ -8,7 +8,7 @@ import io
 import logging
 import tempfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,14 +18,23 @@ import numpy as np
 from .arrays import Array, IntArray
 from .mesh_common import MeshError
 from .mesh_gmsh import trim_gmsh
-from .mesh_headers import DAMAGED, check_header, plain_ply
+from .mesh_headers import DAMAGED, check_face_count, check_header, plain_ply
+from .mesh_medit import trim_medit
 from .mesh_obj import trim_obj
+from .mesh_off import off_to_obj
+from .mesh_ply import text_ply_to_obj
 from .mesh_polygons import triangulate
+from .mesh_stl import trim_stl
 from .mesh_unpack import unpacking_at_most
 
-TRIMESH_FORMATS = (".stl", ".ply", ".off")
+TRIMESH_FORMATS = (".stl", ".ply")
 MESHIO_FORMATS = {".obj": "obj", ".ply": "ply", ".mesh": "medit", ".msh": "gmsh", ".vtu": "vtu"}
-FORMATS = (".obj", *TRIMESH_FORMATS, ".mesh", ".msh", ".vtu")
+FORMATS = (".obj", ".stl", ".ply", ".off", ".mesh", ".msh", ".vtu")
+REWRITTEN: dict[str, Callable[[bytes], bytes | None]] = {
+    ".obj": bytes,
+    ".off": off_to_obj,
+    ".ply": text_ply_to_obj,
+}  # as OBJ records, where a file is text
 POLYGONS = ("triangle", "quad", "polygon")
 BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
 BYTES_AT_LEAST = 64 << 20
@@ -55,24 +64,30 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     suffix = (suffixes[:-1] if packed else suffixes)[-1:]
     if not suffix or suffix[0] not in FORMATS:
         raise MeshError(f"unknown format: expected a name ending in one of {' '.join(FORMATS)}, or these with .gz")
-    stored = _read_bytes(path, BYTES_AT_LEAST + BYTES_PER_FACE * max_faces)
-    data = _unpack(stored, BYTES_AT_LEAST + BYTES_PER_FACE * max_faces) if packed else stored
+    limit = BYTES_AT_LEAST + BYTES_PER_FACE * max_faces
+    stored = _read_bytes(path, limit)
+    data = _unpack(stored, limit) if packed else stored
     if not data.strip():
         raise MeshError("the file is empty: export it again")
+    if suffix[0] == ".stl":
+        data = trim_stl(data)
     header = check_header(data, suffix[0], max_faces)
     notices = [*(["unpacked from .gz"] if packed else []), *header.notices]
-    if suffix[0] == ".obj":
-        data, remarks = trim_obj(data, max_faces)
+    as_obj = REWRITTEN[suffix[0]](data) if suffix[0] in REWRITTEN else None
+    if as_obj is not None:
+        data, remarks = trim_obj(as_obj, max_faces)
         notices += remarks
     elif suffix[0] == ".msh":
         data = trim_gmsh(data)
+    elif suffix[0] == ".mesh":
+        data = trim_medit(data)
     promised = header.polygons or 0
-    plain = plain_ply(data) if suffix[0] == ".ply" else None
-    if suffix[0] in TRIMESH_FORMATS and plain is None:
+    plain = plain_ply(data) if suffix[0] == ".ply" and as_obj is None else None
+    if suffix[0] in TRIMESH_FORMATS and plain is None and as_obj is None:
         vertices, faces = _parse_trimesh(data, suffix[0])
         count = min(len(faces), promised)
     else:
-        vertices, faces, count = _parse_meshio(plain or data, suffix[0], BYTES_AT_LEAST + BYTES_PER_FACE * max_faces)
+        vertices, faces, count = _parse_meshio(plain or data, ".obj" if as_obj is not None else suffix[0], max_faces)
     if count < promised:
         raise MeshError(f"{promised} faces promised, {count} read; {DAMAGED}")
     if len(faces) > count:
@@ -139,7 +154,7 @@ def _parse_trimesh(data: bytes, suffix: str) -> tuple[Array, IntArray]:
     return vertices, faces
 
 
-def _parse_meshio(data: bytes, suffix: str, limit: int) -> tuple[Array, IntArray, int]:
+def _parse_meshio(data: bytes, suffix: str, max_faces: int) -> tuple[Array, IntArray, int]:
     """Vertices, triangles, and the number of polygons they were cut from."""
     import meshio
 
@@ -147,7 +162,7 @@ def _parse_meshio(data: bytes, suffix: str, limit: int) -> tuple[Array, IntArray
         copy = Path(folder, f"mesh{suffix}")
         copy.write_bytes(data)
         try:
-            with _quiet(), unpacking_at_most(limit):
+            with _quiet(), unpacking_at_most(BYTES_AT_LEAST + BYTES_PER_FACE * max_faces):
                 mesh = meshio.read(copy, file_format=MESHIO_FORMATS[suffix])
         except (Exception, SystemExit) as error:  # meshio exits the process on some files
             raise MeshError(f"not readable as {suffix} ({_first_line(error)}); {DAMAGED}") from None
@@ -173,6 +188,7 @@ def _parse_meshio(data: bytes, suffix: str, limit: int) -> tuple[Array, IntArray
     polygons = [polygon for kind, rows in blocks if kind in POLYGONS for polygon in rows.tolist()]
     if not polygons:
         raise MeshError("no tetrahedra and no triangles in the file: export the volume or its surface")
+    check_face_count(sum(map(len, polygons)) - 2 * len(polygons), max_faces)  # before the time is spent on them
     return vertices, triangulate(vertices, polygons), len(polygons)
 
 

@@ -64,6 +64,23 @@ def _textured():
     return obj(faces=[]) + places + "\n".join(rows) + "\n"
 
 
+def _angle():
+    """A prism over an L, turned in space and rounded: its ends are concave and not quite plane."""
+    outline = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
+    vertices = np.vstack([np.c_[outline, np.full(6, z)] for z in (0, 1)])
+    sides = [[i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6] for i in range(6)]
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    return obj(np.round(vertices @ turn.T, 4), [[5, 4, 3, 2, 1, 0], [6, 7, 8, 9, 10, 11], *sides])
+
+
+def _pocket():
+    """A cube with a pocket in its top: that face has a hole, to which a slit leads from a corner."""
+    square = CUBE[[0, 1, 3, 2]] / 2 + [0.25, 0.25, 0]
+    walls = [[8 + i, 8 + (i + 1) % 4, 12 + (i + 1) % 4, 12 + i] for i in range(4)]
+    faces = [QUADS[0], *QUADS[2:], [4, 5, 7, 6, 4, 8, 11, 10, 9, 8], [12, 13, 14, 15], *walls]
+    return obj(np.vstack([CUBE, square + [0, 0, 1], square + [0, 0, 0.5]]), faces)
+
+
 def _turned_inside(vertices, faces):
     return vertices, faces[:, ::-1]
 
@@ -78,6 +95,8 @@ def shapes():
     yield "flat.obj", refused(obj(CUBE * [1, 1, 0], TRIANGLES), "")
     yield "sheet.obj", refused(obj(CUBE[:4], [[0, 2, 3], [0, 3, 1], [0, 3, 2], [0, 1, 3]]), "")
     yield "scan.obj", refused(_scan(3), "open surface: 3 boundary loops")
+    yield "angle.obj", accepted(_angle(), "8 polygons cut into 20 triangles")
+    yield "pocket.obj", accepted(_pocket(), "11 polygons cut into 28 triangles")
     yield "spike.obj", accepted(_spike(), "self-intersection")
     yield "strict_spike.obj", refused(_spike(), "pull the sheets apart", "--strict")
     yield "huge.obj", accepted(obj(1e12 * CUBE), "unusual size")
@@ -90,6 +109,8 @@ def files():
     yield "cube.zip", refused(_archive(), "unpack what is in it first")
     yield "zipped.obj", refused(_archive(), "unpack what is in it first")
     yield "zipped.npz", refused(_archive(), "has no array named")
+    yield "scene.gltf", refused('{"asset": {"version": "2.0"}}', "unknown format: expected")
+    yield "model.3mf", refused(_archive(), "unknown format: expected")
     yield "limit.obj", accepted(obj(faces=TRIANGLES), "", "--max-faces", "12")
     yield "over.obj", refused(obj(faces=TRIANGLES), "12 faces, more than max_faces=11", "--max-faces", "11")
     yield "over.stl", refused(binary_stl(), "12 faces, more than max_faces=11", "--max-faces", "11")

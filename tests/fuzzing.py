@@ -35,7 +35,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import torch
-from test_mesh import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, obj, off, ply, text_stl
+from test_mesh import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
 
 from iga_nn import pipeline, spline_files
 from iga_nn.formats import is_volume
@@ -363,6 +363,7 @@ def readers() -> tuple[Reader, ...]:
         surface_reader("ply, binary", ".ply", ply(binary=True), ply(faces=MIXED, binary=True)),
         surface_reader("off", ".off", off(), off(faces=MIXED).replace("OFF\n", "OFF\n# a cube\n\n")),
         meshio_reader(".mesh", ".mesh", {}),
+        surface_reader(".mesh, sections", ".mesh", medit(), medit(more="RequiredTriangles 2\n1 2\n")),
         meshio_reader("msh, text", ".msh", *({"file_format": f, "binary": False} for f in ("gmsh", "gmsh22"))),
         meshio_reader("msh, binary", ".msh", *({"file_format": f, "binary": True} for f in ("gmsh", "gmsh22"))),
         meshio_reader("vtu", ".vtu", {"binary": False}, {"compression": None}, {"compression": "zlib"}),

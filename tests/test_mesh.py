@@ -74,6 +74,12 @@ def ply(vertices=CUBE, faces=TRIANGLES, counts=None, binary=False):
     return (head + "\n".join(rows) + "\n").encode()
 
 
+def medit(version="MeshVersionFormatted 2\nDimension 3", more=""):
+    rows = [version, "Vertices\n8", *("{} {} {} 0".format(*v) for v in CUBE)]
+    rows += [more, "Triangles\n12", *("{} {} {} 0".format(*(face + 1)) for face in TRIANGLES)]
+    return "\n".join([*rows, "Tetrahedra\n0", "End", ""])
+
+
 def flagged_ply():
     """Faces with a property beside the corners."""
     head, mark, body = ply().decode().partition("end_header\n")
@@ -105,6 +111,7 @@ ACCEPTED = {
     "negative.obj": (obj(faces=[[i - 9 for i in quad] for quad in QUADS]), "negative (relative) vertex numbers"),
     "seams.obj": (obj(CUBE[np.ravel(QUADS)], np.arange(24).reshape(6, 4)), "welded 16 duplicate vertices"),
     "texture.obj": (obj().replace("f 1 3", "vt 0 0\nvn 0 0 1\nf 1/1/1 3//1"), "6 polygons"),
+    "ends.obj": (obj().replace("f 1 3", "# C:\\\ng C:\\\nf 1 \\ \n3", 1), "6 polygons"),
     "colours.obj": (obj().replace("v 0.0 0.0 0.0", "v 0.0 0.0 0.0 0.5 0.5 0.5"), "6 polygons"),
     "groups.obj": (obj().replace("f 1", "o cube\ng side\nusemtl grey\nf 1", 1) + "l 1 2\n", "6 polygons"),
     "mixed.obj": (obj(faces=MIXED), "9 polygons cut into 12 triangles"),
@@ -116,6 +123,8 @@ ACCEPTED = {
     "binary.stl": (binary_stl(), "welded 28 duplicate vertices"),
     "solid.stl": (binary_stl(header=b"solid but binary"), "although it starts with 'solid'"),
     "text.stl": (text_stl(), "welded 28"),
+    "names.stl": ("; comment\n" + text_stl().replace("cube", "facet normal vertex 1"), "welded 28"),
+    "cr.stl": (b"\xef\xbb\xbf" + text_stl().replace("\n", "\r").encode(), "welded 28"),
     "UPPER.STL": (text_stl().upper(), "welded 28"),
     "packed.stl.gz": (gzip.compress(binary_stl()), "unpacked from .gz"),
     "text.ply": (ply(), None),
@@ -125,7 +134,16 @@ ACCEPTED = {
     "mixed.ply": (ply(faces=MIXED, binary=True), "9 polygons cut into 12 triangles"),
     "index.ply": (ply(faces=MIXED).replace(b"vertex_indices", b"vertex_index"), "9 polygons cut"),
     "flags.ply": (flagged_ply(), None),
+    "lines.ply": (b"\xef\xbb\xbf" + ply().replace(b"\n3", b"\n\n3").replace(b"\n", b"\r"), None),
     "quads.off": (off(), "6 polygons cut"),
+    "colours.off": (off().replace("OFF", "COFF").replace("\n4 ", " 1 0 0 1 # red\n4 "), "6 polygons cut"),
+    "one_word.off": ("\ufeff# a cube\n" + off().replace("OFF\n", "off"), "6 polygons cut"),
+    "surface.mesh": (medit(), None),
+    "lines.mesh": (
+        "# a cube\n" + medit("MeshVersionFormatted\n2\nDimension\n3").replace("Vertices\n", "Vertices "),
+        None,
+    ),
+    "more.mesh": ("\ufeff" + medit(more="RequiredTriangles\n2\n1\n2\nNormals 1\n0 0 1\nRequiredEdges 1\n1"), None),
     "comments.off": (off().replace("OFF\n", "OFF\n# a cube\n\n").replace("\n", "\r\n"), "6 polygons cut"),
 }
 
@@ -164,7 +182,7 @@ REFUSED = {
     "face_word.obj": (obj() + "f 1 two 3\n", "line 15: a face needs vertex numbers"),
     "two_corners.obj": (obj() + "f 1 2\n", "line 15: a face has 2 corners"),
     "corners.obj": (obj() + "f" + " 1 2 3" * 100 + "\n", "a face has 300 corners, more than 256"),
-    "short_row.ply": (ply().replace(b"\n3 0 2 3\n", b"\n36\n"), "a face with fewer corners"),
+    "short_row.ply": (ply().replace(b"\n3 0 2 3\n", b"\n36\n"), "line 18: no face as the header promises"),
     "pair.ply": (ply(faces=[*QUADS, [0, 1]], binary=True), "7 faces promised, 6 read"),
     "zero.obj": (obj() + "f 0 1 2\n", "vertex number 0"),
     "nan.obj": (obj(NOT_A_NUMBER), "1 vertices with NaN or infinite coordinates, the first is vertex 3"),
@@ -173,7 +191,13 @@ REFUSED = {
     "nan.ply": (ply(NOT_A_NUMBER, binary=True), "with NaN or infinite"),
     "range.obj": (obj() + "f 1 2 99\n", "1 vertex numbers out of range, the first is 98"),
     "below.obj": (obj() + "f 1 2 -20\n", "1 vertex numbers out of range, the first is -12"),
-    "range.off": (off(faces=[*QUADS, [0, 1, 77]]), "not readable as .off"),
+    "range.off": (off(faces=[*QUADS, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
+    "binary.off": ("OFF BINARY\n", "a binary OFF is not read: save it as text"),
+    "pair.off": (off(faces=[*QUADS, [0, 1]]), "line 17: a face has 2 corners"),
+    "corner.off": (off().replace("4 0 2 3 1", "4 0 2 -3 1"), "line 11: a face needs its number of corners"),
+    "line.obj": (obj().replace("f 1 3", "f 1 \\\n3", 1) + "f 1 two 3\n", "line 16: a face needs vertex numbers"),
+    "flat.mesh": ("MeshVersionFormatted 2\nDimension 2\n", "not of dimension 3"),
+    "short.mesh": (medit().replace(" 0\nTetra", "\nTetra"), "promises 12 Triangles, 48 numbers, 47 follow"),
     "range.ply": (ply(faces=[*TRIANGLES, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
     "few.obj": (obj(faces=QUADS[:1]), "2 faces, a closed surface needs at least 4"),
     "cut.stl": (binary_stl()[:-20], "must have 684 bytes, this one has 664"),
@@ -183,6 +207,7 @@ REFUSED = {
     "cut_binary.ply": (ply(binary=True)[:-30], "truncated or damaged"),
     "cut.off": (off()[:-30], "rows follow"),
     "points.ply": (ply(faces=np.empty((0, 3), int)), "8 vertices and 0 faces is no surface"),
+    "strips.ply": (ply().replace(b"element face", b"element tristrips"), "triangle strips"),
     "billion.ply": (ply(counts=(10**9, 12)), "at least 2000000024 bytes"),
     "billion_binary.ply": (ply(counts=(8, 500_000), binary=True), "at least 500096 bytes"),
     "billion.off": (off(counts=(10**9, 6)), "promises 1000000000 vertices"),
@@ -202,6 +227,12 @@ REFUSED = {
     "many.vtu": (
         '<VTKFile type="UnstructuredGrid"><Piece NumberOfPoints="1000000000" NumberOfCells="1"></Piece></VTKFile>',
         "NumberOfPoints=1000000000",
+    ),
+    "pieces.vtu": (
+        '<VTKFile type="UnstructuredGrid"><UnstructuredGrid>'
+        + 2 * '<Piece NumberOfPoints="4" NumberOfCells="1"></Piece>'
+        + "</UnstructuredGrid></VTKFile>",
+        "holds 2 pieces: merge them",
     ),
     "entities.vtu": (
         '<!DOCTYPE a [<!ENTITY b "c">]><VTKFile type="UnstructuredGrid">&b;</VTKFile>',
@@ -463,6 +494,9 @@ def test_the_deepest_point_of_an_angle_is_in_its_elbow():
     [
         [[0, 0], [2, 1], [0, 0.5], [-2, 1]],  # a dart
         [[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]],  # a U: no corner sees all of it
+        [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0], [1, 1], [1, 3], [3, 3], [3, 1], [1, 1]],  # a slit to a hole
+        [[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [2, 1], [1, 1], [0, 1]],  # corners in a row
+        [[0, 0], [1, 0], [1, 1], [1 - 1e-6, 1], [0, 1]],
     ],
 )
 def test_concave_polygons_are_cut_inside(outline, size):
@@ -476,6 +510,25 @@ def test_concave_polygons_are_cut_inside(outline, size):
     assert len(areas) == len(points) - 2
     assert areas.min() > 0
     assert areas.sum() == pytest.approx(area)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_polygons_not_quite_plane_keep_their_sides(seed):
+    """An L, turned in space and rounded as files are: 4 triangles that turn like it."""
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    outline = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]], dtype=float)
+    points = np.round(outline @ turn.T, 3)
+    corners = points[triangulate(points, [[0, 1, 2, 3, 4, 5]])]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ np.cross(*turn.T[:2]) / 2
+    assert len(areas) == 4
+    assert areas.min() > 0.1
+    assert areas.sum() == pytest.approx(3.0, abs=0.01)
+
+
+def test_repeated_corners_leave_no_hole():
+    surface = surface_from_arrays(CUBE, triangulate(CUBE, [[*quad, quad[-1], quad[0]] for quad in QUADS]))
+    assert is_unit_cube(surface)
+    assert surface.notices == ("dropped 12 degenerate faces",)
 
 
 def test_polygons_keep_their_order():
