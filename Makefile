@@ -32,7 +32,7 @@ validate: $(STAMP)
 	$(BIN)/python examples/validation.py
 	$(BIN)/python -m pytest -m slow
 
-# Takes some two minutes a surface; goes on where it was interrupted.
+# Takes some two to ten minutes a surface, where nothing certifies up to 40; goes on where it was interrupted.
 stress: $(STAMP)
 	$(BIN)/python examples/benchmarks/stress.py
 

@@ -276,7 +276,7 @@ def as_text(rows: Sequence[Row], options: Options) -> str:
     ]
     if failed:
         parts += [
-            "Not certified; mesh and picture are kept under the surface's name:",
+            "Not certified; mesh and picture, the places in red, are kept under the surface's name:",
             processes.as_markdown(FAILED_HEAD, [_failed_cells(row) for row in failed]),
         ]
     if missing := len(options.numbers) - len(rows):
