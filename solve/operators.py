@@ -175,7 +175,7 @@ def assemble(
             turned = _count_folded(measure, rule, q)
             if turned:  # measured with |det J|, the form stays positive: an answer to show, if not to trust
                 folded.append(turned)
-                factors[q] *= to_blocks(np.sign(measure))[:, :, None]
+                factors[q, :, :, :6] *= to_blocks(np.sign(measure))[:, :, None]
                 np.abs(measure, out=measure)
             if reaction is not None:
                 factors[q, :, :, 6] = to_blocks(reaction(*where) * measure)

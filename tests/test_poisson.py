@@ -155,8 +155,11 @@ def test_a_map_that_is_not_certified_is_said_loudly(caplog):
     assert solve_poisson(benchmark_volume(3), WAVE, certified="certified").report.notices == ()
 
 
-def test_a_fold_seen_at_the_gauss_points_is_said():
-    report = solve_poisson(benchmark_volume(8, amplitude=0.3), WAVE).report
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("reaction", [None, "2"])
+def test_a_fold_seen_at_the_gauss_points_is_said(reaction):
+    problem = Poisson(exact=WAVE.exact, reaction=reaction)
+    report = solve_poisson(benchmark_volume(8, amplitude=0.3), problem).report
     assert any("det J < 0 at" in notice for notice in report.notices)
     assert report.converged and report.iterations > 0 and report.l2 is not None  # with |det J| the form stays positive
 
