@@ -16,6 +16,7 @@ VERTEX = re.compile(rf"(?:(?:{NUMBER})(?: |$)){{3}}", re.ASCII | re.IGNORECASE)
 FACE = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*", re.ASCII)
 
 RECORDS = ("v", "f", "fo")
+CORNER = re.compile(r"\d{1,18}", re.ASCII)
 
 
 def trim_obj(data: bytes, max_faces: int) -> tuple[bytes, list[str]]:
@@ -45,6 +46,13 @@ def trim_obj(data: bytes, max_faces: int) -> tuple[bytes, list[str]]:
     notices = ["byte order mark skipped"] if data.startswith(b"\xef\xbb\xbf") else []
     notices += ["negative (relative) vertex numbers resolved"] if relative else []
     return "\n".join([*vertices, *faces, ""]).encode(), notices
+
+
+def face_record(corners: list[str]) -> str:
+    """The record of a face whose corners, words of another format, count from 0. Raises ValueError for other words."""
+    if not all(map(CORNER.fullmatch, corners)):
+        raise ValueError(f"corners {corners!r:.80}")
+    return "f " + " ".join(str(int(corner) + 1) for corner in corners)
 
 
 def _records(text: str) -> Iterator[tuple[int, list[str]]]:

@@ -9,9 +9,9 @@ import re
 
 from .mesh_common import MeshError
 from .mesh_headers import DAMAGED, header_count
+from .mesh_obj import CORNER, face_record
 
 HEADER = re.compile(r"(?:ST)?C?N?OFF", re.IGNORECASE)
-CORNER = re.compile(r"\d{1,18}", re.ASCII)
 
 
 def off_to_obj(data: bytes) -> bytes:
@@ -50,6 +50,9 @@ def _face(words: list[str], number: int) -> str:
     """The record of a row `n i_1 ... i_n ...`, numbers counted from 0; `number` is the line's."""
     size = int(words[0]) if CORNER.fullmatch(words[0]) else 0
     corners = words[1 : size + 1]
-    if not corners or len(corners) < size or not all(map(CORNER.fullmatch, corners)):
-        raise MeshError(f"line {number}: a face needs its number of corners and as many vertices; {DAMAGED}")
-    return "f " + " ".join(str(int(corner) + 1) for corner in corners)
+    try:
+        if corners and len(corners) == size:
+            return face_record(corners)
+    except ValueError:
+        pass
+    raise MeshError(f"line {number}: a face needs its number of corners and as many vertices; {DAMAGED}")

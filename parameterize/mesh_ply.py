@@ -7,8 +7,7 @@ from collections.abc import Iterator
 
 from .mesh_common import MeshError
 from .mesh_headers import DAMAGED, header_count
-
-CORNER = re.compile(r"\d{1,18}", re.ASCII)
+from .mesh_obj import face_record
 
 Properties = list[tuple[str, bool]]  # names in a row's order, and whether each is a list
 
@@ -65,8 +64,4 @@ def _vertex(held: dict[str, list[str]]) -> str:
 
 
 def _face(held: dict[str, list[str]]) -> str:
-    """The record of a face, whose corners count from 0 in a PLY."""
-    corners = held["vertex_index" if "vertex_index" in held else "vertex_indices"]
-    if not all(map(CORNER.fullmatch, corners)):
-        raise ValueError(corners)
-    return "f " + " ".join(str(int(corner) + 1) for corner in corners)
+    return face_record(held["vertex_index" if "vertex_index" in held else "vertex_indices"])

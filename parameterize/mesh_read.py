@@ -61,33 +61,33 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
         raise MeshError("is a directory: name the surface file in it")
     suffixes = [suffix.lower() for suffix in path.suffixes]
     packed = suffixes[-1:] == [".gz"]
-    suffix = (suffixes[:-1] if packed else suffixes)[-1:]
-    if not suffix or suffix[0] not in FORMATS:
+    suffix = "".join((suffixes[:-1] if packed else suffixes)[-1:])
+    if suffix not in FORMATS:
         raise MeshError(f"unknown format: expected a name ending in one of {' '.join(FORMATS)}, or these with .gz")
     limit = BYTES_AT_LEAST + BYTES_PER_FACE * max_faces
     stored = _read_bytes(path, limit)
     data = _unpack(stored, limit) if packed else stored
     if not data.strip():
         raise MeshError("the file is empty: export it again")
-    if suffix[0] == ".stl":
+    if suffix == ".stl":
         data = trim_stl(data)
-    header = check_header(data, suffix[0], max_faces)
+    header = check_header(data, suffix, max_faces)
     notices = [*(["unpacked from .gz"] if packed else []), *header.notices]
-    as_obj = REWRITTEN[suffix[0]](data) if suffix[0] in REWRITTEN else None
+    as_obj = REWRITTEN[suffix](data) if suffix in REWRITTEN else None
     if as_obj is not None:
-        data, remarks = trim_obj(as_obj, max_faces)
+        suffix, (data, remarks) = ".obj", trim_obj(as_obj, max_faces)
         notices += remarks
-    elif suffix[0] == ".msh":
+    elif suffix == ".msh":
         data = trim_gmsh(data)
-    elif suffix[0] == ".mesh":
+    elif suffix == ".mesh":
         data = trim_medit(data)
     promised = header.polygons or 0
-    plain = plain_ply(data) if suffix[0] == ".ply" and as_obj is None else None
-    if suffix[0] in TRIMESH_FORMATS and plain is None and as_obj is None:
-        vertices, faces = _parse_trimesh(data, suffix[0])
+    plain = plain_ply(data) if suffix == ".ply" else None
+    if suffix in TRIMESH_FORMATS and plain is None:
+        vertices, faces = _parse_trimesh(data, suffix)
         count = min(len(faces), promised)
     else:
-        vertices, faces, count = _parse_meshio(plain or data, ".obj" if as_obj is not None else suffix[0], max_faces)
+        vertices, faces, count = _parse_meshio(plain or data, suffix, max_faces)
     if count < promised:
         raise MeshError(f"{promised} faces promised, {count} read; {DAMAGED}")
     if len(faces) > count:
