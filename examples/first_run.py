@@ -14,7 +14,7 @@ def main(name: str = "bean", config: object = None, levels: int = 2, out: str | 
     surface = iga_nn.sample(name)  # or iga_nn.load_surface("conch.obj")
     result = iga_nn.parameterize(surface, config, seed=0)
     print(result.quality)
-    problem = iga_nn.Poisson(exact="exp(x+z)*sin(y)")  # source and boundary data follow
+    problem = iga_nn.Poisson(exact="exp(X+Z)*sin(Y)")  # X: x scaled to volume 1; source and boundary data follow
     solution = iga_nn.solve(result.volume, problem, certified=result.certificate.verdict)
     print(solution.report)
     for row in iga_nn.convergence(result.volume, problem, refine=range(levels)):

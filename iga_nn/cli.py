@@ -23,7 +23,13 @@ from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, 
 
 FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--body-force", "--displacement")
 ONE_TO_ONE = {True: "proved", False: "no: the boundary meets itself", None: "not decided"}
-DONE, BAD_INPUT, NOT_CERTIFIED, NOT_CONVERGED, INTERRUPTED = 0, 2, 3, 4, 130
+ERRORS = {  # of a level, those a reader needs
+    "l2_relative": "relative L2 error",
+    "l2": "L2 error",
+    "error_estimate_relative": "estimated relative L2 error",
+    "error_estimate": "estimated L2 error",
+}
+DONE, BAD_INPUT, NOT_CERTIFIED, NOT_SOLVED, INTERRUPTED = 0, 2, 3, 4, 130
 
 app = App(
     name="iga-nn",
@@ -136,7 +142,7 @@ def solve_poisson(
 def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body = NO_BODY) -> int:
     """Solve linear elasticity on a volume.npz.
 
-    A vector is three formulas in x, y, z with semicolons between them, in quotes: "x*y;0;sin(z)". The volume's six
+    A vector is three formulas with semicolons between them, in quotes: "x*y;0;sin(z)". The volume's six
     faces u0, u1, v0, v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under
     --traction.
 
@@ -163,9 +169,7 @@ def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = 
         _say(json.dumps(outcome.report["study"], indent=2))
     else:
         _say(f"{table}\nresults in {outcome.folder}")
-    if not reports.is_certified(outcome.report):
-        return NOT_CERTIFIED
-    return DONE if reports.is_converged(outcome.report) else NOT_CONVERGED
+    return _exit_code(outcome.report)
 
 
 @app.command(name="check")
@@ -322,15 +326,20 @@ def _say(text: str) -> None:
 
 
 def _tell(outcome: Outcome, output: OutputOptions) -> int:
-    """Say the verdict and return the exit code: 3 wins over 4."""
+    """Say the verdict and return the exit code."""
     verdict = reports.verdict(outcome.report, outcome.folder)
     if output.as_json:
         _say(json.dumps(reports.plain(verdict), indent=2))
     else:
         _say("\n".join([*_lines(verdict), *advice.in_words(outcome.report)]))
-    if not reports.is_certified(outcome.report):
+    return _exit_code(outcome.report)
+
+
+def _exit_code(report: reports.Report) -> int:
+    """3 wins over 4."""
+    if not reports.is_certified(report):
         return NOT_CERTIFIED
-    return DONE if reports.is_converged(outcome.report) else NOT_CONVERGED
+    return DONE if reports.is_converged(report) and reports.is_meaningful(report) else NOT_SOLVED
 
 
 def _lines(verdict: dict[str, Any]) -> list[str]:
@@ -341,11 +350,9 @@ def _lines(verdict: dict[str, Any]) -> list[str]:
         rms = verdict["boundary_rms"][scale]
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
     for level in verdict.get("levels", []):
-        error = f"L2 error {level['l2']:.3e}, " if "l2" in level else ""
-        if "error_estimate" in level:
-            error += f"estimated L2 error {level['error_estimate']:.1e}, "
-        end = "" if level["converged"] else ", NOT CONVERGED"
-        lines.append(f"{level['dofs']:>8} unknowns {error}{level['iterations']} iterations{end}")
+        errors = [f"{title} {level[name]:.3e}, " for name, title in ERRORS.items() if name in level]
+        end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANS NOTHING")
+        lines.append(f"{level['dofs']:>8} unknowns {''.join(errors)}{level['iterations']} iterations{end}")
     lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")
     return lines
 

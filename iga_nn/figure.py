@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.files import replacing
 
+from .color_range import ColorRange
 from .rendering import Patch, View, draw, widest_view
 from .sampling import FACE_COLORS, MAP, face_labels
 
@@ -69,18 +70,23 @@ def name_faces(figure: Figure) -> None:
     )
 
 
-def colors(values: Array, norm: Any) -> Array:
+def colors(values: Array, limits: ColorRange) -> Array:
     """Red, green, blue (m, n, 3) of values (m, n)."""
     from matplotlib import colormaps
 
-    return np.asarray(colormaps[MAP](norm(values)))[..., :3]
+    return np.asarray(colormaps[MAP](limits.shares(values)))[..., :3]
 
 
-def color_bar(figure: Figure, panels: Any, norm: Any, title: str) -> None:
-    """One for all the panels, at their right."""
+def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:
+    """One for all the panels, at their right; of a field with one value it has that colour and says the value."""
+    from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap
 
-    bar = figure.colorbar(ScalarMappable(norm, MAP), ax=panels, shrink=0.85, aspect=28)
+    shades = ListedColormap([colormaps[MAP](0.5)]) if limits.remark else MAP
+    bar = figure.colorbar(ScalarMappable(limits.norm(), shades), ax=panels, shrink=0.85, aspect=28)
+    if limits.remark:
+        bar.set_ticks([0.5], labels=[limits.remark])
     bar.set_label(title, fontsize=13)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import time
@@ -15,7 +16,9 @@ from typing import Any
 from parameterize.files import unfinished
 
 from . import report as reports
-from .options import InputError
+from .options import InputError, one_line
+
+log = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
 MAP_DATA, MAP_PICTURES = ("volume.npz", "boundary.npz", "history.npz"), ("faces", "lines", "cut", "distortion")
@@ -58,12 +61,24 @@ class RunFolder:
         yield
         self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
 
-    def draw(self, draw: Callable[[Any], None]) -> None:
-        """Figures by functions of plotting.py, timed; importing matplotlib and VTK takes part of it."""
-        from . import plotting
+    def draw(self, draw: Callable[[Any], dict[str, str]]) -> None:
+        """Figures by functions of plotting.py, timed; importing matplotlib and VTK takes part of it.
 
+        Those that fail are listed in the report as `not_drawn`, with the reason.
+        """
         with self.timed("report"):
-            draw(plotting)
+            try:
+                from . import plotting
+
+                self.note_failures(draw(plotting))
+            except Exception as error:  # matplotlib itself is missing, say: whatever it is, it ends no run
+                self.note_failures({"figures": one_line(error) or type(error).__name__})
+                log.warning("figures could not be drawn: %s", one_line(error))
+
+    def note_failures(self, failures: dict[str, str]) -> None:
+        """Keep for the report what could not be drawn, and why."""
+        if failures:
+            self.report["not_drawn"] = self.report.get("not_drawn", {}) | failures
 
     def begin(self, *replaced: str) -> None:
         """The input is good: from here on nothing in the folder counts as finished; files of an older run go."""

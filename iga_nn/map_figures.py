@@ -11,13 +11,15 @@ from parameterize.arrays import Array
 from parameterize.injective import Meeting
 from parameterize.volume import BSplineVolume
 
+from .color_range import ColorRange
 from .figure import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, view_of
 from .octant import best_cut, face_patches, octant_label, section_patches, without_octant
 from .rendering import Patch, draw, widest_view
-from .sampling import SECTIONS, all_grids, distortion_on, face_grid, face_window, points_on, section_grid
+from .sampling import SECTIONS, all_grids, distortions, face_grid, face_window, points_on, section_grid
 
 EVERY = 14  # samples between two parameter lines: a tenth of the cube
-DISTORTION = "tanh(√ARAP / 2), scale as given"
+DISTORTION = "tanh(√ARAP / 2), at volume 1"
+SHARES = ColorRange(0.0, 1.0)  # of the distortion as it is coloured
 WINDOW = 0.15  # of the cube, to every side of a meeting place
 MEETING_COLORS = ("#4477aa", "#ee6677")
 
@@ -48,38 +50,32 @@ def draw_cut(path: Path, volume: BSplineVolume) -> None:
 
     The eighth and the side it is seen from are those that show most of the cut.
     """
-    from matplotlib.colors import Normalize
-
-    norm = Normalize(0.0, 1.0)
     faces = face_patches(volume, SAMPLES, EVERY)
     octant, view = best_cut([patch.points for patch in faces])
     named = faces + section_patches(volume, SAMPLES, EVERY)
     distorted = [
-        replace(patch, colors=colors(distortion_on(volume, grid), norm))
-        for patch, grid in zip(named, all_grids(SAMPLES), strict=True)
+        replace(patch, colors=colors(values, SHARES))
+        for patch, values in zip(named, distortions(volume, all_grids(SAMPLES)), strict=True)
     ]
     figure, (panels,) = panels_of(1, 2)
     for panel, patches in zip(panels, (named, distorted), strict=True):
         panel.imshow(draw(without_octant(patches, octant), view, PANEL))
     name_faces(figure)
-    color_bar(figure, panels, norm, DISTORTION)
+    color_bar(figure, panels, SHARES, DISTORTION)
     figure.suptitle(f"Cut open: the part {octant_label(octant)} is left out", fontsize=14)
     save(figure, path)
 
 
 def draw_distortion(path: Path, volume: BSplineVolume) -> None:
-    """tanh(sqrt(ARAP) / 2), as the paper colours it, on the images of u = 1/2, v = 1/2 and w = 1/2; units as given."""
-    from matplotlib.colors import Normalize
-
-    norm = Normalize(0.0, 1.0)
+    """tanh(sqrt(ARAP) / 2), as the paper colours it, on the images of u = 1/2, v = 1/2 and w = 1/2; at volume 1."""
     figure, (panels,) = panels_of(1, 3)
-    for axis, panel in enumerate(panels):
-        grid = section_grid(axis, SAMPLES)
-        points = points_on(volume, grid)
-        patch = Patch(points, colors(distortion_on(volume, grid), norm), lit=False)
+    grids = [section_grid(axis, SAMPLES) for axis in range(3)]
+    for axis, (panel, values) in enumerate(zip(panels, distortions(volume, grids), strict=True)):
+        points = points_on(volume, grids[axis])
+        patch = Patch(points, colors(values, SHARES), lit=False)
         panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
         panel.set_title(SECTIONS[axis], fontsize=13)
-    color_bar(figure, panels, norm, DISTORTION)
+    color_bar(figure, panels, SHARES, DISTORTION)
     figure.suptitle("Distortion on the mid-sections", fontsize=14)
     save(figure, path)
 

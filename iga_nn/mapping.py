@@ -13,6 +13,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.files import save_arrays
+from solve.frame import UnitFrame
 
 from . import advice
 from . import report as reports
@@ -61,7 +62,7 @@ def map_surface(
     """
     with state.timed("load"):
         surface = load(mesh, options.component, options.max_faces, options.decimate)
-        corners = read_corners(options.corners) if options.corners else None
+        corners = read_corners(options.corners, _frame(surface)) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
         log.warning("%s: %s", surface.name, notice)
@@ -88,13 +89,26 @@ def map_surface(
     return result
 
 
+def _frame(surface: Surface) -> UnitFrame:
+    """What X, Y, Z mean before there is a volume."""
+    low, high = surface.bbox
+    x, y, z = ((low + high) / 2.0).tolist()
+    return UnitFrame((x, y, z), 1.0 / surface.scale)
+
+
 def _check_data(equation: Poisson, surface: Surface) -> None:
     """What can be known of the data before there are points inside: their values on the surface."""
     from parameterize.surface_measures import vertex_normals
+    from solve.meaning import empty_formulas
 
+    equation = equation.placed(_frame(surface))
     x, y, z = surface.vertices.T
     for evaluate in (equation.boundary_at, equation.source_at, equation.kappa_at, equation.reaction_at):
         evaluate(x, y, z)
+    if equation.exact is not None:
+        equation.exact_at(x, y, z)
+    for notice in empty_formulas(equation, surface.vertices.T):
+        log.warning("%s", notice)
     normals = vertex_normals(surface.vertices, surface.faces)
     for face in equation.neumann:
         _check_somewhere(partial(equation.flux_at, face), surface.vertices, normals)

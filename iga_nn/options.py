@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from parameterize.config import Config
     from parameterize.volume import BSplineVolume
     from solve import Elasticity, Poisson
+    from solve.frame import UnitFrame
 
 _CORNERS_BYTES = 65_536
 _LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
@@ -23,7 +24,6 @@ MAX_CONTROL_POINTS = 100  # per direction
 MAX_STEPS_FACTOR = 100.0
 MAX_REFINE = 6
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
-DEFAULT_EXACT = "exp(x+z)*sin(y)"  # the paper's problem, section 5.5
 
 
 class InputError(ValueError):
@@ -56,7 +56,8 @@ class MapOptions:
         device: where the network is trained; "auto" takes CUDA where there is one.
         control_points: per direction.
         corners: JSON file with a list of eight, one a corner of the cube in the order (0,0,0), (0,0,1), (0,1,0), ...,
-            (1,1,1): points of three coordinates in the surface's units, or vertex numbers counted from 0.
+            (1,1,1): points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
+            {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
         resume: go on from the checkpoint in the output folder.
         component: which connected piece of the file to take, counted from 0.
         max_faces: refuse larger surfaces.
@@ -98,15 +99,17 @@ class MapOptions:
 class PoissonOptions:
     """-div(kappa grad u) + c u = f on the volume, data on its six faces, and the meshes it is solved on.
 
-    A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on.
+    A formula knows x, y, z, in the input's units, and X, Y, Z, the same scaled to volume 1 about the middle of the
+    volume's bounding box: X = (x - c) / V^(1/3). A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and
+    so on.
 
     Attributes:
-        exact: solution as a formula in x, y, z; gives f and g, and errors are reported. The paper's exp(x+z)*sin(y)
-            where neither f nor g is given. A formula that starts with a minus is written --exact=-x.
-        source: f, a formula in x, y, z.
-        boundary: g, the values of u, a formula in x, y, z.
+        exact: solution as a formula; gives f and g, and errors are reported. exp(X+Z)*sin(Y) where neither f nor g is
+            given. A formula that starts with a minus is written --exact=-x.
+        source: f, a formula.
+        boundary: g, the values of u, a formula.
         kappa: one formula, or six with commas between them for a symmetric tensor: xx,xy,xz,yy,yz,zz.
-        reaction: c, a formula in x, y, z.
+        reaction: c, a formula.
         neumann: faces with the flux kappa du/dn, each as FACE=FORMULA, or FACE alone for that of the exact solution.
         robin: faces with kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
             solution.
@@ -131,9 +134,6 @@ class PoissonOptions:
         from solve import Poisson
 
         check_space(self.refine, self.degree)
-        exact = self.exact
-        if exact is None and self.source is None and self.boundary is None:
-            exact = DEFAULT_EXACT
         robin = {}
         for face, text in _faces("robin", self.robin).items():
             alpha, colon, g = (text or "").partition(":")
@@ -142,7 +142,7 @@ class PoissonOptions:
             robin[face] = (alpha, g if colon else None)
         with input_errors():
             return Poisson(
-                exact=exact,
+                exact=self.exact,
                 source=self.source,
                 boundary=self.boundary,
                 kappa=self.kappa.split(",") if self.kappa else None,
@@ -157,7 +157,7 @@ class ElasticityOptions:
     """Linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
 
     A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
-    with semicolons between them, in quotes: "x*y;0;sin(z)".
+    or X, Y, Z (scaled to volume 1 about the middle) with semicolons between them, in quotes: "x*y;0;sin(z)".
 
     Attributes:
         exact: displacement as a vector; gives force and boundary data, and errors are reported. One that starts with
@@ -203,12 +203,13 @@ class StudyOptions:
     """A known solution of Poisson's problem, and the trial spaces it is approximated in.
 
     Attributes:
-        exact: the solution, a formula in x, y, z. One that starts with a minus is written --exact=-x.
+        exact: the solution, a formula in x, y, z or X, Y, Z (scaled to volume 1 about the middle); exp(X+Z)*sin(Y) by
+            default. One that starts with a minus is written --exact=-x.
         degree: one or more; the map's own by default.
         refine: levels, each halves every span of the map's knots that many times: 0 1 2, or 0..2.
     """
 
-    exact: str = DEFAULT_EXACT
+    exact: str | None = None
     degree: tuple[int, ...] = ()
     refine: tuple[str, ...] = ("0..2",)
 
@@ -275,11 +276,17 @@ def _vector(text: str | None) -> list[str] | None:
     return None if text is None else text.split(";")
 
 
-def read_corners(path: Path) -> np.ndarray[Any, Any]:
-    """Eight points (8, 3) or eight whole numbers (8,) from a JSON list. Raises InputError."""
+def read_corners(path: Path, frame: UnitFrame | None = None) -> np.ndarray[Any, Any]:
+    """Eight points (8, 3) in the surface's units or eight whole numbers (8,) from a JSON file. Raises InputError.
+
+    frame: of the surface; where it is known, the file may hold {"XYZ": [...]}, points in scaled coordinates.
+    """
     try:
         with path.open(encoding="utf-8") as stream:
             given = json.loads(stream.read(_CORNERS_BYTES))
+        is_scaled = frame is not None and isinstance(given, dict) and list(given) == ["XYZ"]
+        if is_scaled:
+            given = given["XYZ"]
         rows = np.array(given, dtype=np.float64)
         if any(isinstance(number, bool) for number in np.array(given, dtype=object).flat):
             raise TypeError
@@ -293,7 +300,9 @@ def read_corners(path: Path) -> np.ndarray[Any, Any]:
             f"found an array of shape {rows.shape}"
         )
     if rows.shape == (8, 3):
-        return rows
+        return frame.to_units(rows) if frame is not None and is_scaled else rows
+    if is_scaled:
+        raise InputError(f"{path}: XYZ must hold eight points of three coordinates; vertex numbers stand in a list")
     if np.any(rows != np.rint(rows)) or np.abs(rows).max() > _LARGEST_WHOLE:
         raise InputError(f"{path}: vertex numbers must be whole and at most {_LARGEST_WHOLE}")
     return rows.astype(np.int64)

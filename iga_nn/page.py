@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import logging
 from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
@@ -15,8 +16,11 @@ from parameterize.files import save_text
 
 from . import report as reports
 from .advice import in_words
+from .options import one_line
 from .report import Report
 from .scene import Scene
+
+log = logging.getLogger(__name__)
 
 MAP_FIGURES = {
     "meeting.png": "Where the boundary meets itself",
@@ -61,23 +65,40 @@ COLUMNS = {
     "elements": "elements",
     "dofs": "unknowns",
     "h": "h",
+    "l2_relative": "relative L2 error",
     "l2": "L2 error",
-    "l2_relative": "relative",
     "rate_l2": "rate",
+    "h1_relative": "relative H1 error",
     "h1_seminorm": "H1 error",
     "rate_h1": "rate",
+    "error_estimate_relative": "estimated relative L2 error",
     "error_estimate": "estimated L2 error",
-    "error_estimate_relative": "relative",
     "iterations": "iterations",
 }
 
 
-def write(folder: Path, report: Report, scene: Scene) -> None:
-    """Write report.html from a finished report; its figures are taken from the folder, where they are. Atomic."""
-    save_text(folder / reports.PAGE_NAME, page(report, scene, folder))
+def write(folder: Path, report: Report, scene: Scene | None) -> None:
+    """Write report.html from a finished report; its figures are taken from the folder, where they are. Atomic.
+
+    scene: for the interactive view, where it could be drawn. A page that cannot be made is a bare one: report.json.
+    """
+    try:
+        text = page(report, scene, folder)
+    except Exception as error:
+        log.warning("report.html is bare, it could not be laid out: %s", one_line(error))
+        text = _bare(report, one_line(error))
+    save_text(folder / reports.PAGE_NAME, text)
 
 
-def page(report: Report, scene: Scene, folder: Path) -> str:
+def _bare(report: Report, reason: str) -> str:
+    whole = escape(json.dumps(reports.plain(report), indent=2))
+    return (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>iga-nn</title>'
+        f"<p>This page could not be laid out ({escape(reason)}); this is report.json:</p><pre>{whole}</pre></html>"
+    )
+
+
+def page(report: Report, scene: Scene | None, folder: Path) -> str:
     """The page as text."""
     here = files(__package__)
     skeleton, style, script = ((here / f).read_text(encoding="utf-8") for f in ("page.html", "page.css", "viewer.js"))
@@ -97,7 +118,8 @@ def page(report: Report, scene: Scene, folder: Path) -> str:
         script=script,
         verdict=_verdict(report),
         facts=_facts(report),
-        choices="".join(_choice(name) for name in ("faces", *(field["name"] for field in scene["fields"]))),
+        hidden="" if scene else "hidden",
+        choices="".join(_choice(name) for name in ("faces", *_fields(scene))),
         scene=json.dumps(scene, ensure_ascii=False).replace("<", "\\u003c"),
         sections="\n".join(filter(None, sections)),
     )
@@ -119,6 +141,8 @@ def _verdict(report: Report) -> str:
     if quality.get("witness"):
         meaning += " The worst place: u, v, w = " + ", ".join(f"{value:.4g}" for value in quality["witness"]) + "."
     found = f'<div class="verdict {kind}"><strong>{heading}</strong>{escape(meaning)}</div>'
+    if not reports.is_meaningful(report):
+        found += '<div class="verdict bad"><strong>The errors mean nothing</strong>The notices below say why.</div>'
     if not reports.is_converged(report):
         found += '<div class="verdict bad"><strong>A solve did not converge</strong>The last iterate is shown.</div>'
     return found
@@ -129,13 +153,14 @@ def _facts(report: Report) -> str:
     quality = report["parameterization"]
     facts = []
     if "arap" in quality:
-        arap, boundary = quality["arap"]["as_given"], quality["boundary"]["as_given"]
-        facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; scale as given"))
-        facts.append(("Boundary distance", f"{boundary['rms']:.3g}", "root mean square, units as given"))
+        arap, boundary = quality["arap"]["unit_volume"], quality["boundary"]
+        facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; at volume 1"))
+        given = f"root mean square at volume 1; {boundary['as_given']['rms']:.3g} in the units given"
+        facts.append(("Boundary distance", f"{boundary['unit_volume']['rms']:.3g}", given))
     levels = reports.solved(report).get("levels", [])
     if levels:
         finest = levels[-1]
-        names = {"l2": "L2 error", "error_estimate": "Estimated L2 error"}
+        names = {"l2": "L2 error", "error_estimate": "estimated L2 error"}
         facts += [_error_fact(finest, key, name) for key, name in names.items() if finest.get(key) is not None]
         facts.append(("Unknowns", f"{finest['dofs']:,}", f"{finest['iterations']} iterations"))
     points = " × ".join(map(str, quality["control_points"]))
@@ -148,8 +173,15 @@ def _facts(report: Report) -> str:
 
 
 def _error_fact(level: Report, key: str, name: str) -> tuple[str, str, str]:
+    """The relative error, and the absolute one as the remark; that alone where the solution is zero."""
     relative = level.get(f"{key}_relative")
-    return name, f"{level[key]:.3e}", f"relative {relative:.1e}" if relative is not None else "on the finest mesh"
+    if relative is None:
+        return name.capitalize(), f"{level[key]:.3e}", "on the finest mesh"
+    return f"Relative {name}", f"{relative:.3e}", f"absolute {level[key]:.3e}"
+
+
+def _fields(scene: Scene | None) -> list[str]:
+    return [field["name"] for field in scene["fields"]] if scene else []
 
 
 def _choice(name: str) -> str:
@@ -196,6 +228,7 @@ def _items(texts: Iterable[str]) -> str:
 
 def _notices(report: Report) -> str:
     notices = [*report["input"].get("notices", []), *reports.solved(report).get("notices", [])]
+    notices += [f"{name} could not be drawn: {why}" for name, why in report.get("not_drawn", {}).items()]
     if not notices:
         return ""
     return f"<h2>Notices</h2>{_items(notices)}"

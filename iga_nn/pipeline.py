@@ -6,7 +6,9 @@ Every file is written as soon as its content is known, so that a late failure co
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,18 +16,28 @@ import numpy as np
 
 from parameterize.files import save_text
 from parameterize.volume import BSplineVolume
+from solve.frame import UnitFrame
 
 from . import studies
 from .command import command_line, gives_the_same
 from .folder import SOLUTION_FILES, STUDY_FILES, Outcome, RunFolder, open_folder
 from .formats import load_volume
 from .mapping import load, map_surface
-from .options import InputError, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size, input_errors
+from .options import (
+    InputError,
+    MapOptions,
+    PoissonOptions,
+    ProblemOptions,
+    StudyOptions,
+    check_size,
+    input_errors,
+    one_line,
+)
 from .verdict import certified_facts, write_certificate
 
 if TYPE_CHECKING:
     from parameterize.progress import ProgressCallback
-    from solve import Elasticity, Poisson, Solution
+    from solve import ConvergenceRow, Elasticity, Poisson, Solution, SolveReport
 
 log = logging.getLogger(__name__)
 
@@ -146,13 +158,16 @@ def study_to(
         state.begin(*STUDY_FILES)
         write_certificate(state, path, loaded, command_line("study", path, options, out=out))
         verdict = state.report["parameterization"]["bijective"]
-        study = {}
+        study: dict[int, list[ConvergenceRow]] = {}
         with state.timed("solve"), input_errors():
             for degree in degrees:
                 study[degree] = convergence(loaded, equation, levels, degree, certified=verdict)
                 log.info("degree %d: done", degree)
         save_text(state.folder / "study.csv", studies.as_csv(study))
-        state.write(study={"exact": equation.exact, "levels": studies.rows_of(study)})
+        state.write(
+            study=_given(equation, loaded)
+            | {"levels": studies.rows_of(study), "notices": _notices([row.report for row in chain(*study.values())])}
+        )
         state.draw(lambda plotting: plotting.draw_levels(state.folder, "study", study, state.endings))
         return _finish(state, loaded), studies.as_table(study)
 
@@ -214,16 +229,28 @@ def _solve(
             solution.save(state.folder / "solution.npz")  # the finest so far
     found = [solution.report for solution in solutions]
     section = {
-        **{name: given for name, given in asdict(options).items() if given and name not in ("refine", "degree")},
-        **({"exact": equation.exact} if isinstance(equation.exact, str) else {}),  # the default one, too
+        **{name: given for name, given in asdict(options).items() if name not in ("refine", "degree")},
+        **_given(equation, volume),
         "levels": [item.as_dict() for item in found],
         "rates": rates(found),
-        "notices": list(dict.fromkeys(notice for item in found for notice in item.notices)),  # each once
+        "notices": _notices(found),
     }
+    section = {name: given for name, given in section.items() if given is not None and given != ()}
     state.write(**{options.section: section})
     if equation.exact is not None:
         state.draw(lambda plotting: plotting.draw_solution(state.folder, volume, solutions, equation, state.endings))
     return solutions[-1]
+
+
+def _given(equation: Poisson | Elasticity, volume: BSplineVolume) -> dict[str, Any]:
+    """What a report says of a problem beside the user's options: the default solution, too, and what X, Y, Z mean."""
+    given: dict[str, Any] = {"exact": equation.exact} if isinstance(equation.exact, str) else {}
+    return given | ({"frame": UnitFrame.of(volume).as_dict()} if equation.is_scaled else {})
+
+
+def _notices(found: Iterable[SolveReport]) -> list[str]:
+    """The notices of some solves, each once."""
+    return list(dict.fromkeys(notice for item in found for notice in item.notices))
 
 
 def _finish(
@@ -232,12 +259,18 @@ def _finish(
     solution: Solution | None = None,
     equation: Poisson | Elasticity | None = None,
 ) -> Outcome:
-    """Close the report, and write the page that shows it."""
+    """Close the report, and write the page that shows it; without a view where that cannot be drawn."""
     from . import page
-    from .scene import scene_of
 
+    scene = None
     with state.timed("report"):
-        scene = scene_of(volume, solution, equation)
+        try:
+            from .scene import scene_of
+
+            scene = scene_of(volume, solution, equation)
+        except Exception as error:  # no figure ends a run
+            log.warning("the interactive view could not be drawn: %s", one_line(error))
+            state.note_failures({"interactive view": one_line(error) or type(error).__name__})
     outcome = state.finish()
     page.write(outcome.folder, outcome.report, scene)
     return outcome

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.files import save_text
+from solve.report import NORMS
 
 from . import __version__
 
@@ -80,6 +81,12 @@ def is_converged(report: Report) -> bool:
     return all(level["converged"] for level in solved(report).get("levels", []))
 
 
+def is_meaningful(report: Report) -> bool:
+    """Whether the finest solve's numbers mean something; True where nothing was solved."""
+    levels = solved(report).get("levels", [])
+    return not levels or levels[-1].get("meaningful", True) is not False
+
+
 def solved(report: Report) -> Report:
     """The section of the problem that was solved, empty without one."""
     return next((report[name] for name in ("poisson", "elasticity", "study") if name in report), {})
@@ -94,10 +101,9 @@ def verdict(report: Report, folder: Path) -> Report:
         short["arap"] = quality["arap"]
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
     defects = {name: quality[name] for name in ("unproved", "boundary_meeting") if quality.get(name)}
-    short |= defects | {name: report[name] for name in ("advice",) if name in report}
+    short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
     if section := solved(report):
-        errors = ("l2", "l2_relative", "h1_seminorm", "error_estimate", "error_estimate_relative")
-        keys = ("dofs", *errors, "iterations", "converged")
+        keys = ("dofs", *NORMS, "iterations", "converged", "meaningful")
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]
         short["notices"] = section["notices"]
     short["seconds"] = report["seconds"]["total"]

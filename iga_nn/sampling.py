@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array
 from parameterize.quality import arap
 from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
+from solve.frame import UnitFrame
 
 if TYPE_CHECKING:
     from solve import Elasticity, Poisson, Solution
@@ -58,9 +59,10 @@ def points_on(volume: BSplineVolume, grid: Grid) -> Array:
     return _flat(volume.grid(*grid))
 
 
-def distortion_on(volume: BSplineVolume, grid: Grid) -> Array:
-    """tanh(sqrt(ARAP) / 2), as the paper colours it, in the units given: (samples, samples)."""
-    return np.asarray(np.tanh(np.sqrt(_flat(arap(volume.grid_jacobian(*grid)))) / 2.0))
+def distortions(volume: BSplineVolume, grids: Sequence[Grid]) -> list[Array]:
+    """tanh(sqrt(ARAP) / 2), as the paper colours it, of the volume scaled to volume 1: (samples, samples) each."""
+    length = UnitFrame.of(volume).length
+    return [np.tanh(np.sqrt(_flat(arap(volume.grid_jacobian(*grid) / length))) / 2.0) for grid in grids]
 
 
 def solution_on(solution: Solution, grid: Grid) -> Array:
@@ -86,17 +88,10 @@ def sampled_error(
     volume: BSplineVolume, solution: Solution, problem: Problem, samples: int
 ) -> tuple[list[Array], list[Array]]:
     """Points (samples, samples, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
+    problem = problem.on(volume)
     grids = all_grids(samples)
     points = [points_on(volume, grid) for grid in grids]
     return points, [error_on(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
-
-
-def error_norm(meshes: Sequence[Sequence[Array]]) -> Any:
-    """Logarithmic colours from the largest error of all meshes to four decades below that of the best one."""
-    from matplotlib.colors import LogNorm
-
-    tops = [max(float(error.max()) for error in errors) or 1.0 for errors in meshes]
-    return LogNorm(1e-4 * min(tops), max(tops), clip=True)
 
 
 def face_labels() -> list[str]:

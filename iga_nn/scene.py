@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.volume import BSplineVolume
 
+from .color_range import ColorRange, error_range, even_range
 from .rendering import widest_view
 from .sampling import (
     FACE_COLORS,
     MAP,
     all_grids,
-    distortion_on,
-    error_norm,
+    distortions,
     error_on,
     face_labels,
     points_on,
@@ -45,14 +45,15 @@ def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: P
     """What viewer.js draws, in JSON's own types; solution and error are there where they are known and finite."""
     grids = all_grids(SAMPLES)
     points = [points_on(volume, grid) for grid in grids]
-    fields = [_field("distortion", "tanh(√ARAP / 2)", [distortion_on(volume, grid) for grid in grids], (0.0, 1.0))]
+    fields = [_field("distortion", "tanh(√ARAP / 2), volume 1", distortions(volume, grids), ColorRange(0.0, 1.0))]
     if solution is not None and np.all(np.isfinite(solution.coefficients)):
         name = "u" if solution.coefficients.ndim == 3 else "|u|"
         values = [solution_on(solution, grid) for grid in grids]
-        fields.append(_field("solution", name, values, (float(np.min(values)), float(np.max(values)))))
+        fields.append(_field("solution", name, values, even_range(values)))
         if problem is not None and problem.exact is not None:
-            errors = [error_on(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
-            fields.append(_error_field(errors))
+            known = problem.on(volume)
+            errors = [error_on(solution, known, grid, where) for grid, where in zip(grids, points, strict=True)]
+            fields.append(_field("error", "|u − uₕ|, logarithmic", errors, error_range([errors])))
     cloud = np.concatenate([where.reshape(-1, 3) for where in points])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
     view = widest_view(cloud[: 6 * SAMPLES**2], tilt=TILT)
@@ -72,18 +73,10 @@ def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: P
     }
 
 
-def _field(name: str, title: str, patches: Sequence[Array], limits: tuple[float, float]) -> dict[str, str]:
-    """Values on the nine patches, evenly coloured between the limits."""
-    low, high = limits
-    shares = (np.stack(patches) - low) / (high - low if high > low else 1.0)
-    return {"name": name, "title": title, "low": f"{low:.3g}", "high": f"{high:.3g}", "values": _packed(shares)}
-
-
-def _error_field(patches: Sequence[Array]) -> dict[str, str]:
-    norm = error_norm([patches])
-    shares = np.asarray(norm(np.concatenate(patches).ravel()))
-    limits = {"low": f"{norm.vmin:.1e}", "high": f"{norm.vmax:.1e}"}
-    return {"name": "error", "title": "|u − uₕ|, logarithmic", **limits, "values": _packed(shares)}
+def _field(name: str, title: str, patches: Sequence[Array], limits: ColorRange) -> dict[str, str]:
+    """Values on the nine patches, coloured between the limits."""
+    low, high = limits.labels
+    return {"name": name, "title": title, "low": low, "high": high, "values": _packed(limits.shares(np.stack(patches)))}
 
 
 def _color_map() -> str:

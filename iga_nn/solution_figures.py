@@ -10,9 +10,10 @@ import numpy as np
 
 from parameterize.volume import BSplineVolume
 
+from .color_range import error_range, even_range
 from .figure import PANEL, SAMPLES, color_bar, colors, panels_of, save, show_around
 from .rendering import Patch, draw, widest_view
-from .sampling import SECTIONS, all_grids, error_norm, points_on, sampled_error, solution_on
+from .sampling import SECTIONS, all_grids, points_on, sampled_error, solution_on
 
 if TYPE_CHECKING:
     from solve import Elasticity, Poisson, Solution
@@ -23,16 +24,16 @@ if TYPE_CHECKING:
 def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
     """|u - u_h| on the boundary and on the three mid-sections, logarithmic colours; the error norms beside it."""
     points, errors = sampled_error(volume, solution, problem, SAMPLES)
-    norm = error_norm([errors])
+    limits = error_range([errors])
     figure, rows = panels_of(2, 3)
-    boundary = [Patch(p, colors(e, norm)) for p, e in zip(points[:6], errors[:6], strict=True)]
+    boundary = [Patch(p, colors(e, limits)) for p, e in zip(points[:6], errors[:6], strict=True)]
     show_around(rows[0][:2], boundary)
     _write_numbers(rows[0][2], solution)
     for axis, panel in enumerate(rows[1]):
-        patch = Patch(points[6 + axis], colors(errors[6 + axis], norm), lit=False)
+        patch = Patch(points[6 + axis], colors(errors[6 + axis], limits), lit=False)
         panel.imshow(draw([patch], widest_view(patch.points.reshape(-1, 3)), PANEL))
         panel.set_title(SECTIONS[axis], fontsize=13)
-    color_bar(figure, rows, norm, r"$|u - u_h|$")
+    color_bar(figure, rows, limits, r"$|u - u_h|$")
     figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
     save(figure, path)
 
@@ -44,18 +45,16 @@ def draw_values(
 
     exaggerate: draw the body displaced by that many times u_h, a vector.
     """
-    from matplotlib.colors import Normalize
-
     grids = all_grids(SAMPLES)[:6]
     values = [solution_on(solution, grid) for grid in grids]
     points = [points_on(volume, grid) for grid in grids]
     if exaggerate is not None:
         moved = [solution.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
         points = [where + exaggerate * by for where, by in zip(points, moved, strict=True)]
-    norm = Normalize(float(np.min(values)), float(np.max(values)))
+    limits = even_range(values)
     figure, (panels,) = panels_of(1, 2)
-    show_around(panels, [Patch(p, colors(v, norm)) for p, v in zip(points, values, strict=True)])
-    color_bar(figure, panels, norm, title)
+    show_around(panels, [Patch(p, colors(v, limits)) for p, v in zip(points, values, strict=True)])
+    color_bar(figure, panels, limits, title)
     save(figure, path)
 
 
@@ -65,27 +64,30 @@ def draw_errors(path: Path, volume: BSplineVolume, solutions: Sequence[Solution]
     The layout of the paper's Fig. 14, with the L2 error marked.
     """
     samples = [sampled_error(volume, solution, problem, SAMPLES) for solution in solutions]
-    norm = error_norm([errors for _, errors in samples])
+    limits = error_range([errors for _, errors in samples])
     figure, rows = panels_of(len(solutions), 4)
     for row, (points, errors), solution in zip(rows, samples, solutions, strict=True):
         for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
             lit = isinstance(shown, slice)
             chosen = range(6) if isinstance(shown, slice) else (shown,)
-            patches = [Patch(points[i], colors(errors[i], norm), lit=lit) for i in chosen]
+            patches = [Patch(points[i], colors(errors[i], limits), lit=lit) for i in chosen]
             cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
             panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if lit else 0.0), PANEL))
             panel.set_title(title, fontsize=13)
-        label = f"{solution.report.dofs} unknowns, L2 error {solution.report.l2:.3e}"
+        report = solution.report
+        relative = "" if report.l2_relative is None else f"relative L2 error {report.l2_relative:.3e}, "
+        label = f"{report.dofs} unknowns, {relative}L2 error {report.l2:.3e}"
         row[0].text(0.0, 0.0, label, transform=row[0].transAxes, fontsize=14)
-    color_bar(figure, rows, norm, r"$|u - u_h|$")
+    color_bar(figure, rows, limits, r"$|u - u_h|$")
     save(figure, path)
 
 
 def _write_numbers(panel: Any, solution: Solution) -> None:
     report = solution.report
-    norms = [("L2 error", report.l2), ("relative", report.l2_relative), ("H1 seminorm", report.h1_seminorm)]
+    titles = ("relative L2 error", "L2 error", "relative H1 error", "H1 error")
+    norms = (report.l2_relative, report.l2, report.h1_relative, report.h1_seminorm)
     lines = [f"{report.dofs:,} unknowns"]
-    lines += [f"{name} {value:.3e}" for name, value in norms if value is not None]
+    lines += [f"{title} {value:.3e}" for title, value in zip(titles, norms, strict=True) if value is not None]
     if not report.converged:
         lines.append("NOT CONVERGED")
     panel.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", fontsize=14, linespacing=1.8)

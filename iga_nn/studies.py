@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 Study = Mapping[int, Sequence["ConvergenceRow"]]  # degree -> its levels
 COLUMNS = (
-    "degree", "elements", "dofs", "h", "l2", "l2_relative", "rate_l2", "h1_seminorm", "rate_h1", "iterations",
-    "converged", "setup", "solve",
+    "degree", "elements", "dofs", "h", "l2_relative", "l2", "rate_l2", "h1_relative", "h1_seminorm", "rate_h1",
+    "iterations", "converged", "meaningful", "setup", "solve",
 )  # fmt: skip
 
 
@@ -39,13 +39,19 @@ def as_csv(study: Study) -> str:
 
 def as_table(study: Study) -> str:
     """Columns for a reader."""
-    head = ("degree", "elements", "dofs", "L2 error", "rate", "H1 error", "rate", "iterations", "seconds")
+    head = ("degree", "elements", "dofs", "relative L2", "L2 error", "rate", "relative H1", "H1 error", "rate",
+            "iterations", "seconds")  # fmt: skip
+    errors = ("l2_relative", "l2", "rate_l2", "h1_relative", "h1_seminorm", "rate_h1")
     lines: list[tuple[str, ...]] = [head]
     for row in rows_of(study):
-        rates = [f"{row[name]:.2f}" if row[name] is not None else "-" for name in ("rate_l2", "rate_h1")]
-        errors = [f"{row[name]:.3e}" if row[name] is not None else "-" for name in ("l2", "h1_seminorm")]
         counts = [str(row[name]) for name in ("degree", "elements", "dofs")]
-        seconds = f"{row['setup'] + row['solve']:.2f}"
-        lines.append((*counts, errors[0], rates[0], errors[1], rates[1], str(row["iterations"]), seconds))
+        numbers = [_number(name, row[name]) for name in errors]
+        lines.append((*counts, *numbers, str(row["iterations"]), f"{row['setup'] + row['solve']:.2f}"))
     widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
     return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in lines)
+
+
+def _number(name: str, value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if name.startswith("rate") else f"{value:.3e}"

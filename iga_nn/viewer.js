@@ -107,6 +107,7 @@ function rgb(color) {
 }
 
 function start(scene, canvas) {
+  if (!scene) return;  // it could not be drawn: the page hides its place, and says why
   const gl = canvas.getContext("webgl2", {antialias: true, preserveDrawingBuffer: true});
   if (!gl) {
     document.getElementById("scene").classList.add("absent");

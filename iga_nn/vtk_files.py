@@ -9,7 +9,7 @@ higher degree on all spans, exactly.
 
 VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
 tessellations are right. For slicing and clipping there are the samples (`_view.vtu`): linear hexahedra whose nodes lie
-on the spline, SAMPLES a span and direction, with the values there of `arap` (distortion, scale as given), `det J`, and,
+on the spline, SAMPLES a span and direction, with the values there of `arap` (distortion at volume 1), `det J`, and,
 with a solution, `u` and (the exact solution being known) `error` = |u - u_h|. Displacements are vectors `u`, and their
 `error` is a length.
 """
@@ -29,6 +29,7 @@ from parameterize.bezier import elevation, extraction
 from parameterize.bspline import apply_along, divided_spans, insert_knots
 from parameterize.quality import arap
 from parameterize.volume import BSplineVolume
+from solve.frame import UnitFrame
 
 from .sampling import error_at
 
@@ -69,11 +70,11 @@ def write_view(
     u, v, w = (divided_spans(knots, SAMPLES) for knots in volume.knots)
     points = volume.grid(u, v, w)  # (m_u, m_v, m_w, 3)
     jacobians = volume.grid_jacobian(u, v, w)
-    fields = {"arap": arap(jacobians), "det J": np.linalg.det(jacobians)}
+    fields = {"arap": arap(jacobians / UnitFrame.of(volume).length), "det J": np.linalg.det(jacobians)}
     if solution is not None:
         fields["u"] = solution.grid(u, v, w)
         if problem is not None:
-            fields["error"] = error_at(fields["u"], problem, points)
+            fields["error"] = error_at(fields["u"], problem.on(volume), points)
     grid = pyvista.StructuredGrid(*np.moveaxis(points, -1, 0)).cast_to_unstructured_grid()
     for name, values in fields.items():
         grid.point_data[name] = values.reshape((-1, *values.shape[3:]), order="F")  # VTK counts the first index fastest

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import logging
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ __all__ = ["MAX_FACES", "MeshError", "Surface", "load_surface", "surface_from_ar
 
 MAX_FACES = 500_000
 USUAL_SIZES = (1e-6, 1e6)
+GRID = 2.0**-24  # of the box's longest side: less than single precision, in which networks train, tells apart
 logger = logging.getLogger(__name__)
 
 
@@ -35,7 +35,9 @@ class Surface:
     name: the input's stem. vertices: (n, 3), user's units. faces: (m, 3) vertex numbers. source: path as given, "" for
     arrays. sha256: of the file's bytes, or of the arrays. notices: what was mended or is doubtful, one line each.
     scale, center: to_unit(x) = scale * (x - center) + 1/2 gives volume 1 and puts the deepest interior point at
-    (1/2, 1/2, 1/2). crossings: (k, 2) pairs of faces that intersect.
+    (1/2, 1/2, 1/2). unit_vertices: the vertices (n, 3) placed so, after rounding them to multiples of GRID: the same
+    surface in another unit or at another place then gives the same numbers, and with them the same map.
+    crossings: (k, 2) pairs of faces that intersect.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Surface:
     notices: tuple[str, ...]
     scale: float
     center: Array
+    unit_vertices: Array
     crossings: IntArray
 
     def to_unit(self, points: ArrayLike) -> Array:
@@ -57,11 +60,6 @@ class Surface:
         """Placed points (..., 3) -> the user's units."""
         restored: Array = (np.asarray(points, dtype=np.float64) - 0.5) / self.scale + self.center
         return restored
-
-    @cached_property
-    def unit_vertices(self) -> Array:
-        """Vertices (n, 3) as placed: the surface encloses volume 1."""
-        return self.to_unit(self.vertices)
 
     @property
     def volume(self) -> float:
@@ -185,7 +183,9 @@ def _gate(
     crossings = crossing_faces(points, triangles)
     if len(crossings):
         doubts.append(describe_crossings(vertices[kept], triangles, crossings))
+    points = GRID * np.rint(points / GRID)
     deepest, _ = deepest_point(points, triangles)
+    unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
     return Surface(
         name=name,
         vertices=vertices[kept],
@@ -193,8 +193,9 @@ def _gate(
         source=source,
         sha256=sha256,
         notices=(*notices, *remarks, *mended, *chosen, *turned, *doubts),
-        scale=signed_volume(points, triangles) ** (-1.0 / 3.0) / size,
+        scale=unit_scale / size,
         center=deepest * size + middle,
+        unit_vertices=unit_scale * (points - deepest) + 0.5,
         crossings=crossings,
     )
 

@@ -10,7 +10,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.volume import FACE_NAMES
 
-from .data import Data, Parsed, check_faces, finite, parse, values
+from .data import Data, Parsed, ProblemData, check_faces, finite, parse, values
 from .expressions import Expression
 from .problem import SYMMETRIC
 
@@ -18,10 +18,11 @@ VectorData = Sequence[Data]  # three entries, one a component
 
 
 @dataclass(frozen=True)
-class Elasticity:
+class Elasticity(ProblemData):
     """Linear elasticity of an isotropic body: -div sigma = f, sigma = lambda div(u) I + mu (grad u + grad u^T).
 
-    Each vector is given as three entries, formulas in x, y, z or functions of three arrays of equal shape.
+    Each vector is given as three entries, formulas in x, y, z and X, Y, Z (as in `Poisson`) or functions of three
+    arrays x, y, z of equal shape.
     exact: the displacement u, where it is known. As formulas it gives force and boundary data, and the report's errors;
         functions need them beside it, and leave the H1 seminorm out.
     force: f, per volume; overrides what follows from `exact`.

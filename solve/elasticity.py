@@ -16,7 +16,8 @@ from .elastic_operator import assemble_elasticity
 from .elastic_problem import Elasticity
 from .failure import announce, check_solver, check_unknowns, solve_notices
 from .linear import conjugate_gradients
-from .norms import Errors, error_norms
+from .meaning import doubts
+from .norms import Errors, squared_errors
 from .operators import free_window
 from .planes import map_planes
 from .precondition import fast_diagonalization
@@ -45,6 +46,7 @@ def solve_elasticity(
     The solution's coefficients are (m_u, m_v, m_w, 3).
     """
     check_solver(tolerance, max_iterations)
+    problem = problem.on(volume)
     space = trial_space(volume, refine, degree)
     check_unknowns(space, problem.dirichlet)
     _warm_up()
@@ -58,7 +60,7 @@ def solve_elasticity(
 
 def check_elastic_data(volume: BSplineVolume, problem: Elasticity) -> None:
     """Evaluate a problem's data where the coarsest solve needs them. Raises ExpressionError where not finite."""
-    space = trial_space(volume)
+    problem, space = problem.on(volume), trial_space(volume)
     _displacements(volume, space, problem)
     _add_tractions(volume, space, problem, np.zeros((3, *space.shape)))
     for _, fields in map_planes(volume, gauss_rule(space)):
@@ -102,8 +104,10 @@ def _solve(
     clock.append(time.process_time())
     errors = _errors(volume, space, coefficients, problem, threads) if problem.exact is not None else None
     clock.append(time.process_time())
-    notices = solve_notices(volume, space, system, certified, result)
-    return solution_of(volume, space, np.moveaxis(coefficients, 0, -1), result, clock, errors, notices)
+    doubtful = doubts(volume, problem, errors, coefficients.size)
+    notices = (*doubtful, *solve_notices(volume, space, system, certified, result))
+    spline = np.moveaxis(coefficients, 0, -1)
+    return solution_of(volume, space, spline, result, clock, errors, notices, meaningful=not doubtful)
 
 
 def _displacements(volume: BSplineVolume, space: TrialSpace, problem: Elasticity) -> Array:
@@ -133,10 +137,5 @@ def _errors(volume: BSplineVolume, space: TrialSpace, coefficients: Array, probl
 
         return exact
 
-    parts = [error_norms(volume, space, coefficients[c], component(c), threads) for c in range(3)]
-    norms = [part.l2 / part.l2_relative for part in parts if part.l2_relative]
-    l2 = float(np.linalg.norm([part.l2 for part in parts]))
-    slopes = [part.h1_seminorm for part in parts if part.h1_seminorm is not None]
-    return Errors(
-        l2, l2 / float(np.linalg.norm(norms)) if norms else None, float(np.linalg.norm(slopes)) if slopes else None
-    )
+    parts = [squared_errors(volume, space, coefficients[c], component(c), threads) for c in range(3)]
+    return Errors.from_squares(np.sum([squares for squares, _ in parts], axis=0), all(known for _, known in parts))

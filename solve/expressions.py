@@ -1,5 +1,6 @@
-"""Formulas a user types, such as "exp(x+z)*sin(y)": parsed by a whitelist, evaluated on arrays with derivatives.
+"""Formulas a user types, such as "exp(X+Z)*sin(Y)": parsed by a whitelist, evaluated on arrays with derivatives.
 
+x, y, z are coordinates in the user's units; X, Y, Z are the same scaled to a body of volume 1 (`frame.UnitFrame`).
 Nothing is ever passed to eval or exec. Python's own parser makes the tree; every node is then checked against the few
 kinds allowed and translated. Value, gradient and Hessian follow together by forward automatic differentiation
 (Griewank and Walther, *Evaluating Derivatives*, 2nd ed., chapter 13), so a source -div(kappa grad u) is exact.
@@ -9,13 +10,16 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
+
+from .frame import UnitFrame
 
 Number = float | Array  # constants stay NumPy scalars (a kind of float): products with 0.0 and 1.0 are then free
 Numbers = tuple[Number, ...]
@@ -24,7 +28,9 @@ PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six
 MAX_LENGTH = 1000
 MAX_DEPTH = 100
 MAX_EXPONENT = 64
-VARIABLES = ("x", "y", "z")
+COORDINATES = ("x", "y", "z")
+SCALED = ("X", "Y", "Z")
+VARIABLES = (*COORDINATES, *SCALED)
 CONSTANTS = {"pi": math.pi, "e": math.e}
 OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
 
@@ -158,24 +164,49 @@ FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
     "abs": _abs,
 }
 
-Evaluator = Callable[[tuple[Jet, Jet, Jet]], Jet]
+Evaluator = Callable[[Sequence[Jet]], Jet]  # of the six variables
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A formula in x, y, z. Raises ExpressionError, naming the place, for anything outside the whitelist."""
+    """A formula in x, y, z and X, Y, Z.
+
+    frame: what X, Y, Z mean; a formula with one of them cannot be evaluated without it (`placed`).
+    variables: those that occur in the formula.
+    Raises ExpressionError, naming the place, for anything outside the whitelist.
+    """
 
     text: str
+    frame: UnitFrame | None = None
+    variables: frozenset[str] = field(init=False, repr=False, compare=False)
     _evaluate: Evaluator = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_evaluate", _Translator(self.text).result)
+        translator = _Translator(self.text)
+        object.__setattr__(self, "variables", frozenset(translator.variables))
+        object.__setattr__(self, "_evaluate", translator.result)
+
+    @property
+    def is_scaled(self) -> bool:
+        """Whether X, Y or Z occurs in the formula."""
+        return not self.variables.isdisjoint(SCALED)
+
+    @property
+    def scaled_text(self) -> str | None:
+        """The formula with X, Y, Z in place of x, y, z; None where none of these occurs."""
+        if self.variables.isdisjoint(COORDINATES):
+            return None
+        return re.sub(r"\b[xyz]\b", lambda match: match.group().upper(), self.text)
+
+    def placed(self, frame: UnitFrame) -> Expression:
+        """The same formula with X, Y, Z measured in this frame."""
+        return replace(self, frame=frame)
 
     def __call__(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
         """Values at points given by arrays of equal shape."""
         points = _coordinates(x, y, z)
         with np.errstate(all="ignore"):
-            jet = self._evaluate((Jet(points[0]), Jet(points[1]), Jet(points[2])))
+            jet = self._evaluate(self._seeds([Jet(point) for point in points]))
         return np.broadcast_to(np.asarray(jet.value), points[0].shape)
 
     def gradient(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array]:
@@ -195,10 +226,25 @@ class Expression:
         units = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         seeds = [Jet(point, unit, seconds) for point, unit in zip(points, units, strict=True)]
         with np.errstate(all="ignore"):
-            jet = self._evaluate((seeds[0], seeds[1], seeds[2]))
+            jet = self._evaluate(self._seeds(seeds))
         shape = points[0].shape
         value = np.broadcast_to(np.asarray(jet.value), shape)
         return value, _stacked(jet.gradient, shape), _stacked(jet.hessian[: len(seconds)], shape)
+
+    def _seeds(self, coordinates: list[Jet]) -> list[Jet]:
+        """The jets of the variables: of X, Y, Z only where they occur. Raises ExpressionError where they mean nothing.
+
+        (x - c) / L has the gradient 1 / L.
+        """
+        if not self.is_scaled:
+            return coordinates
+        if self.frame is None:
+            raise ExpressionError(
+                f"{_shorten(self.text)!r}: X, Y, Z are scaled by the size of a volume: name it with problem.on(volume)"
+            )
+        scale = np.float64(1.0 / self.frame.length)
+        shifted = [_add(x, Jet(np.float64(-c))) for x, c in zip(coordinates, self.frame.center, strict=True)]
+        return [*coordinates, *(_scale(scale, x) for x in shifted)]
 
 
 def _stacked(rows: Numbers, shape: tuple[int, ...]) -> Array:
@@ -224,8 +270,9 @@ class _Translator:
         if not isinstance(text, str):
             raise ExpressionError(f"an expression must be text, got {type(text).__name__}")
         self.text = text.strip()
+        self.variables: set[str] = set()
         if not self.text:
-            raise ExpressionError("the expression is empty; write a formula such as exp(x+z)*sin(y)")
+            raise ExpressionError("the expression is empty; write a formula such as exp(X+Z)*sin(Y)")
         if len(self.text) > MAX_LENGTH:
             raise ExpressionError(f"the expression has {len(self.text)} characters; at most {MAX_LENGTH} are allowed")
         self._check_brackets()
@@ -267,7 +314,7 @@ class _Translator:
             raise self._refuse(node, "a power is written with **, as in x**2")
         if isinstance(node, ast.Call):
             return self._call(node, depth)
-        raise self._refuse(node, f"not allowed; use numbers, x y z pi e, + - * / ** and {' '.join(FUNCTIONS)}")
+        raise self._refuse(node, f"not allowed; use numbers, x y z X Y Z pi e, + - * / ** and {' '.join(FUNCTIONS)}")
 
     def _number(self, node: ast.Constant) -> Evaluator:
         if type(node.value) not in (int, float):
@@ -284,6 +331,7 @@ class _Translator:
     def _name(self, node: ast.Name) -> Evaluator:
         if node.id in VARIABLES:
             index = VARIABLES.index(node.id)
+            self.variables.add(node.id)
             return lambda p: p[index]
         if node.id in CONSTANTS:
             constant = Jet(np.float64(CONSTANTS[node.id]))
@@ -316,7 +364,7 @@ class _Translator:
         if any(isinstance(part, ast.Name) and part.id in VARIABLES for part in ast.walk(node.right)):
             return lambda p: _exp(_multiply(right(p), _log(left(p))))  # valid for a positive base
         with np.errstate(all="ignore"):
-            exponent = float(right((Jet(0.0), Jet(0.0), Jet(0.0))).value)  # no variable in it: any point will do
+            exponent = float(right([]).value)  # no variable in it
         if not abs(exponent) <= MAX_EXPONENT:
             raise self._refuse(node.right, f"the exponent must lie between -{MAX_EXPONENT} and {MAX_EXPONENT}")
         return lambda p: _raise_to(left(p), exponent)

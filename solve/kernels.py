@@ -190,13 +190,13 @@ def plane_tensor_factors(fields: Array, weights: Array, kappa: Array, factors: A
 
 
 @compiled
-def plane_errors(fields: Array, weights: Array, spline: Array, exact: Array) -> tuple[float, float, float]:
-    """Sums over a plane of (u - u_h)^2, u^2 and |grad u - grad u_h|^2, each times w |det J|.
+def plane_errors(fields: Array, weights: Array, spline: Array, exact: Array) -> tuple[float, float, float, float]:
+    """Sums over a plane of (u - u_h)^2, u^2, |grad u - grad u_h|^2 and |grad u|^2, each times w |det J|.
 
     fields (3, 4, q_w, q_v): the map. spline (4, q_w, q_v): u_h and its parametric gradient.
     exact (4, q_w, q_v): u and its physical gradient.
     """
-    error, norm, seminorm = 0.0, 0.0, 0.0
+    error, norm, seminorm, slope = 0.0, 0.0, 0.0, 0.0
     n_w, n_v = weights.shape
     for q in range(n_w):
         for m in range(n_v):
@@ -216,4 +216,5 @@ def plane_errors(fields: Array, weights: Array, spline: Array, exact: Array) -> 
             error += volume * difference * difference
             norm += volume * exact[0, q, m] * exact[0, q, m]
             seminorm += volume * (dx * dx + dy * dy + dz * dz)
-    return error, norm, seminorm
+            slope += volume * (exact[1, q, m] ** 2 + exact[2, q, m] ** 2 + exact[3, q, m] ** 2)
+    return error, norm, seminorm, slope

@@ -21,11 +21,26 @@ PLANES = 16  # of points of u, in a piece of work
 
 @dataclass(frozen=True)
 class Errors:
-    """L2 norm of u - u_h, the same over that of u (None where it is zero), and H1 seminorm (None without grad u)."""
+    """L2 norm and H1 seminorm of u - u_h, and the same over those of u.
+
+    None: the relative errors where u or its gradient is zero, both of H1 where the gradient of u is unknown.
+    """
 
     l2: float
     l2_relative: float | None
     h1_seminorm: float | None
+    h1_relative: float | None
+
+    @classmethod
+    def from_squares(cls, squares: Array, has_gradient: bool) -> Errors:
+        """From the integrals (4,) of (u - u_h)^2, u^2, |grad u - grad u_h|^2 and |grad u|^2."""
+        l2, norm, seminorm, slope = np.sqrt(squares).tolist()
+        return cls(
+            l2,
+            l2 / norm if norm > 0.0 else None,
+            seminorm if has_gradient else None,
+            seminorm / slope if has_gradient and slope > 0.0 else None,
+        )
 
 
 def error_norms(
@@ -35,13 +50,24 @@ def error_norms(
     exact: Callable[[Array, Array, Array], tuple[Array, Array | None]],
     threads: int = 1,
 ) -> Errors:
-    """Error norms over the physical domain, slab by slab.
+    """Error norms over the physical domain; arguments as in `squared_errors`."""
+    return Errors.from_squares(*squared_errors(volume, space, coefficients, exact, threads))
+
+
+def squared_errors(
+    volume: BSplineVolume,
+    space: TrialSpace,
+    coefficients: Array,
+    exact: Callable[[Array, Array, Array], tuple[Array, Array | None]],
+    threads: int = 1,
+) -> tuple[Array, bool]:
+    """The integrals that `Errors.from_squares` takes, slab by slab, and whether the gradient of u is known.
 
     exact: takes x, y, z and returns u and grad u (3, ...), or None in the gradient's place.
     """
     rule = gauss_rule(space, tuple(p + 2 for p in space.degrees))  # type: ignore[arg-type]
     spline = PlaneField(coefficients, rule.tabulate(space.degrees, space.knots))
-    sums = np.zeros((rule.shape[0], 3))  # plane by plane: the same total for any number of threads
+    sums = np.zeros((rule.shape[0], 4))  # plane by plane: the same total for any number of threads
     has_gradient = []
 
     def integrate(points: range) -> None:
@@ -56,6 +82,4 @@ def error_norms(
 
     planes = range(rule.shape[0])
     in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
-    l2, norm, seminorm = np.sqrt(sums.sum(axis=0)).tolist()
-    relative = l2 / norm if norm > 0.0 else None
-    return Errors(l2, relative, seminorm if all(has_gradient) else None)
+    return sums.sum(axis=0), all(has_gradient)

@@ -19,6 +19,7 @@ from .elastic_problem import Elasticity
 from .failure import announce, check_solver, check_unknowns, solve_notices
 from .field import SplineField
 from .linear import LinearResult, conjugate_gradients
+from .meaning import doubts
 from .norms import error_norms
 from .operators import Operator, System, assemble, free_window, prepare
 from .planes import map_planes
@@ -67,6 +68,7 @@ def solve_poisson(
     """
     check_solver(tolerance, max_iterations)
     check_device(device, problem)
+    problem = problem.on(volume)
     space = trial_space(volume, refine, degree)
     check_unknowns(space, problem.dirichlet)
     _warm_up()
@@ -85,7 +87,7 @@ def check_data(volume: BSplineVolume, problem: Poisson) -> None:
 
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
-    space = trial_space(volume)
+    problem, space = problem.on(volume), trial_space(volume)
     boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet)
     system = _assemble(volume, space, problem, gauss_rule(space))
     _add_faces(volume, space, problem, system.load)
@@ -166,8 +168,10 @@ def _solve(
     if problem.exact is not None:
         errors = error_norms(volume, space, coefficients, problem.exact_at, threads)
     clock.append(time.process_time())
-    notices = (*contradictions(volume, problem), *solve_notices(volume, space, system, certified, result))
-    return solution_of(volume, space, coefficients, result, clock, errors, notices)
+    contradictory = contradictions(volume, problem)
+    doubtful = doubts(volume, problem, None if contradictory else errors, coefficients.size)
+    notices = (*contradictory, *doubtful, *solve_notices(volume, space, system, certified, result))
+    return solution_of(volume, space, coefficients, result, clock, errors, notices, meaningful=not doubtful)
 
 
 def _iterate(

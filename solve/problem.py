@@ -10,19 +10,23 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.volume import FACE_NAMES
 
-from .data import Data, Parsed, check_faces, demand, finite, parse, values
+from .data import Data, Parsed, ProblemData, check_faces, demand, finite, parse, values
 from .expressions import PAIRS, Expression
 
+DEFAULT_EXACT = "exp(X+Z)*sin(Y)"  # the paper's solution (section 5.5), at volume 1: it means the same in any unit
 SYMMETRIC = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # place of a tensor's entry (i, j) among its six: xx, xy, xz, yy, yz, zz
 
 
 @dataclass(frozen=True)
-class Poisson:
+class Poisson(ProblemData):
     """-div(kappa grad u) + c u = f in the volume's own coordinates, with data on the images of the cube's six faces.
 
-    Each entry is a formula in x, y, z or a function of three arrays of equal shape.
-    exact: the solution, where it is known. As a formula it gives source and boundary data, and the report's errors;
-        a function needs them beside it, and leaves the H1 seminorm out, for its derivatives are unknown.
+    Each entry is a formula or a function of three arrays x, y, z of equal shape. A formula knows x, y, z, in the
+    volume's units, and X, Y, Z, the same scaled to volume 1 about the middle of the volume's bounding box
+    (`frame.UnitFrame`): X = (x - c_x) / V^(1/3).
+    exact: the solution, where it is known; DEFAULT_EXACT where neither it nor source nor boundary is given. As a
+        formula it gives source and boundary data, and the report's errors; a function needs them beside it, and leaves
+        the H1 seminorm out, for its derivatives are unknown.
     source: f; overrides the one that follows from `exact`.
     boundary: values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
     kappa: a scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz or nine by rows; default 1.
@@ -43,21 +47,28 @@ class Poisson:
     reaction: Data | None = None
     neumann: Mapping[str, Data | None] = field(default_factory=dict)
     robin: Mapping[str, tuple[Data, Data | None]] = field(default_factory=dict)
-    _parsed: dict[str, Parsed] = field(init=False, repr=False, compare=False)
-    _kappa: tuple[Parsed, ...] = field(init=False, repr=False, compare=False)
+    _parsed: dict[str, tuple[Parsed, ...]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        if self.exact is None and self.source is None and self.boundary is None:
+            object.__setattr__(self, "exact", DEFAULT_EXACT)
         if self.source is None and self.exact is None:
             raise ValueError('the problem has no source: give exact="..." or source="..." (source="0" for Laplace)')
         given = {name: getattr(self, name) for name in ("exact", "source", "boundary", "reaction")}
         given |= {f"neumann {face}": data for face, data in self.neumann.items()}
         for face, pair in self.robin.items():
             given |= {f"robin {face}: alpha": pair[0], f"robin {face}": pair[1]}
-        parsed = {name: parse(name, data) for name, data in given.items() if data is not None}
-        object.__setattr__(self, "_parsed", parsed)
-        object.__setattr__(self, "_kappa", _parse_kappa(self.kappa))
+        parsed = {name: (parse(name, data),) for name, data in given.items() if data is not None}
+        object.__setattr__(self, "_parsed", parsed | {"kappa": _parse_kappa(self.kappa)})
         self._check_faces()
         self._check_derivatives()
+
+    @property
+    def _kappa(self) -> tuple[Parsed, ...]:
+        return self._parsed["kappa"]
+
+    def _values(self, name: str, x: Array, y: Array, z: Array) -> Array:
+        return values(name, self._parsed[name][0], x, y, z)
 
     def _check_faces(self) -> None:
         check_faces("neumann", self.neumann)
@@ -68,7 +79,7 @@ class Poisson:
 
     def _check_derivatives(self) -> None:
         """Whether all that is to follow from `exact` can be derived from it."""
-        exact = self._parsed.get("exact")
+        exact = self._parsed.get("exact", (None,))[0]
         if self.source is None and not isinstance(exact, Expression):
             raise ValueError(
                 "exact is a function, whose Laplacian is unknown: give source=... too, or a formula as exact"
@@ -97,7 +108,7 @@ class Poisson:
     def source_at(self, x: Array, y: Array, z: Array) -> Array:
         """Source f at points given by arrays of equal shape. Raises ExpressionError where it is not finite."""
         if "source" in self._parsed:
-            return values("source", self._parsed["source"], x, y, z)
+            return self._values("source", x, y, z)
         return self.source_of_exact(x, y, z)
 
     def source_of_exact(self, x: Array, y: Array, z: Array) -> Array:
@@ -106,14 +117,14 @@ class Poisson:
         found = -self._divergence(gradient, hessian, x, y, z)
         if self.reaction is not None:
             found += self.reaction_at(x, y, z) * value
-        return finite("source (from exact)", found, x, y, z)
+        return finite("source (from exact)", found, x, y, z, self._parsed["exact"][0])
 
     def exact_hessian(self, x: Array, y: Array, z: Array) -> Array:
         """Second derivatives (6, ...) of a formula `exact`: xx, xy, xz, yy, yz, zz."""
         return self._exact_derivatives(x, y, z)[2]
 
     def _exact_derivatives(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-        exact = self._parsed["exact"]
+        exact = self._parsed["exact"][0]
         assert isinstance(exact, Expression)
         return exact.hessian(x, y, z)
 
@@ -168,7 +179,7 @@ class Poisson:
         """The reaction c at points given by arrays of equal shape. Raises ExpressionError where it is negative."""
         if self.reaction is None:
             return np.zeros(x.shape)
-        found = values("reaction", self._parsed["reaction"], x, y, z)
+        found = self._values("reaction", x, y, z)
         demand(found >= 0.0, "reaction", "zero or positive", x, y, z)
         return found
 
@@ -176,37 +187,38 @@ class Poisson:
         """Dirichlet data at points given by arrays of equal shape. Raises ExpressionError where they are not finite."""
         for name in ("boundary", "exact"):
             if name in self._parsed:
-                return values(name, self._parsed[name], x, y, z)
+                return self._values(name, x, y, z)
         return np.zeros(x.shape)
 
     def flux_at(self, face: str, points: Array, normal: Array) -> Array:
         """The flux kappa grad u . n on a Neumann face, at points (3, ...) with outward unit normals (3, ...)."""
         name = f"neumann {face}"
-        return values(name, self._parsed[name], *points) if name in self._parsed else self._exact_flux(points, normal)
+        return self._values(name, *points) if name in self._parsed else self._exact_flux(points, normal)
 
     def robin_at(self, face: str, points: Array, normal: Array) -> tuple[Array, Array]:
         """Alpha and g on a Robin face, at points (3, ...) with outward unit normals (3, ...)."""
         name = f"robin {face}"
-        alpha = values(f"{name}: alpha", self._parsed[f"{name}: alpha"], *points)
+        alpha = self._values(f"{name}: alpha", *points)
         demand(alpha >= 0.0, f"{name}: alpha", "zero or positive", *points)
         if name in self._parsed:
-            return alpha, values(name, self._parsed[name], *points)
-        return alpha, self._exact_flux(points, normal) + alpha * values("exact", self._parsed["exact"], *points)
+            return alpha, self._values(name, *points)
+        return alpha, self._exact_flux(points, normal) + alpha * self._values("exact", *points)
 
     def _exact_flux(self, points: Array, normal: Array) -> Array:
-        exact = self._parsed["exact"]
+        exact = self._parsed["exact"][0]
         assert isinstance(exact, Expression)
         _, gradient = exact.gradient(*points)
         kappa = self.kappa_at(*points)
         flux = _times_symmetric(kappa, gradient) if len(self._kappa) == 6 else kappa * gradient
-        return finite("flux of exact", (flux * normal).sum(axis=0), *points)
+        x, y, z = points
+        return finite("flux of exact", (flux * normal).sum(axis=0), x, y, z, exact)
 
     def exact_at(self, x: Array, y: Array, z: Array) -> tuple[Array, Array | None]:
         """Exact u and its gradient (3, ...), None for a function. Raises ExpressionError where they are not finite."""
-        exact = self._parsed["exact"]
+        exact = self._parsed["exact"][0]
         if isinstance(exact, Expression):
             value, gradient = exact.gradient(x, y, z)
-            return finite("exact", value, x, y, z), finite("gradient of exact", gradient, x, y, z)
+            return finite("exact", value, x, y, z, exact), finite("gradient of exact", gradient, x, y, z, exact)
         return values("exact", exact, x, y, z), None
 
 

@@ -35,6 +35,7 @@ def solution_of(
     clock: Sequence[float],
     errors: Errors | None,
     notices: tuple[str, ...],
+    meaningful: bool,
 ) -> Solution:
     """Spline and report of a solve. clock: process seconds before and after set-up, after iteration and errors."""
     report = SolveReport(
@@ -47,6 +48,7 @@ def solution_of(
         seconds=dict(zip(("setup", "solve", "errors"), np.diff(clock).tolist(), strict=True)),
         errors=errors,
         notices=notices,
+        meaningful=meaningful,
         residuals=result.residuals,
     )
     return Solution(space.degrees, space.knots, coefficients, volume, report)

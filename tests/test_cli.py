@@ -122,7 +122,7 @@ def test_solve_poisson_on_a_saved_volume(in_folder, capsys):
     benchmark_volume(4).save("map.npz")
     assert main(["solve", "poisson", "map.npz", "--refine", "0", "1", "--degree", "2"]) == 0
     report = json.loads(Path("map/report.json").read_text())
-    assert report["poisson"]["exact"] == "exp(x+z)*sin(y)"
+    assert report["poisson"]["exact"] == "exp(X+Z)*sin(Y)"
     assert report["parameterization"]["bijective"] == "certified"
     assert "config" not in report
     with np.load("map/solution.npz") as data:
@@ -293,6 +293,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["parameterize", "cube", "--corners", "seven.json"], "shape (7, 3)"),
         (["parameterize", "cube", "--corners", "numbers.json"], "vertex numbers"),
         (["parameterize", "cube", "--corners", "same.json"], "same vertex"),
+        (["parameterize", "cube", "--corners", "scaled.json"], "XYZ must hold eight points"),
         (["parameterize", "cube", "--corners", "yes.json"], "eight points"),
         (["check", ""], "no surface is named"),
         (["check", "good.npz", "--strict"], "good.npz: is a volume; --component"),
@@ -318,6 +319,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, says, in_folder, capsy
     Path("words.txt").write_text("once upon a time\n")
     Path("seven.json").write_text(json.dumps([[0, 0, 0]] * 7))
     Path("numbers.json").write_text(json.dumps([99999999] * 8))
+    Path("scaled.json").write_text('{"XYZ": [0, 1, 2, 3, 4, 5, 6, 7]}')
     Path("same.json").write_text(json.dumps([[0, 0, 0]] * 8))
     Path("yes.json").write_text(json.dumps([True] * 8))
     if "--max-faces" in arguments:
@@ -477,6 +479,12 @@ def test_corners_reach_the_training(in_folder, monkeypatch):
     Path("numbers.json").write_text("[0, 1, 2, 3, 4, 5, 6, 7]")
     main(["parameterize", "cube", "--corners", "numbers.json"])
     assert np.array_equal(seen["corners"], np.arange(8)) and seen["corners"].dtype.kind == "i"
+    Path("scaled.json").write_text(json.dumps({"XYZ": (points - 0.5).tolist()}))
+    main(["parameterize", "cube", "--corners", "scaled.json"])
+    cube = iga_nn.sample("cube")
+    assert seen["corners"] == pytest.approx(
+        points - 0.5 + np.mean(cube.bbox, axis=0), abs=1e-6 + abs(cube.volume - 1.0)
+    )
 
 
 def test_checkpoint_of_another_run_is_said(formula_training, in_folder, capsys):

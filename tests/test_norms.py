@@ -25,6 +25,7 @@ def test_norms_of_a_linear_function_against_zero_by_hand():
     assert errors.l2 == pytest.approx(np.sqrt(96.0))
     assert errors.l2_relative == pytest.approx(1.0)
     assert errors.h1_seminorm == pytest.approx(np.sqrt(72.0))
+    assert errors.h1_relative == pytest.approx(1.0)
 
 
 def test_a_spline_has_no_distance_from_itself():

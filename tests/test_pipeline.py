@@ -80,7 +80,7 @@ def test_a_hidden_file_has_a_folder_of_its_own():
 def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, monkeypatch):
     formula_training()
     seen = []
-    monkeypatch.setattr("iga_nn.plotting.draw_map", lambda *given: seen.append(given[-1]))
+    monkeypatch.setattr("iga_nn.plotting.draw_map", lambda *given: seen.append(given[-1]) or {})
     Path("corners.json").write_text("[7, 6, 5, 4, 3, 2, 1, 0]")
     pipeline.parameterize_to("cube", "out", mapping=MapOptions(corners=Path("corners.json")))
     pipeline.parameterize_to("cube", "out", force=True)
@@ -120,8 +120,8 @@ def test_config_follows_the_options():
     assert config.stages[0].steps == 60
 
 
-def test_default_problem_is_the_papers():
-    assert PoissonOptions().problem().exact == "exp(x+z)*sin(y)"
+def test_default_problem_is_the_papers_at_volume_1():
+    assert PoissonOptions().problem().exact == "exp(X+Z)*sin(Y)"
     assert PoissonOptions(source="1").problem().exact is None
 
 

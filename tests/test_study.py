@@ -11,7 +11,7 @@ WAVE = Poisson(exact="exp(x+z)*sin(y)")
 
 
 def report(elements, l2, h1):
-    return SolveReport(elements, 0, 0.0, 0, True, 0.0, {}, Errors(l2, 0.0, h1))
+    return SolveReport(elements, 0, 0.0, 0, True, 0.0, {}, Errors(l2, 0.0, h1, 0.0))
 
 
 def test_rates_by_hand():
