@@ -43,10 +43,10 @@ Errors (`norms`, `estimate`, `study`). Against an exact solution with p + 2 Gaus
 smooth solutions the L2 norm falls like h^(p + 1), the H1 seminorm like h^p. Without one the L2 norm is estimated from
 the residual, which for Poisson's problem is close to kappa (2 pi / h)^2 times the error.
 
->>> from solve import Poisson, benchmark_volume, convergence
 Formulas (`expressions`, `frame`). Beside x, y, z they know X, Y, Z: with c the middle of F's bounding box and V its
 volume, (X, Y, Z) = ((x, y, z) - c) / V^(1/3). `meaning` finds data that do not vary on the domain.
 
+>>> from solve import Poisson, benchmark_volume, convergence
 >>> rows = convergence(benchmark_volume(2), Poisson(exact="exp(X+Z)*sin(Y)"), refine=range(3))
 >>> [row.report.dofs for row in rows]
 [125, 343, 1331]

@@ -106,4 +106,4 @@ def test_scene_of_a_body_has_lengths(result):
     volume = benchmark_volume(1)
     body = solve.Elasticity(force=("0", "0", "-1"))
     drawing = scene.scene_of(volume, solve.solve_elasticity(volume, body), body)
-    assert [field["title"] for field in drawing["fields"]] == ["tanh(√ARAP / 2)", "|u|"]
+    assert [field["title"] for field in drawing["fields"]] == ["tanh(√ARAP / 2), volume 1", "|u|"]
