@@ -13,6 +13,7 @@ from parameterize.certificate import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig, preset
 from parameterize.corners import CORNERS
+from parameterize.injective import BoundaryCheck
 from parameterize.mesh import surface_from_arrays
 from parameterize.run import choose_device, corner_vertices, parameterize
 from parameterize.stages import start_map
@@ -260,6 +261,26 @@ def test_a_map_not_certified_is_tried_anew_with_the_cube_turned(surface, monkeyp
     assert (result.history["stage"] == "cube").sum() == 2 * STEPS[2]
     parameterize(surface, tiny_config(), seed=3, device="cpu")
     assert len(seen) == 3
+
+
+@pytest.mark.parametrize("meets", [[True, False], [False], [True, True]])
+def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monkeypatch, meets):
+    """The first start of several that does not meet itself is kept; where all do, the first."""
+    optimize, seen = run.optimize, []
+
+    def certified(control, *args, **options):
+        found = optimize(control, *args, **options)
+        none = np.zeros((0, 3), dtype=np.int64)
+        seen.append(replace(found, certificate=replace(found.certificate, verdict="certified", unproved=none)))
+        return seen[-1]
+
+    answers = iter(meets)
+    monkeypatch.setattr(run, "optimize", certified)
+    monkeypatch.setattr(run, "check_boundary", lambda volume: BoundaryCheck(not next(answers), None, 0))
+    result = parameterize(surface, replace(tiny_config(), starts=2), seed=3, device="cpu")
+    assert len(seen) == len(meets)
+    kept = np.moveaxis(seen[meets.index(False) if False in meets else 0].control.numpy(), 0, -1)
+    assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
 
 
 @pytest.mark.parametrize("start", [0, 1, 2])
