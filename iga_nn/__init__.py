@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from .version import __version__
 
 # Threads that wait for each other by spinning are 9 times slower once another program wants a core (measured), and
 # no faster on an idle machine. The runtime reads this once, when torch is loaded.

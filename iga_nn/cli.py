@@ -15,11 +15,12 @@ from cyclopts import App, CycloptsError, Parameter
 from parameterize.mesh import MAX_FACES, MeshError
 from solve.expressions import ExpressionError
 
-from . import __version__, advice, console, pipeline
+from . import advice, console, pipeline
 from . import report as reports
 from .folder import Outcome
 from .formats import export, is_volume
 from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
+from .version import __version__
 
 FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--body-force", "--displacement")
 ONE_TO_ONE = {True: "proved", False: "no: the boundary meets itself", None: "not decided"}
