@@ -36,11 +36,11 @@ def _refuse_shadowed(*names: str) -> None:
 _refuse_shadowed("parameterize", "solve")
 
 if TYPE_CHECKING:
-    from parameterize.certificate import certify
+    from parameterize.certificate.jacobian import certify
     from parameterize.config import preset
-    from parameterize.mesh import MeshError, Surface, load_surface
     from parameterize.run import Parameterization, parameterize
-    from parameterize.volume import BSplineVolume
+    from parameterize.spline.volume import BSplineVolume
+    from parameterize.surface.surface import MeshError, Surface, load_surface
     from solve import Elasticity, Poisson, convergence
     from solve import solve_problem as solve
 
@@ -50,20 +50,20 @@ if TYPE_CHECKING:
     from .samples import sample
 
 _HOME = {
-    "BSplineVolume": "parameterize.volume",
+    "BSplineVolume": "parameterize.spline.volume",
     "Elasticity": "solve",
     "ElasticityOptions": "iga_nn.options",
     "InputError": "iga_nn.options",
     "MapOptions": "iga_nn.options",
-    "MeshError": "parameterize.mesh",
+    "MeshError": "parameterize.surface.surface",
     "Parameterization": "parameterize.run",
     "Poisson": "solve",
     "PoissonOptions": "iga_nn.options",
-    "Surface": "parameterize.mesh",
-    "certify": "parameterize.certificate",
+    "Surface": "parameterize.surface.surface",
+    "certify": "parameterize.certificate.jacobian",
     "convergence": "solve",
     "export": "iga_nn.formats",
-    "load_surface": "parameterize.mesh",
+    "load_surface": "parameterize.surface.surface",
     "load_volume": "iga_nn.formats",
     "parameterize": "parameterize.run",
     "preset": "parameterize.config",

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array, in_brackets
-from parameterize.bspline import breakpoints
-from parameterize.certificate import Certificate
-from parameterize.volume import BSplineVolume
+from parameterize.certificate.jacobian import Certificate
+from parameterize.spline.bspline import breakpoints
+from parameterize.spline.volume import BSplineVolume
 
 from .options import MAX_CONTROL_POINTS
 from .report import Report, is_certified

@@ -18,7 +18,7 @@ from aiohttp import ClientError, http_exceptions, web
 from trame.app import get_server
 
 from parameterize.arrays import Array
-from parameterize.mesh import Surface
+from parameterize.surface.surface import Surface
 
 from . import job_process
 from .app_layout import lay_out

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from parameterize.arrays import Array
-from parameterize.mesh import Surface
+from parameterize.surface.surface import Surface
 
 from .folder import has_checkpoint
 from .jobs import Job

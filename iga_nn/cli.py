@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from parameterize.mesh import MAX_FACES, MeshError
+from parameterize.surface.surface import MAX_FACES, MeshError
 from solve.expressions import ExpressionError
 
 from . import advice, console, pipeline

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from parameterize.files import save_bytes
-from parameterize.mesh import MAX_FACES, MeshError, Surface, load_surface
+from parameterize.surface.surface import MAX_FACES, MeshError, Surface, load_surface
 
 from .samples import SAMPLES, obj_text, sample
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import torch
 
     from parameterize.config import Config, SplineConfig
-    from parameterize.mesh import Surface
+    from parameterize.surface.surface import Surface
 
 Clock = Callable[[], float]
 REPEATS = 3
@@ -91,7 +91,7 @@ def _training_points(surface: Surface, config: Config) -> int:
     """Points that the network maps in a step."""
     import torch
 
-    from parameterize.sample import stencils
+    from parameterize.training.samples import stencils
 
     vertices, faces, cell = surface.unit_vertices, surface.faces, config.train.cell
     nodes = stencils(vertices, faces, cell, device=torch.device("cpu"), dtype=torch.float32).nodes
@@ -101,7 +101,7 @@ def _training_points(surface: Surface, config: Config) -> int:
 def _pass_seconds(config: Config, device: torch.device, clock: Clock) -> float:
     import torch
 
-    from parameterize.network import InverseMap
+    from parameterize.training.network import InverseMap
 
     with torch.random.fork_rng(devices=[]):
         network = InverseMap(config.network).to(device)
@@ -118,8 +118,8 @@ def _pass_seconds(config: Config, device: torch.device, clock: Clock) -> float:
 def _product_seconds(spline: SplineConfig, device: torch.device, clock: Clock) -> float:
     import torch
 
-    from parameterize.bspline import greville, open_uniform_knots
-    from parameterize.energy import DistortionEnergy
+    from parameterize.optimization.energy import DistortionEnergy
+    from parameterize.spline.bspline import greville, open_uniform_knots
 
     count = min(spline.control_points, LARGEST)
     knots = open_uniform_knots(count, spline.degree)

@@ -33,8 +33,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.files import replacing
-from parameterize.mesh_read import FORMATS
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.readers.file import FORMATS
 
 from . import report as reports
 from . import spline_files

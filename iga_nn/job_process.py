@@ -19,8 +19,8 @@ from threading import Event
 from typing import Literal
 
 from parameterize.arrays import Array
-from parameterize.mesh import MeshError
 from parameterize.progress import Progress
+from parameterize.surface.surface import MeshError
 from solve.expressions import ExpressionError
 
 from . import pipeline

@@ -15,8 +15,8 @@ from pathlib import Path
 from threading import Event, Lock
 
 from parameterize.arrays import Array
-from parameterize.mesh import MeshError, Surface
 from parameterize.progress import Progress
+from parameterize.surface.surface import MeshError, Surface
 
 from .folder import default_folder
 from .job_process import Line, Message, Step

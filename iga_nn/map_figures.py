@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.injective import Meeting
-from parameterize.volume import BSplineVolume
+from parameterize.certificate.boundary import Meeting
+from parameterize.spline.volume import BSplineVolume
 
 from .color_range import ColorRange
 from .figure import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, view_of

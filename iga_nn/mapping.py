@@ -24,9 +24,9 @@ from .options import InputError, MapOptions, input_errors, read_corners
 from .verdict import tell
 
 if TYPE_CHECKING:
-    from parameterize.mesh import Surface
     from parameterize.progress import ProgressCallback
     from parameterize.run import Parameterization
+    from parameterize.surface.surface import Surface
     from solve import Poisson
 
 log = logging.getLogger(__name__)
@@ -36,8 +36,8 @@ _TRIED = 50  # points of the surface
 
 def load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool) -> Surface:
     """A surface by path or name, through the gate. Raises MeshError where it is refused."""
-    from parameterize import mesh_decimate
-    from parameterize.mesh import MAX_FACES
+    from parameterize.surface import decimation as mesh_decimate
+    from parameterize.surface.surface import MAX_FACES
 
     from .data import resolve
 
@@ -98,7 +98,7 @@ def _frame(surface: Surface) -> UnitFrame:
 
 def _check_data(equation: Poisson, surface: Surface) -> None:
     """What can be known of the data before there are points inside: their values on the surface."""
-    from parameterize.surface_measures import vertex_normals
+    from parameterize.surface.geometry import vertex_normals
     from solve.meaning import empty_formulas
 
     equation = equation.placed(_frame(surface))
@@ -147,7 +147,7 @@ def _train(
     surface: Surface, options: MapOptions, corners: Any, progress: ProgressCallback | None, checkpoint: Path
 ) -> Parameterization:
     from parameterize.checkpoint import CheckpointError
-    from parameterize.corners import PathError
+    from parameterize.cube.edge_paths import PathError
     from parameterize.run import parameterize
 
     try:

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import AXES, BSplineVolume
+from parameterize.spline.volume import AXES, BSplineVolume
 
 from .rendering import Patch, View, widest_view
 from .sampling import FACE_COLORS, face_grid, points_on, section_grid

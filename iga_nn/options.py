@@ -13,7 +13,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from parameterize.config import Config
-    from parameterize.volume import BSplineVolume
+    from parameterize.spline.volume import BSplineVolume
     from solve import Elasticity, Poisson
     from solve.frame import UnitFrame
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from parameterize.files import save_text
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 from solve.frame import UnitFrame
 
 from . import studies

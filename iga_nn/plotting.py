@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
-from parameterize.injective import Meeting
-from parameterize.volume import BSplineVolume
+from parameterize.certificate.boundary import Meeting
+from parameterize.spline.volume import BSplineVolume
 
 from .curves import draw_history, draw_study
 from .map_figures import draw_cut, draw_distortion, draw_faces, draw_folds, draw_lines, draw_meeting

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from parameterize.arrays import Array, IntArray
 from parameterize.files import save_text
-from parameterize.mesh import Surface, surface_from_arrays
+from parameterize.surface.surface import Surface, surface_from_arrays
 
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 

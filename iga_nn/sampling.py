@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
-from parameterize.quality import arap
-from parameterize.volume import AXES, FACE_NAMES, BSplineVolume
+from parameterize.quality.quality import arap
+from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 from solve.frame import UnitFrame
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from .color_range import ColorRange, error_range, even_range
 from .rendering import widest_view

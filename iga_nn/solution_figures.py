@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from .color_range import error_range, even_range
 from .figure import PANEL, SAMPLES, color_bar, colors, panels_of, save, show_around

@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.bspline import apply_along, insertion_into
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import apply_along, insertion_into
+from parameterize.spline.volume import BSplineVolume
 
 from .options import InputError, one_line
 from .spline_gate import checked_text

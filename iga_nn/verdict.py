@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from parameterize.arrays import in_brackets
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from . import advice
 from . import report as reports
@@ -20,8 +20,8 @@ log = logging.getLogger(__name__)
 
 def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
     """What the section `parameterization` of report.json says of a volume alone."""
-    from parameterize.certificate import certify
-    from parameterize.injective import check_boundary
+    from parameterize.certificate.boundary import check_boundary
+    from parameterize.certificate.jacobian import certify
 
     certificate = certify(volume)
     return {

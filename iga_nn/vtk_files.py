@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
-from parameterize.bezier import elevation, extraction
-from parameterize.bspline import apply_along, divided_spans, insert_knots
-from parameterize.quality import arap
-from parameterize.volume import BSplineVolume
+from parameterize.quality.quality import arap
+from parameterize.spline.bernstein import elevation, extraction
+from parameterize.spline.bspline import apply_along, divided_spans, insert_knots
+from parameterize.spline.volume import BSplineVolume
 from solve.frame import UnitFrame
 
 from .sampling import error_at

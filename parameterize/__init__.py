@@ -6,7 +6,7 @@ The solid P inside the surface becomes the image of the unit cube under a tensor
 
 Method (Zhan, Wang, Chen, CMAME 441, 2025, 117988; lengths such that P has volume 1, (x)_+ = max(x, 0)):
 
-1. Train (`stages`, `network`, `losses`). A network learns the inverse map G from P to the cube. With c the cube's
+1. Train (`training`). A network learns the inverse map G from P to the cube. With c the cube's
    centre, A a constant matrix and k trained,
 
        G(x) = c + A (x - c) + MLP(e(x)),    e(x) = (x, sin(n k x) / (n k), cos(n k x) / (n k)),  n = 1, ..., 10.
@@ -28,11 +28,12 @@ Method (Zhan, Wang, Chen, CMAME 441, 2025, 117988; lengths such that P has volum
 
    `cor` and `edge` are `dist` of the corners and of the paths, these with |t - t*|^2 / 1000 of their directions t.
 
-2. Fit (`fit`). Surface points take places q on the cube's faces, one-to-one where that succeeds; F minimises
+2. Fit (`optimization.least_squares`). Surface points take places q on the cube's faces, one-to-one where that
+   succeeds; F minimises
 
        sum_x |F(G(x)) - x|^2 + sum_y |F(q_y) - y|^2 + fairness int |Hess F|^2    (weighted; x inside, y on the surface).
 
-3. Optimise (`optimize`, `energy`). Newton steps on the control points, the places q sliding between them, lower
+3. Optimise (`optimization`). Newton steps on the control points, the places q sliding between them, lower
 
        int a + s (a - l)_+^2 du dv dw + fairness int |Hess F|^2    a = |J - R|^2 = sum_i (sigma_i - 1)^2, the distortion
        + vertex sum_y r^T (n n^T + t I) r                          r = F(q_y) - y, measured along the normals n at y
@@ -40,11 +41,12 @@ Method (Zhan, Wang, Chen, CMAME 441, 2025, 117988; lengths such that P has volum
 
    where R is the rotation closest to J, sigma_i are the singular values of J, the smallest with the sign of det J, and
    the rest are options (`config.SplineConfig`). beta is watched on the spans along the cube's edges and wherever the
-   certificate has failed before. Further, weaker terms hold F's edges to the surface (`anchors`) and let its faces look
-   the way the mesh does (`facing`). Rounds with a growing penalty end soon after the map is certified. (The paper
-   penalises det J at samples alone, holds the places, and stops after a number of steps.)
+   certificate has failed before. Further, weaker terms hold F's edges to the surface
+   (`optimization.edge_attraction`) and let its faces look the way the mesh does (`optimization.normals`). Rounds with
+   a growing penalty end soon after the map is certified. (The paper penalises det J at samples alone, holds the
+   places, and stops after a number of steps.)
 
-Certificate (`certificate`, `determinant`). With s the coordinates within a knot span, det J there is a polynomial of
+Certificate (`certificate`). With s the coordinates within a knot span, det J there is a polynomial of
 degree m = 3 p - 1 in each of them:
 
     det J = sum_abc beta_abc B_a(s_1) B_b(s_2) B_c(s_3),    B_a(s) = (m over a) s^a (1 - s)^(m - a).
@@ -57,7 +59,8 @@ With eps a bound of all rounding errors made in beta:
     otherwise                        the span is cut into eight (de Casteljau), where the bounds are closer; what is
                                      left after six cuts is undecided
 
-det J > 0 makes F one-to-one near every point, and with a boundary that does not meet itself (`injective`) at large.
+det J > 0 makes F one-to-one near every point, and with a boundary that does not meet itself
+(`certificate.boundary`) at large.
 
 >>> import numpy as np
 >>> from parameterize import BSplineVolume, certify
@@ -81,26 +84,26 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .boundary import BoundaryMap
-    from .certificate import Certificate, certify
+    from .certificate.jacobian import Certificate, certify
     from .config import Config, preset
-    from .mesh import MeshError, Surface, load_surface, surface_from_arrays
-    from .quality import QualityReport, measure
-    from .volume import BSplineVolume
+    from .cube.boundary_map import BoundaryMap
+    from .quality.quality import QualityReport, measure
+    from .spline.volume import BSplineVolume
+    from .surface.surface import MeshError, Surface, load_surface, surface_from_arrays
 
 _HOME = {
-    "BSplineVolume": "volume",
-    "BoundaryMap": "boundary",
-    "Certificate": "certificate",
+    "BSplineVolume": "spline.volume",
+    "BoundaryMap": "cube.boundary_map",
+    "Certificate": "certificate.jacobian",
     "Config": "config",
-    "MeshError": "mesh",
-    "QualityReport": "quality",
-    "Surface": "mesh",
-    "certify": "certificate",
-    "load_surface": "mesh",
-    "measure": "quality",
+    "MeshError": "surface.surface",
+    "QualityReport": "quality.quality",
+    "Surface": "surface.surface",
+    "certify": "certificate.jacobian",
+    "load_surface": "surface.surface",
+    "measure": "quality.quality",
     "preset": "config",
-    "surface_from_arrays": "mesh",
+    "surface_from_arrays": "surface.surface",
 }
 
 __all__ = [

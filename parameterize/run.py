@@ -17,30 +17,30 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Array, IntArray
-from .boundary import BoundaryMap
-from .bspline import open_uniform_knots
-from .certificate import Certificate, certify
+from .certificate.boundary import check_boundary
+from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
-from .corners import PathError, choose_corners
-from .correspondence import boundary_map
-from .cutting import subdivide_long_edges
-from .fit import fit_pairs
+from .cube.boundary_map import BoundaryMap
+from .cube.correspondence import boundary_map
+from .cube.cutting import subdivide_long_edges
+from .cube.edge_paths import PathError, choose_corners
+from .cube.flips import flipped, sides, untangle
+from .cube.tutte import Layout, lay_out
 from .history import History
-from .injective import check_boundary
-from .layout import flipped, sides, untangle
-from .mesh import Surface
-from .network import InverseMap
-from .optimize import Optimized, optimize
-from .patches import Layout, lay_out
+from .optimization.least_squares import fit_pairs
+from .optimization.newton import Optimized, optimize
+from .optimization.surface_distance import SurfaceFit
 from .progress import ProgressCallback, ignore
-from .quality import QualityReport, measure
-from .sample import interior_points
-from .stages import Trainer, map_points
-from .surface_fit import SurfaceFit
-from .surface_measures import vertex_quadrics, vertex_weights
-from .targets import nearest_on_cube
-from .volume import BSplineVolume
+from .quality.quality import QualityReport, measure
+from .spline.bspline import open_uniform_knots
+from .spline.volume import BSplineVolume
+from .surface.geometry import vertex_quadrics, vertex_weights
+from .surface.surface import Surface
+from .training.network import InverseMap
+from .training.samples import interior_points
+from .training.target_shapes import nearest_on_cube
+from .training.trainer import Trainer, map_points
 
 _log = logging.getLogger(__name__)
 _BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit

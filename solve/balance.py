@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from .planes import PlaneField, map_planes
 from .problem import Poisson

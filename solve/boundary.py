@@ -12,8 +12,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from parameterize.arrays import Array
-from parameterize.bspline import apply_along, collocation, gauss_points
-from parameterize.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.bspline import apply_along, collocation, gauss_points
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .operators import ScalarFunction
 from .space import TrialSpace

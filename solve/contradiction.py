@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from parameterize.volume import AXES, BSplineVolume
+from parameterize.spline.volume import AXES, BSplineVolume
 
 from .expressions import ExpressionError
 from .problem import Poisson

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from parameterize.arrays import Array
-from parameterize.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .expressions import Expression, ExpressionError
 from .frame import UnitFrame

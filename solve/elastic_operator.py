@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from . import elastic_kernels, kernels
 from .operators import PAIRS, Operator, Window, to_blocks

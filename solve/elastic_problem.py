@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import FACE_NAMES
+from parameterize.spline.volume import FACE_NAMES
 
 from .data import Data, Parsed, ProblemData, check_faces, finite, parse, values
 from .expressions import Expression

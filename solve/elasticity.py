@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from .boundary import boundary_coefficients
 from .elastic_operator import assemble_elasticity

@@ -16,8 +16,8 @@ from typing import Protocol
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.bspline import apply_along, breakpoints, collocation
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import apply_along, breakpoints, collocation
+from parameterize.spline.volume import BSplineVolume
 
 from .expressions import PAIRS
 from .problem import SYMMETRIC

@@ -8,8 +8,8 @@ from collections.abc import Collection
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.quality import scaled_jacobian
-from parameterize.volume import AXES, BSplineVolume
+from parameterize.quality.quality import scaled_jacobian
+from parameterize.spline.volume import AXES, BSplineVolume
 
 from .elastic_operator import ElasticSystem
 from .linear import LinearResult

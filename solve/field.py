@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
-from parameterize.bspline import evaluate_at, evaluate_grid
-from parameterize.volume import checked_knots, load_spline, save_spline
+from parameterize.spline.bspline import evaluate_at, evaluate_grid
+from parameterize.spline.volume import checked_knots, load_spline, save_spline
 
 
 @dataclass(frozen=True, eq=False)

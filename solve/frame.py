@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.bspline import divided_spans, gauss_points
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import divided_spans, gauss_points
+from parameterize.spline.volume import BSplineVolume
 
 BOX_SAMPLES = 8  # intervals a span and direction in which the boundary is sampled for its bounding box
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from .data import ProblemData, in_scaled
 from .norms import Errors

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from . import kernels
 from .planes import PlaneField, map_planes

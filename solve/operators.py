@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
-from parameterize.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from . import kernels, product
 from .planes import map_planes

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from . import kernels
 from .quadrature import GaussRule, Table

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from .balance import balanced, missing_mean
 from .boundary import boundary_coefficients

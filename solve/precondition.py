@@ -16,8 +16,8 @@ import numpy as np
 from scipy.linalg import eigh
 
 from parameterize.arrays import Array
-from parameterize.bspline import breakpoints
-from parameterize.volume import FACE_NAMES
+from parameterize.spline.bspline import breakpoints
+from parameterize.spline.volume import FACE_NAMES
 
 from .operators import Operator, from_blocks
 from .quadrature import GaussRule, Table

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
-from parameterize.bspline import basis_derivatives, breakpoints, gauss_points
+from parameterize.spline.bspline import basis_derivatives, breakpoints, gauss_points
 
 from .space import TrialSpace
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from .estimate import Problem, error_estimate
 from .field import SplineField

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 
 from .elastic_problem import Elasticity
 from .elasticity import check_elastic_data, solve_elasticity

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.bspline import apply_along, breakpoints, insert_knots, insertion_into, midpoints
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import apply_along, breakpoints, insert_knots, insertion_into, midpoints
+from parameterize.spline.volume import BSplineVolume
 
 
 @dataclass(frozen=True, eq=False)

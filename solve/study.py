@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 
 from .elastic_problem import Elasticity
 from .problem import Poisson

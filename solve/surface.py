@@ -9,8 +9,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
-from parameterize.bspline import apply_along, collocation, gauss_points
-from parameterize.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.bspline import apply_along, collocation, gauss_points
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .operators import Operator
 from .space import TrialSpace

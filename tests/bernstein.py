@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from parameterize.determinant import DeterminantForm
+from parameterize.certificate.determinant import DeterminantForm
 
 
 def coefficients_and_errors(volume, spans):

@@ -16,10 +16,10 @@ STAGES = ("S(2)", "S(1)", "cube", "corners", "edges")
 def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
     """A result as training leaves it, from the benchmark map; amplitude 0.4 folds it."""
     from iga_nn.samples import sample
-    from parameterize.boundary import BoundaryMap
-    from parameterize.certificate import certify
+    from parameterize.certificate.jacobian import certify
     from parameterize.config import preset
-    from parameterize.quality import measure
+    from parameterize.cube.boundary_map import BoundaryMap
+    from parameterize.quality.quality import measure
     from parameterize.run import Parameterization
     from solve.study import benchmark_volume
 

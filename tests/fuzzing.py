@@ -41,11 +41,11 @@ from iga_nn import pipeline, spline_files
 from iga_nn.formats import is_volume
 from iga_nn.options import InputError, input_errors, one_line, read_corners
 from iga_nn.samples import sample
-from parameterize.boundary import BoundaryMap
 from parameterize.checkpoint import Checkpoints
-from parameterize.mesh import MAX_FACES, MeshError
+from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.surface import MAX_FACES, MeshError
 from solve.expressions import Expression, ExpressionError
 from solve.field import SplineField
 from solve.study import benchmark_volume

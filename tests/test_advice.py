@@ -12,8 +12,8 @@ from test_injective import bent, mapped
 from iga_nn import advice, page, plotting, report
 from iga_nn.cli import main
 from iga_nn.options import MapOptions
-from parameterize.certificate import certify
-from parameterize.injective import check_boundary
+from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.jacobian import certify
 from solve.study import benchmark_volume
 
 

@@ -3,12 +3,12 @@ import pytest
 import torch
 from shapes import ball
 
-from parameterize.anchors import EdgeAnchors, edge_points
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.corners import CORNERS
-from parameterize.layout import sides, snap
-from parameterize.surface_fit import SurfaceFit
-from parameterize.surface_measures import vertex_quadrics, vertex_weights
+from parameterize.cube.edge_paths import CORNERS
+from parameterize.cube.flips import sides, snap
+from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
+from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 KNOTS = (open_uniform_knots(6, 3),) * 3  # three spans a direction
 TANGENTIAL = 1e-3

@@ -24,7 +24,7 @@ from iga_nn.cli import main
 from iga_nn.formats import load_volume
 from iga_nn.samples import write_obj
 from iga_nn.sampling import FACE_COLORS
-from parameterize.mesh import surface_from_arrays
+from parameterize.surface.surface import surface_from_arrays
 
 QUICK = ("--steps-factor", "0.02", "--control-points", "6", "--refine", "0")
 OPEN = obj(CUBE, TRIANGLES[:-1])

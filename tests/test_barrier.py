@@ -3,9 +3,9 @@ import pytest
 import torch
 from bernstein import bernstein_coefficients
 
-from parameterize.barrier import SpanBarrier, edge_spans
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.volume import BSplineVolume
+from parameterize.optimization.determinant_penalty import SpanBarrier, edge_spans
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 
 CPU = torch.device("cpu")
 

@@ -14,7 +14,7 @@ from test_examples import load
 import iga_nn
 from iga_nn.options import MapOptions
 from iga_nn.samples import write_obj
-from parameterize.mesh import surface_from_arrays
+from parameterize.surface.surface import surface_from_arrays
 
 g1 = load("benchmarks/g1")
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from parameterize.boundary import BoundaryMap
-from parameterize.volume import FACE_NAMES
+from parameterize.cube.boundary_map import BoundaryMap
+from parameterize.spline.volume import FACE_NAMES
 
 CORNERS = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import collocation, gauss_points
+from parameterize.spline.bspline import collocation, gauss_points
 from solve.boundary import boundary_coefficients
 from solve.space import trial_space
 from solve.study import benchmark_volume

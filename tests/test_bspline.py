@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from parameterize.bspline import (
+from parameterize.spline.bspline import (
     apply_along,
     basis_derivatives,
     breakpoints,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from bernstein import bernstein_coefficients, coefficients_and_errors
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.certificate import certify
-from parameterize.volume import BSplineVolume
+from parameterize.certificate.jacobian import certify
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 
 
 def grid_of(knots, degrees):

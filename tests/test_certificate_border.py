@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_certificate import exact_coefficients, exact_verdict, random_volume
 
-from parameterize.certificate import certify
-from parameterize.volume import BSplineVolume
+from parameterize.certificate.jacobian import certify
+from parameterize.spline.volume import BSplineVolume
 
 DEPTH = 8  # of the exact subdivision: deeper than the certificate's own, so that nothing certified stays undecided
 SHAPES = [((1, 1, 1), (2, 1, 1)), ((1, 1, 1), (2, 2, 1)), ((2, 1, 1), (1, 1, 2)), ((1, 2, 1), (2, 1, 1))]

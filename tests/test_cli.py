@@ -22,7 +22,7 @@ from iga_nn.cli import main
 from iga_nn.folder import open_folder
 from iga_nn.rendering import can_draw
 from parameterize.checkpoint import CheckpointError
-from parameterize.volume import FACE_NAMES
+from parameterize.spline.volume import FACE_NAMES
 from solve.study import benchmark_volume
 
 FILES = (

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from shapes import area, ball, is_closed, turned
 
-from parameterize.boundary import BoundaryMap
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.correspondence import boundary_map
-from parameterize.cutting import cut_along_rays
-from parameterize.volume import BSplineVolume
+from parameterize.cube.boundary_map import BoundaryMap
+from parameterize.cube.correspondence import boundary_map
+from parameterize.cube.cutting import cut_along_rays
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 
 
 def identity_volume():

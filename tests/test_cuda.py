@@ -3,7 +3,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from parameterize.volume import FACE_NAMES  # noqa: E402
+from parameterize.spline.volume import FACE_NAMES  # noqa: E402
 from solve import Poisson, benchmark_volume, solve_poisson  # noqa: E402
 from solve.cuda import DeviceOperator, device_preconditioner, solve_on_device  # noqa: E402
 from solve.linear import conjugate_gradients  # noqa: E402

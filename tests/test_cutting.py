@@ -3,8 +3,8 @@ import pytest
 from scipy.spatial import ConvexHull
 from shapes import area, ball, enclosed_volume, is_closed, turned
 
-from parameterize.cutting import cut_along_rays, split_edges, subdivide_long_edges
-from parameterize.edges import edge_table
+from parameterize.cube.cutting import cut_along_rays, split_edges, subdivide_long_edges
+from parameterize.surface.edges import edge_table
 
 
 def surrounding(seed):

@@ -14,7 +14,7 @@ from iga_nn import data
 from iga_nn.cli import main
 from iga_nn.data import MODELS, Model, fetch, fetch_all, resolve
 from iga_nn.samples import sample, write_obj
-from parameterize.mesh import MeshError
+from parameterize.surface.surface import MeshError
 
 REAL_MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).parents[2] / "shared" / "models"))
 

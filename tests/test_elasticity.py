@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import ConvergenceError, Elasticity, SplineField, benchmark_volume, convergence, solve_elasticity
 from solve.elastic_operator import assemble_elasticity
 from solve.operators import free_window

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import gauss_points, greville, open_uniform_knots
-from parameterize.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Elasticity, Poisson, benchmark_volume, solve_elasticity, solve_poisson
 
 WAVE = "exp(x+z)*sin(y)"

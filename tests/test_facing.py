@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.facing import facing_penalty
-from parameterize.surface_fit import SurfaceFit
-from parameterize.surface_measures import vertex_normals
+from parameterize.optimization.normals import facing_penalty
+from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.surface.geometry import vertex_normals
 
 CPU = torch.device("cpu")
 FLOOR = 0.3

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 from solve import ConvergenceError, Poisson, solve_poisson
 from solve.failure import worst_place
 from solve.space import trial_space

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.fit import fit_pairs
-from parameterize.volume import BSplineVolume
+from parameterize.optimization.least_squares import fit_pairs
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 
 CPU = torch.device("cpu")
 DEGREE = 3

@@ -14,9 +14,9 @@ import pytest
 from iga_nn.cli import main
 from iga_nn.formats import export, is_volume, load_volume
 from iga_nn.options import InputError
-from parameterize.bezier import binomials, elevation
-from parameterize.bspline import open_uniform_knots
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bernstein import binomials, elevation
+from parameterize.spline.bspline import open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 from solve import Poisson, solve_poisson
 from solve.field import SplineField
 from solve.frame import UnitFrame

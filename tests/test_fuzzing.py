@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from iga_nn.options import InputError, read_corners
-from parameterize.boundary import BoundaryMap
+from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.files import save_arrays
-from parameterize.mesh import MeshError
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.surface import MeshError
 from solve.expressions import Expression, ExpressionError
 from solve.field import SplineField
 

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from parameterize.boxes import overlapping_boxes
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.certificate import certify
-from parameterize.injective import check_boundary
-from parameterize.volume import BSplineVolume
+from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.box_overlap import overlapping_boxes
+from parameterize.certificate.jacobian import certify
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 
 
 def mapped(function, shape=(6, 6, 6), degrees=(3, 3, 3)):

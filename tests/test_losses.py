@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize import losses
-from parameterize.sample import OFFSETS
+from parameterize.training import losses
+from parameterize.training.samples import OFFSETS
 
 CELL = 0.1
 

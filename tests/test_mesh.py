@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from parameterize.mesh import MeshError, load_surface, surface_from_arrays
-from parameterize.mesh_clean import signed_volume
-from parameterize.mesh_place import deepest_point
-from parameterize.mesh_polygons import triangulate
-from parameterize.mesh_read import BYTES_AT_LEAST
+from parameterize.surface.inside import deepest_point
+from parameterize.surface.readers.file import BYTES_AT_LEAST
+from parameterize.surface.surface import MeshError, load_surface, surface_from_arrays
+from parameterize.surface.triangulation import triangulate
+from parameterize.surface.welding import signed_volume
 
 MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).parents[2] / "shared" / "models"))
 CUBE = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)

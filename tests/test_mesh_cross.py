@@ -8,8 +8,8 @@ import trimesh
 
 from iga_nn.cli import BAD_INPUT, DONE, main
 from iga_nn.samples import sample, write_obj
-from parameterize.mesh import MeshError, surface_from_arrays
-from parameterize.mesh_cross import crossing_faces, crossing_places
+from parameterize.surface.self_intersection import crossing_faces, crossing_places
+from parameterize.surface.surface import MeshError, surface_from_arrays
 
 
 def dented(depth):

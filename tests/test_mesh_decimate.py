@@ -8,8 +8,8 @@ import pytest
 
 from iga_nn.cli import main
 from iga_nn.samples import sample, write_obj
-from parameterize.mesh import MeshError
-from parameterize.mesh_decimate import decimate
+from parameterize.surface.decimation import decimate
+from parameterize.surface.surface import MeshError
 
 
 def test_a_small_surface_is_left_alone():

@@ -5,7 +5,7 @@ import pytest
 from test_formats import spans_at
 
 from iga_nn.spline_files import write_mfem
-from parameterize.volume import FACE_NAMES
+from parameterize.spline.volume import FACE_NAMES
 from solve import Poisson, benchmark_volume, solve_poisson
 
 mfem = pytest.importorskip("mfem.ser")

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from parameterize.config import NetworkConfig
-from parameterize.network import InverseMap, ResidualModule
+from parameterize.training.network import InverseMap, ResidualModule
 
 SMALL = NetworkConfig(width=16, modules=2, frequencies=3)
 

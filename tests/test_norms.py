@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 from solve.norms import error_norms
 from solve.space import trial_space
 from solve.study import benchmark_volume

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import collocation
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import collocation
+from parameterize.spline.volume import BSplineVolume
 from solve.operators import assemble, free_window
 from solve.quadrature import gauss_rule
 from solve.space import trial_space

@@ -5,17 +5,17 @@ import pytest
 import torch
 from shapes import rounded_cube, turned
 
-from parameterize.bspline import gauss_points, greville, open_uniform_knots
-from parameterize.certificate import certify
+from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
-from parameterize.energy import DistortionEnergy, SplineEnergy
 from parameterize.history import History
-from parameterize.optimize import optimize
-from parameterize.quality import arap
-from parameterize.surface_fit import SurfaceFit
-from parameterize.surface_measures import vertex_quadrics, vertex_weights
-from parameterize.volume import BSplineVolume
+from parameterize.optimization.energy import DistortionEnergy, SplineEnergy
+from parameterize.optimization.newton import optimize
+from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.quality.quality import arap
+from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 CPU = torch.device("cpu")
 CONFIG = SplineConfig(control_points=7, steps=5, penalties=(20.0, 100.0, 500.0, 2500.0), rounds=6)

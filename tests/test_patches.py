@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from shapes import rounded_cube, turned
 
-from parameterize.corners import CORNERS, PathError, choose_corners
-from parameterize.layout import flipped, snap
-from parameterize.patches import lay_out
+from parameterize.cube.edge_paths import CORNERS, PathError, choose_corners
+from parameterize.cube.flips import flipped, snap
+from parameterize.cube.tutte import lay_out
 
 
 def crumpled(noise, seed=0):

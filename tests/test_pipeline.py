@@ -11,7 +11,7 @@ import iga_nn
 from iga_nn import folder, pipeline
 from iga_nn.options import ElasticityOptions, InputError, MapOptions, PoissonOptions
 from iga_nn.rendering import can_draw
-from parameterize.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 from solve import benchmark_volume
 
 MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).resolve().parents[2] / "shared" / "models"))

@@ -3,8 +3,8 @@ import logging
 import numpy as np
 import pytest
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 from solve import ConvergenceError, ExpressionError, Poisson, SplineField, benchmark_volume, check_data, solve_poisson
 
 WAVE = Poisson(exact="exp(x+z)*sin(y)")

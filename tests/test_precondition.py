@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Poisson, solve_poisson
 from solve.linear import conjugate_gradients
 from solve.operators import assemble, free_window

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from parameterize.volume import FACE_NAMES
+from parameterize.spline.volume import FACE_NAMES
 from solve import ExpressionError, Poisson, benchmark_volume, check_data, convergence, solve_poisson
 from solve.space import trial_space
 from solve.surface import FaceMass, face_rule

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize.rotation import closest_rotation, cofactor, determinant, least_eigenvalue
+from parameterize.optimization.polar import closest_rotation, cofactor, determinant, least_eigenvalue
 
 
 def batch(matrices, dtype=torch.float64):

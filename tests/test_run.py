@@ -8,15 +8,15 @@ import torch
 from shapes import rounded_cube, turned
 
 from parameterize import run
-from parameterize.boundary import BoundaryMap
-from parameterize.certificate import certify
+from parameterize.certificate.boundary import BoundaryCheck
+from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig, preset
-from parameterize.corners import CORNERS
-from parameterize.injective import BoundaryCheck
-from parameterize.mesh import surface_from_arrays
+from parameterize.cube.boundary_map import BoundaryMap
+from parameterize.cube.edge_paths import CORNERS
 from parameterize.run import choose_device, corner_vertices, parameterize
-from parameterize.stages import start_map
+from parameterize.surface.surface import surface_from_arrays
+from parameterize.training.trainer import start_map
 
 STEPS = (6, 4, 8, 4, 8)
 

@@ -6,7 +6,15 @@ import torch
 from scipy.spatial import cKDTree
 from shapes import ball, rounded_cube
 
-from parameterize.sample import OFFSETS, TriangleSampler, gather, interior_points, lattice, signed_distance, stencils
+from parameterize.training.samples import (
+    OFFSETS,
+    TriangleSampler,
+    gather,
+    interior_points,
+    lattice,
+    signed_distance,
+    stencils,
+)
 
 CELL = 0.1
 CPU = torch.device("cpu")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from iga_nn.samples import SAMPLES, sample, write_obj
-from parameterize.mesh import load_surface
+from parameterize.surface.surface import load_surface
 
 
 @pytest.mark.parametrize("name", SAMPLES)

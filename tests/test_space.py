@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import evaluate_at, greville, open_uniform_knots
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import evaluate_at, greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 from solve.space import embedded, longest_edge, trial_space
 from solve.study import benchmark_volume
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.volume import BSplineVolume
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 from solve import Poisson, SolveReport, benchmark_volume, convergence, poisson, rates
 from solve.norms import Errors
 from solve.space import TrialSpace

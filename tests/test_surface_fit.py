@@ -4,12 +4,12 @@ import torch
 from shapes import ball, rounded_cube
 
 from iga_nn.samples import sample
-from parameterize.bspline import greville, open_uniform_knots
-from parameterize.layout import flipped, snap
-from parameterize.surface_fit import SurfaceFit, fold_over_edges
-from parameterize.surface_measures import vertex_quadrics, vertex_weights
-from parameterize.targets import nearest_on_cube
-from parameterize.volume import BSplineVolume
+from parameterize.cube.flips import flipped, snap
+from parameterize.optimization.surface_distance import SurfaceFit, fold_over_edges
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.geometry import vertex_quadrics, vertex_weights
+from parameterize.training.target_shapes import nearest_on_cube
 
 CPU = torch.device("cpu")
 DEGREE = 3

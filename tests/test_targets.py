@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize.targets import cuboid_scale, nearest, nearest_on_cube, nearest_on_cube_face, nearest_on_cuboid
+from parameterize.training.target_shapes import (
+    cuboid_scale,
+    nearest,
+    nearest_on_cube,
+    nearest_on_cube_face,
+    nearest_on_cuboid,
+)
 
 
 def random_points(count=300, low=-0.6, high=1.6):

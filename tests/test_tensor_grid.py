@@ -3,10 +3,17 @@ import pytest
 import torch
 from scipy.sparse import csr_array
 
-from parameterize.bspline import gauss_points, greville, open_uniform_knots
-from parameterize.conjugate import conjugate_gradients
-from parameterize.tensor_grid import BendingOperator, FastDiagonalization, along, gauss_grid, gram, to_torch
-from parameterize.volume import BSplineVolume
+from parameterize.optimization.cg import conjugate_gradients
+from parameterize.optimization.tensor_product import (
+    BendingOperator,
+    FastDiagonalization,
+    along,
+    gauss_grid,
+    gram,
+    to_torch,
+)
+from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 
 CPU = torch.device("cpu")
 KIND = {"device": CPU, "dtype": torch.float64}

@@ -5,7 +5,7 @@ import pytest
 from shapes import ball
 
 import iga_nn
-from parameterize.mesh import GRID, surface_from_arrays
+from parameterize.surface.surface import GRID, surface_from_arrays
 
 FAR = 1e4  # of the size: coordinates that large keep 12 of their 16 digits
 POINTS, FACES = ball(400)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from iga_nn.samples import GOLDEN_ANGLE, ball, outward_hull
-from parameterize.mesh import MeshError, Surface, surface_from_arrays
-from parameterize.mesh_cross import crossing_faces
+from parameterize.surface.self_intersection import crossing_faces
+from parameterize.surface.surface import MeshError, Surface, surface_from_arrays
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -33,7 +33,7 @@ from iga_nn.rendering import can_draw, widest_view
 from iga_nn.samples import write_obj
 from parameterize.arrays import Array
 from parameterize.files import replacing, save_text
-from parameterize.mesh import Surface
+from parameterize.surface.surface import Surface
 
 SETTINGS = "{0.preset}, seed {0.seed}, {0.control_points} control points, steps times {0.steps_factor:g}"
 LOOKS = {  # what a reader should picture

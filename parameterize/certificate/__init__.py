@@ -1,0 +1,1 @@
+"""Proves that a spline volume folds nowhere and that its faces do not meet."""

@@ -1,0 +1,165 @@
+"""Is a volume's boundary injective: do its six faces meet nowhere but where they are joined?
+
+With det J > 0 on the whole cube, an injective boundary makes the whole map one-to-one. The faces are cut into Bezier
+patches (bezier_patches.py), and every pair of patches is settled by a proof (patch_proofs.py), or cut in four and
+looked at again. Where nothing is proved, two parameters of one point are searched for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, IntArray, in_brackets
+from ..spline.bspline import breakpoints
+from ..spline.volume import BSplineVolume
+from .bezier_patches import TANGENTS, Pieces, as_rows, boundary_pieces, contact, halved
+from .box_overlap import overlapping_boxes
+from .patch_proofs import settled
+
+Point = tuple[float, float, float]
+
+_MOST_PAIRS = 50_000, 10  # in all, and for each patch in addition: more are not looked at
+_TRIED = 64  # pairs a level from which a common point is searched for
+_NEWTON_STEPS = 12
+_DISTINCT = 1e3  # times their errors the two parameters of a meeting must differ
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Two parameters on the boundary of the cube that the map takes to one point, in the user's units."""
+
+    parameters: tuple[Point, Point]
+    point: Point
+
+    def __str__(self) -> str:
+        first, second, place = map(in_brackets, (*self.parameters, self.point))
+        return f"meets itself at {place}, parameters {first} and {second}"
+
+
+@dataclass(frozen=True)
+class BoundaryCheck:
+    """injective: True where proved, False where `meeting` was found (to rounding), None where neither.
+
+    undecided: pairs of patches left without a proof.
+    """
+
+    injective: bool | None
+    meeting: Meeting | None
+    undecided: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Entries of the section `parameterization` of report.json."""
+        meeting = self.meeting
+        place = meeting and {"parameters": [list(row) for row in meeting.parameters], "point": list(meeting.point)}
+        return {"boundary_injective": self.injective, "boundary_meeting": place}
+
+
+def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryCheck:
+    """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four.
+
+    Raises ValueError for a negative depth.
+    """
+    if max_depth < 0:
+        raise ValueError(f"max_depth must be non-negative, got {max_depth}")
+    local = _local(volume)
+    pieces = boundary_pieces(local)
+    error = _rounding(local, max_depth)
+    own = np.repeat(np.arange(len(pieces.nets))[:, None], 2, axis=1)
+    points = as_rows(pieces.nets)
+    pairs = np.concatenate([own, overlapping_boxes(points.min(axis=1) - error, points.max(axis=1) + error)])
+    most = _MOST_PAIRS[0] + _MOST_PAIRS[1] * len(own)
+    for depth in range(max_depth + 1):
+        hopeless = len(pairs) > most  # then only a common point is searched for
+        pairs = pairs if hopeless else pairs[~settled(pieces, pairs, error)]
+        if not len(pairs):
+            return BoundaryCheck(True, None, 0)
+        met = _search(local, pieces, pairs, error)
+        if met is not None:
+            meeting = Meeting((_as_point(met[0]), _as_point(met[1])), _as_point(volume(met[0])[0]))
+            return BoundaryCheck(False, meeting, len(pairs))
+        if hopeless or depth == max_depth:
+            break
+        pieces, pairs = halved(pieces, pairs)
+    return BoundaryCheck(None, None, len(pairs))
+
+
+def _local(volume: BSplineVolume) -> BSplineVolume:
+    """The volume with its middle moved to the origin, and scaled by a power of two to magnitude 1.
+
+    That is one rounding for each coordinate, relative to the difference from the middle, however far away that is.
+    """
+    points = volume.control_points
+    moved = points - (points.min(axis=(0, 1, 2)) + points.max(axis=(0, 1, 2))) / 2.0
+    exponent = int(np.frexp(np.abs(moved).max())[1])
+    return BSplineVolume(volume.degrees, volume.knots, np.ldexp(moved, -exponent))
+
+
+def _rounding(local: BSplineVolume, max_depth: int) -> float:
+    """Bound of the rounding error of a Bezier control point's coordinate.
+
+    No weight is negative and all sum to 1, so that each rounding changes a sum by at most the unit roundoff times the
+    largest coordinate: 6 p + 2 a direction for the extraction (bernstein.py), 2 p + 2 for the elevation, p + 1 a
+    halving, and 1 for the move to the origin. All that underflows is below 2**-1000, and the largest coordinate at
+    least 1/2.
+    """
+    degree = max(local.degrees)
+    roundings = 2 * (8 * degree + 4 + max_depth * (degree + 1)) + 8 + 1
+    return 1.01 * roundings * 2.0**-53 * float(np.abs(local.control_points).max())
+
+
+def _search(local: BSplineVolume, pieces: Pieces, pairs: IntArray, error: float) -> tuple[Array, Array] | None:
+    """Two parameters of a common point of pieces that do not touch in the cube.
+
+    Newton's method starts from the middle of some pairs. Beside an edge of the cube it tends to two equal parameters:
+    so the gap must be rounding, and the parameters farther apart than their errors, gap / (least slope), can explain.
+    """
+    some = pairs[:: 1 + len(pairs) // _MOST_PAIRS[0]]
+    touching, _ = contact(pieces, some[:, 0], some[:, 1])
+    open_pairs = some[~touching]
+    if not len(open_pairs):
+        return None
+    chosen = open_pairs[np.unique(np.linspace(0, len(open_pairs) - 1, _TRIED).astype(np.int64))]
+    rows = np.arange(len(chosen))[:, None]
+    tangents = [TANGENTS[pieces.axes[part]] for part in chosen.T]
+    where = [_middles(local, pieces, part) for part in chosen.T]  # two (k, 3)
+    for _ in range(_NEWTON_STEPS):
+        gap = local(where[0]) - local(where[1])
+        slopes = _slopes(local, where, tangents)
+        step = np.einsum("kab,kb->ka", np.linalg.pinv(slopes, rcond=1e-9), gap)  # (k, 4)
+        for side in range(2):
+            where[side][rows, tangents[side]] -= step[:, 2 * side : 2 * side + 2]
+            np.clip(where[side], 0.0, 1.0, out=where[side])
+    gap = np.linalg.norm(local(where[0]) - local(where[1]), axis=1)
+    singular = np.linalg.svd(_slopes(local, where, tangents), compute_uv=False)
+    met = (gap < error) & (singular[:, 2] > 1e-4 * singular[:, 0])  # the surfaces cross, they do not just touch
+    distance = np.abs(where[0] - where[1]).max(axis=1)
+    met &= (distance > 1e-6) & (distance * singular[:, 2] > _DISTINCT * (gap + error))
+    if not met.any():
+        return None
+    best = int(np.flatnonzero(met)[0])
+    return where[0][best], where[1][best]
+
+
+def _slopes(volume: BSplineVolume, where: list[Array], tangents: list[NDArray[np.int64]]) -> Array:
+    """Derivative (k, 3, 4) of F(p) - F(q) in the two free parameters of each."""
+    parts = [
+        np.take_along_axis(volume.jacobian(points), axes[:, None, :], axis=2)
+        for points, axes in zip(where, tangents, strict=True)
+    ]
+    return np.concatenate([parts[0], -parts[1]], axis=2)
+
+
+def _middles(volume: BSplineVolume, pieces: Pieces, rows: NDArray[np.int64]) -> Array:
+    """Parameters (k, 3) of the middle of pieces."""
+    middle = (pieces.low[rows] + pieces.high[rows]) / 2.0 ** (pieces.depth + 1)
+    breaks = [breakpoints(knots) for knots in volume.knots]
+    return np.stack([np.interp(middle[:, a], np.arange(len(breaks[a])), breaks[a]) for a in range(3)], axis=1)
+
+
+def _as_point(row: Array) -> Point:
+    x, y, z = row.tolist()
+    return x, y, z

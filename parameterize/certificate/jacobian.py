@@ -1,0 +1,177 @@
+"""Certificate: a proof that det J of a trivariate spline is positive on the whole cube, or a point where it is not.
+
+On every span det J is a polynomial of degree 3 p - 1 a direction, and its Bernstein coefficients bound it. All of them
+positive: proved. A corner coefficient is a value of det J: negative there, folded. Else the span is cut into eight and
+looked at again. (Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys.
+233, 2013, section 3.) "Positive" and "negative" mean by more than a bound of all rounding errors (determinant.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, IntArray
+from ..spline.bernstein import split
+from ..spline.volume import BSplineVolume
+from .determinant import CHUNK, DeterminantForm, corners_of
+
+_PIECES = 64  # pieces at a time
+_TIGHT = 0.5  # a proved bound below this share of the least known value of det J is refined
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What is known about the sign of det J.
+
+    verdict: "certified" (det J > 0 on the whole cube), "folded" (det J < 0 at `witness`), or "undecided".
+    lower_bound: proved lower bound of det J over the cube, divided by the magnitude of its mean.
+    mean_det: integral of det J over the cube, which is the signed volume, in the volume's own units.
+    witness: the parameters of a point where det J is negative; None unless folded.
+    unproved: (k, 3) span numbers (i, j, l) on which det J was not proved positive.
+    """
+
+    verdict: Literal["certified", "folded", "undecided"]
+    lower_bound: float
+    mean_det: float
+    witness: tuple[float, float, float] | None
+    unproved: IntArray
+
+
+def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
+    """Decide whether det J > 0 on the whole cube, cutting doubtful spans at most `max_depth` times in eight.
+
+    Raises ValueError for a negative depth, or where derivatives overflow.
+    """
+    if max_depth < 0:
+        raise ValueError(f"max_depth must be non-negative, got {max_depth}")
+    form = DeterminantForm(volume)
+    bounds, corners, means = form.survey()
+    search = _Search(form, max_depth, float(corners.min()))
+    doubtful = np.flatnonzero(~(bounds > search.target))  # span numbers, flat
+    for begin in range(0, len(doubtful), CHUNK):
+        search.examine(doubtful[begin : begin + CHUNK])
+    bounds[doubtful] = np.inf
+    lowest = min(float(bounds.min()), search.lowest)
+    mean = float(np.sum(means * form.span_sizes()))
+    failed = np.flatnonzero(search.unproved)
+    verdict: Literal["certified", "folded", "undecided"] = "undecided" if failed.size else "certified"
+    if search.worst_piece is not None:
+        verdict = "folded"
+    return Certificate(
+        verdict=verdict,
+        lower_bound=lowest / abs(mean) if mean != 0.0 else -np.inf,
+        mean_det=float(np.ldexp(mean, form.exponent)),
+        witness=search.witness(volume),
+        unproved=form.numbers(failed),
+    )
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Parts of spans, all cut equally often: their edges are 2**-depth of their spans' edges."""
+
+    depth: int
+    spans: IntArray  # (k,) flat span numbers
+    origins: IntArray  # (k, 3) place inside the span, in edges of the piece
+    values: Array  # (k, d_u, d_v, d_w)
+    permanents: Array  # (k,)
+
+    def subset(self, rows: NDArray[np.bool_] | slice) -> _Pieces:
+        """The pieces that a mask or a slice picks."""
+        return _Pieces(self.depth, self.spans[rows], self.origins[rows], self.values[rows], self.permanents[rows])
+
+    def halved(self) -> _Pieces:
+        """Each piece as eight."""
+        values = split(self.values)
+        origins = 2 * self.origins[:, None] + np.indices((2, 2, 2)).reshape(3, 8).T  # (k, 8, 3)
+        return _Pieces(
+            self.depth + 1,
+            np.repeat(self.spans, 8),
+            origins.reshape(-1, 3),
+            values.reshape(-1, *values.shape[4:]),
+            np.repeat(self.permanents, 8),
+        )
+
+
+class _Search:
+    """Depth-first subdivision of doubtful spans, each until it is proved, or folded, or a part of it is given up.
+
+    Depth-first bounds the memory, at most 9 * _PIECES pieces a level, and the time that a hopeless span takes.
+    """
+
+    def __init__(self, form: DeterminantForm, max_depth: int, known: float) -> None:
+        self.form = form
+        self.max_depth = max_depth
+        self.known = known  # least value of det J seen
+        self.lowest = np.inf  # least bound of det J over the pieces done with
+        self.unproved = np.zeros(form.span_count, dtype=bool)
+        self.closed = np.zeros(form.span_count, dtype=bool)  # folded or given up: not to be looked at further
+        self.deepest = 0.0  # det J at the worst fold
+        self.worst_piece: tuple[int, int, IntArray, IntArray] | None = None  # depth, span, origin (3,), corner (3,)
+
+    def examine(self, spans: IntArray) -> None:
+        """Look at whole spans (k,), flat numbers, until each is proved, folded or given up."""
+        values, permanents = self.form.coefficients(self.form.numbers(spans))
+        whole = np.ascontiguousarray(np.moveaxis(values, -1, 0))
+        stack = [_Pieces(0, spans, np.zeros((len(spans), 3), dtype=np.int64), whole, permanents)]
+        while stack:
+            top = stack.pop()
+            if len(top.spans) > _PIECES:
+                stack.append(top.subset(slice(_PIECES, None)))
+                top = top.subset(slice(_PIECES))
+            doubtful = self._settle(top)
+            if len(doubtful.spans):
+                stack.append(doubtful.halved())
+
+    @property
+    def target(self) -> float:
+        """A bound of det J above this is good enough."""
+        return max(0.0, _TIGHT * self.known)
+
+    def _settle(self, pieces: _Pieces) -> _Pieces:
+        """Draw the conclusions that can be drawn; return the pieces to be cut."""
+        errors = self.form.errors(pieces.permanents, pieces.depth)
+        least = pieces.values.min(axis=(1, 2, 3))
+        bounds = least - errors
+        corners = corners_of(pieces.values, first=1).reshape(-1, 8)
+        lowest_corner = corners.min(axis=1)
+        self.known = min(self.known, float(lowest_corner.min()))
+        self._record_folds(pieces, corners, lowest_corner < -errors)
+        if pieces.depth == self.max_depth:
+            self.closed[pieces.spans[~(bounds > 0.0)]] = True
+        hopeless = (lowest_corner <= errors) & (least >= -errors)  # det J is 0 at a corner, and no fold can show
+        done = (bounds > self.target) | hopeless | self.closed[pieces.spans] | (pieces.depth == self.max_depth)
+        self.unproved[pieces.spans[done & ~(bounds > 0.0)]] = True
+        self.lowest = min(self.lowest, float(bounds[done].min(initial=np.inf)))
+        return pieces.subset(~done)
+
+    def _record_folds(self, pieces: _Pieces, corners: Array, folded: NDArray[np.bool_]) -> None:
+        self.closed[pieces.spans[folded]] = True
+        row, corner = np.unravel_index(int(corners.argmin()), corners.shape)
+        if folded[row] and corners[row, corner] < self.deepest:
+            self.deepest = float(corners[row, corner])
+            place = np.array(np.unravel_index(int(corner), (2, 2, 2)), dtype=np.int64)
+            self.worst_piece = (pieces.depth, int(pieces.spans[row]), pieces.origins[row], place)
+
+    def witness(self, volume: BSplineVolume) -> tuple[float, float, float] | None:
+        """Parameters of the worst fold found.
+
+        Derivatives may jump between spans, and parameters are rounded: where det J as evaluated there is positive, a
+        point a little inside the piece, where det J is negative by continuity, is returned.
+        """
+        if self.worst_piece is None:
+            return None
+        depth, span, origin, place = self.worst_piece
+        number = self.form.numbers(np.array([span]))[0]
+        edges = np.array([b[[i, i + 1]] for b, i in zip(self.form.breaks, number, strict=True)])  # (3, 2)
+        for inward in (0.0, 1e-12, 1e-9, 1e-6, 1e-3):
+            local = (origin + place + inward * (0.5 - place)) / 2.0**depth
+            point = (1.0 - local) * edges[:, 0] + local * edges[:, 1]
+            if np.linalg.det(volume.jacobian(point)[0]) <= 0.0:
+                break
+        u, v, w = point.tolist()
+        return u, v, w

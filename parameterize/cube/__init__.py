@@ -1,0 +1,1 @@
+"""Lays a closed surface out on the six faces of the unit cube."""

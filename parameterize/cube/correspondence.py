@@ -1,0 +1,90 @@
+"""The final boundary map: every surface point's place on the cube, one-to-one, cut along the cube's edges."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+from ..spline.volume import BSplineVolume
+from .boundary_map import BoundaryMap
+from .cutting import CutMesh, cut_along_rays
+from .flips import snap, untangle
+
+_SAME = 1e-7  # share of a mesh edge: cuts this close to a vertex take the vertex, which NEAR_EDGE then puts on the edge
+_NUDGE, _NUDGES = 1e-4, 10
+_SETTLE_STEPS = 8
+_UNDO_ROUNDS = 10
+_MARGIN = 1e-2  # share of a mesh edge that a cut keeps from its ends
+
+
+def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parameters: Array) -> BoundaryMap:
+    """Cut the surface (vertices (n, 3), user's units) where its parameters (n, 3) pass an edge of the cube.
+
+    Parameters come from closest points of the volume's boundary, which may turn a few triangles over where the spline
+    smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
+    """
+    placed = untangle(parameters, faces)
+    for number in range(_NUDGES):
+        cut = cut_along_rays(placed, faces, _SAME)
+        spread = snap(cut.carry(placed))
+        spread[: len(placed)] = placed
+        plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
+        turned = plain.flipped()
+        if not len(turned):
+            break
+        placed = _nudged(placed, cut, turned, number)
+    closer = _settle_cuts(volume, vertices, cut, plain.parameters)
+    return plain if len(closer.flipped()) > len(plain.flipped()) else closer
+
+
+def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int) -> Array:
+    """Shift the vertices (n, 3) around degenerate pieces a little: a mesh edge ran through a corner of the cube."""
+    corners = np.unique(cut.faces[turned])
+    around = np.unique(np.concatenate([corners[corners < len(placed)], cut.parents[corners].ravel()]))
+    around = around[around < len(placed)]
+    moved = placed.copy()
+    moved[around] += _NUDGE * np.random.default_rng(number).uniform(-1.0, 1.0, (len(around), 3))
+    return snap(moved)
+
+
+def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameters: Array) -> BoundaryMap:
+    """Move each cut vertex along its mesh edge and its parameter along the cube's edge until F(p) is close to it.
+
+    Gauss-Newton in those two unknowns; corners of the cube and cuts within a face keep their parameter. Steps that turn
+    a triangle are undone.
+    """
+    n = len(vertices)
+    new = np.arange(n, len(parameters))
+    inner = (parameters[new] > 0.0) & (parameters[new] < 1.0)  # (k, 3)
+    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; ends of cuts within a face stay
+    best = BoundaryMap(cut.carry(vertices), parameters, cut.faces)
+    for _ in range(_SETTLE_STEPS):
+        where, carried = best.parameters[new], best.vertices
+        along_mesh = carried[cut.parents[new, 1]] - carried[cut.parents[new, 0]]
+        along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
+        shift, slide = _fit_two(along_mesh, along_cube, volume(where) - carried[new])
+        share, moved = cut.share.copy(), best.parameters.copy()
+        share[new] = np.clip(share[new] + shift, _MARGIN, 1.0 - _MARGIN)
+        moved[new] = np.where(inner, np.clip(where + slide[:, None], _MARGIN**2, 1.0 - _MARGIN**2), where)
+        trial = replace(cut, share=share)
+        for _ in range(_UNDO_ROUNDS):
+            candidate = BoundaryMap(trial.carry(vertices), moved, cut.faces)
+            turned = np.setdiff1d(cut.faces[candidate.flipped()].ravel(), np.arange(n))
+            if not turned.size:
+                cut, best = trial, candidate
+                break
+            trial.share[turned] = cut.share[turned]
+            moved[turned] = best.parameters[turned]
+    return best
+
+
+def _fit_two(first: Array, second: Array, right: Array) -> tuple[Array, Array]:
+    """Coefficients a, b (k,) that minimise |a first - b second - right|, damped against parallel directions."""
+    aa, bb, ab = (first * first).sum(1), (second * second).sum(1), -(first * second).sum(1)
+    ra, rb = (first * right).sum(1), -(second * right).sum(1)
+    damping = 1e-3 * (aa + bb) + 1e-300
+    aa, bb = aa + damping, bb + damping
+    determinant = aa * bb - ab * ab
+    return (bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant

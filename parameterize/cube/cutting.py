@@ -1,0 +1,132 @@
+"""Cutting a surface that surrounds the cube's centre along the rays through the cube's 12 edges.
+
+Each edge of the cube spans, with the centre, a half plane where two coordinates (counted from the centre) are equal in
+size and no smaller than the third. Splitting the triangles that such a half plane crosses puts mesh vertices and
+edges on it; seen from the centre the mesh then resolves the 12 edges and 8 corners of the cube.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+from ..surface.edges import edge_table
+
+_PLANES = [(a, b, sign) for a, b in ((0, 1), (0, 2), (1, 2)) for sign in (1.0, -1.0)]
+
+
+@dataclass(frozen=True, eq=False)
+class CutMesh:
+    """Triangles after splitting, and where their vertices lie on the original mesh.
+
+    parents: (n, 2) original or earlier vertices; share: (n,) position = (1 - share) * first + share * second.
+    Vertices of the input are their own parents, share 0. Parents of a new vertex always come before it.
+    """
+
+    faces: IntArray
+    parents: IntArray
+    share: Array
+
+    def carry(self, values: Array) -> Array:
+        """Values at the input's vertices (n_input, k), interpolated along the split edges: (n, k)."""
+        result = np.empty((len(self.parents), values.shape[1]))
+        n = len(values)
+        result[:n] = values
+        for i in range(n, len(result)):
+            a, b = self.parents[i]
+            result[i] = (1.0 - self.share[i]) * result[a] + self.share[i] * result[b]
+        return result
+
+
+def cut_along_rays(mapped: Array, faces: IntArray, snap: float) -> CutMesh:
+    """Split the mesh (mapped vertices (n, 3), faces (m, 3)) along the six planes of the cube's edges.
+
+    A crossing closer than `snap` (share of the edge's length) to an end takes that vertex instead of a new one.
+    """
+    position = mapped - 0.5
+    n = len(position)
+    parents, share = np.stack([np.arange(n)] * 2, axis=1), np.zeros(n)
+    for a, b, sign in _PLANES:
+        height = position[:, a] - sign * position[:, b]
+        edges, where = _crossings(height, position, faces, (a, b, 3 - a - b), snap)
+        new = (1.0 - where)[:, None] * position[edges[:, 0]] + where[:, None] * position[edges[:, 1]]
+        new[:, b] = sign * new[:, a]  # on the plane, to the last bit
+        faces = split_edges(faces, edges, len(position))
+        position = np.concatenate([position, new])
+        parents = np.concatenate([parents, edges])
+        share = np.concatenate([share, where])
+    return CutMesh(faces, parents, share)
+
+
+def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tuple[Array, IntArray]:
+    """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface the same."""
+    while True:
+        edges = edge_table(faces)[0]
+        ends = vertices[edges]
+        long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > longest
+        if not long.any():
+            return vertices, faces
+        faces = split_edges(faces, edges[long], len(vertices))
+        vertices = np.concatenate([vertices, ends[long].mean(axis=1)])
+
+
+def _crossings(
+    height: Array, position: Array, faces: IntArray, axes: tuple[int, int, int], snap: float
+) -> tuple[IntArray, Array]:
+    """Mesh edges (k, 2) to split at the plane, and where (k,): of triangles that a cube edge's half plane crosses.
+
+    A triangle meets the plane in a segment. It is left whole only where that segment stays beyond one of the cube's
+    corners; so, after all planes, no half plane passes through the inside of a triangle.
+    """
+    level = height[faces]
+    sides = faces[(level.min(axis=1) < 0.0) & (level.max(axis=1) > 0.0)][:, [[0, 1], [1, 2], [2, 0]]]  # (k, 3, 2)
+    sides.sort(axis=2)
+    start, end = height[sides[:, :, 0]], height[sides[:, :, 1]]
+    crossing = start * end < 0.0  # (k, 3)
+    where = np.where(crossing, start, 0.0) / np.where(crossing, start - end, 1.0)
+    where[end == 0.0] = 1.0
+    point = position[sides[:, :, 0]] + where[..., None] * (position[sides[:, :, 1]] - position[sides[:, :, 0]])
+    meets = crossing | (start == 0.0) | (end == 0.0)
+    size, third = np.abs(point[..., axes[0]]), point[..., axes[2]]
+    above, below = (meets & (third > -size)).any(axis=1), (meets & (third < size)).any(axis=1)
+    split = crossing & (above & below)[:, None] & (where > snap) & (where < 1.0 - snap)
+    edges, first = np.unique(sides[split], axis=0, return_index=True)
+    return edges, where[split][first]
+
+
+def split_edges(faces: IntArray, edges: IntArray, first_new: int) -> IntArray:
+    """Faces after putting vertex `first_new + i` on edge i (given once, smaller index first); (m, 3) -> (m', 3).
+
+    One split edge of a triangle gives two triangles, two give three, three give four.
+    """
+    lookup = {(int(i), int(j)): first_new + k for k, (i, j) in enumerate(edges)}
+    touched = np.zeros(int(faces.max()) + 1, dtype=bool)
+    touched[edges.ravel()] = True
+    candidate = touched[faces].sum(axis=1) >= 2
+    result = [faces[~candidate]]
+    pieces: list[tuple[int, int, int]] = []
+    for face in faces[candidate].tolist():
+        pieces.extend(_split_triangle(face, lookup))
+    result.append(np.array(pieces, dtype=np.int64).reshape(-1, 3))
+    return np.concatenate(result)
+
+
+def _split_triangle(face: list[int], lookup: dict[tuple[int, int], int]) -> list[tuple[int, int, int]]:
+    middle = [lookup.get((min(face[k], face[k - 2]), max(face[k], face[k - 2]))) for k in range(3)]  # edge k -> k + 1
+    count = sum(m is not None for m in middle)
+    if count == 0:
+        return [(face[0], face[1], face[2])]
+    if count == 3:
+        (a, b, c), (ab, bc, ca) = face, middle
+        assert ab is not None and bc is not None and ca is not None
+        return [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    turn = next(k for k in range(3) if middle[k] is not None and (count == 1 or middle[k - 1] is not None))
+    a, b, c = face[turn], face[turn - 2], face[turn - 1]
+    first, last = middle[turn], middle[turn - 1]  # on a-b and, for two cuts, on c-a
+    assert first is not None
+    if count == 1:
+        return [(a, first, c), (first, b, c)]
+    assert last is not None
+    return [(a, first, last), (first, b, c), (first, c, last)]

@@ -1,0 +1,161 @@
+"""Corners of the cube on the surface, 12 edge paths between them, six patches bounded by these (section 4.4.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from ..arrays import Array, IntArray
+from ..surface.edges import directed_edges, edge_table
+from .cutting import CutMesh, cut_along_rays
+
+CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)  # (8, 3), (0,0,0) ... (1,1,1)
+EDGES = [(i, j) for i in range(8) for j in range(i + 1, 8) if np.abs(CORNERS[i] - CORNERS[j]).sum() == 1.0]
+_SNAP = 0.1  # crossings nearer than this share of a mesh edge to a vertex use the vertex: no slivers along the paths
+_STRAY = 20.0  # how much dearer a path gets at one cell's distance from its cube edge
+_CELL = 0.05
+_TRIES = 24
+
+
+class PathError(RuntimeError):
+    """The cube's edges could not be traced on the surface."""
+
+
+@dataclass(frozen=True, eq=False)
+class CubeSurface:
+    """The surface, cut along the 12 paths.
+
+    cut: the refined mesh; corners (8,): vertices on the cube's corners; paths: 12 vertex sequences between corners, in
+    the order of EDGES; face_labels (m,): the cube face (u0, u1, v0, v1, w0, w1) of each triangle.
+    """
+
+    cut: CutMesh
+    corners: IntArray
+    paths: list[IntArray]
+    face_labels: IntArray
+
+
+def choose_corners(mapped: Array) -> IntArray:
+    """The vertex farthest towards each corner of the cube: argmax <v - A, P - A>, eight different vertices."""
+    reach = (mapped - 0.5) @ (CORNERS - 0.5).T  # (n, 8)
+    candidates = np.unique(np.argsort(-reach, axis=0)[:8])
+    rows, columns = linear_sum_assignment(-reach[candidates])
+    result = np.empty(8, dtype=np.int64)
+    result[columns] = candidates[rows]
+    return result
+
+
+def cut_surface(mapped: Array, faces: IntArray, corners: IntArray) -> CubeSurface:
+    """Cut the mapped surface (n, 3), close to the cube's boundary, along paths between its eight corners.
+
+    Raises PathError where the paths do not bound six discs, which happens only far from a cube, or where the corners
+    come in the order of a mirrored cube.
+    """
+    cut = cut_along_rays(mapped, faces, _SNAP)
+    position = cut.carry(mapped)
+    paths = _trace_paths(position, cut.faces, corners)
+    labels = _patches(cut.faces, paths, corners)
+    if _mirrored(cut.faces, labels, paths[0]):
+        raise PathError("the corners are those of a mirrored cube: swap corners 0-3 with 4-7, or let them be chosen")
+    return CubeSurface(cut, corners, paths, labels)
+
+
+def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
+    """Disjoint paths along mesh edges, one a cube edge; where one finds no way, it is traced first in the next try."""
+    order = list(range(len(EDGES)))
+    for _ in range(_TRIES):
+        paths, blocked = _trace_in_order(position, faces, corners, order)
+        if blocked is None:
+            return [paths[k] for k in range(len(EDGES))]
+        order.remove(blocked)
+        order.insert(0, blocked)
+    i, j = EDGES[order[0]]
+    raise PathError(f"no path left on the surface between cube corners {CORNERS[i]} and {CORNERS[j]}")
+
+
+def _trace_in_order(
+    position: Array, faces: IntArray, corners: IntArray, order: list[int]
+) -> tuple[dict[int, IntArray], int | None]:
+    """Shortest paths, made dear away from the cube edge they stand for; and the first edge that found no way."""
+    edges = edge_table(faces)[0]
+    length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
+    radial = 0.5 + (position - 0.5) / (2.0 * np.abs(position - 0.5).max(axis=1, keepdims=True))
+    free = np.ones(len(position), dtype=bool)
+    free[corners] = False
+    paths: dict[int, IntArray] = {}
+    for number in order:
+        i, j = EDGES[number]
+        usable = free.copy()
+        usable[corners[[i, j]]] = True
+        keep = usable[edges].all(axis=1)
+        stray = _distance_to_segment(radial, CORNERS[i], CORNERS[j])[edges[keep]].max(axis=1)
+        cost = (length[keep] + 1e-9) * (1.0 + _STRAY * stray / _CELL)
+        a, b = edges[keep].T
+        graph = coo_array((cost, (a, b)), shape=(len(position),) * 2).tocsr()
+        _, previous = dijkstra(graph, directed=False, indices=corners[i], return_predecessors=True)
+        path = [int(corners[j])]
+        while path[-1] != corners[i]:
+            if previous[path[-1]] < 0:
+                return paths, number
+            path.append(int(previous[path[-1]]))
+        free[path] = False
+        paths[number] = np.array(path[::-1])
+    return paths, None
+
+
+def _distance_to_segment(points: Array, start: Array, end: Array) -> Array:
+    along = np.clip((points - start) @ (end - start), 0.0, 1.0)
+    return np.linalg.norm(points - start - along[:, None] * (end - start), axis=1)
+
+
+def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntArray:
+    """Flood-fill the triangles between the paths; label each of the six patches by its four corners."""
+    on_path = {
+        tuple(sorted(pair)) for path in paths for pair in zip(path[:-1].tolist(), path[1:].tolist(), strict=True)
+    }
+    sides = np.sort(directed_edges(faces), axis=1)
+    order = np.lexsort(sides.T)
+    pairs, owners = sides[order][::2], order.reshape(-1, 2) // 3  # closed mesh: every edge has two triangles
+    open_sides = np.array([tuple(p) not in on_path for p in pairs.tolist()])
+    a, b = owners[open_sides].T
+    links = coo_array((np.ones(len(a)), (a, b)), shape=(len(faces),) * 2)
+    count, patch = connected_components(links, directed=False)
+    if count != 6:
+        raise PathError(f"the edge paths bound {count} patches, not 6")
+    labels = np.full(6, -1)
+    for k in range(6):
+        inside = np.isin(corners, faces[patch == k])
+        if inside.sum() != 4:
+            raise PathError(f"a patch between the edge paths has {inside.sum()} corners, not 4")
+        spread = np.ptp(CORNERS[inside], axis=0)
+        axis = int(np.argmin(spread))
+        labels[k] = 2 * axis + int(CORNERS[inside][0, axis])
+    if len(set(labels.tolist())) != 6:
+        raise PathError("two patches belong to the same face of the cube")
+    return np.asarray(labels[patch], dtype=np.int64)
+
+
+def _mirrored(faces: IntArray, labels: IntArray, path: IntArray) -> bool:
+    """Whether the face to the left of the path from corner (0,0,0) to (0,0,1), seen from outside, is not u0."""
+    sides = directed_edges(faces)
+    left = np.flatnonzero((sides == path[:2]).all(axis=1))[0] // 3
+    return bool(labels[left] != 0)
+
+
+def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array, IntArray]:
+    """Path vertices (k,), targets on the cube's edges by mapped arc length (k, 3), pairs of neighbours (s, 2)."""
+    vertices: list[IntArray] = []
+    targets: list[Array] = []
+    following: list[IntArray] = []
+    for (i, j), path in zip(EDGES, paths, strict=True):
+        steps = np.linalg.norm(np.diff(mapped[path], axis=0), axis=1)
+        share = np.concatenate([[0.0], np.cumsum(steps)]) / max(steps.sum(), 1e-12)
+        start = sum(len(path) for path in vertices)
+        vertices.append(path)
+        targets.append((1.0 - share)[:, None] * CORNERS[i] + share[:, None] * CORNERS[j])
+        following.append(start + np.stack([np.arange(len(path) - 1), np.arange(1, len(path))], axis=1))
+    return np.concatenate(vertices), np.concatenate(targets), np.concatenate(following)

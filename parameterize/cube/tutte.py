@@ -1,0 +1,106 @@
+"""A first layout of the surface on the cube without a single flipped triangle.
+
+The surface is cut along the 12 edge paths. Each of the six patches is a disc whose rim goes to the sides of a square;
+with every inner vertex a convex combination of its neighbours the map onto that square is one-to-one (Tutte 1963;
+Floater, Math. Comp. 72, 2003). The combinations reproduce the network's places wherever those are one-to-one already.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, eye_array
+from scipy.sparse.linalg import splu
+
+from ..arrays import Array, IntArray
+from ..surface.edges import edge_table
+from .cutting import split_edges
+from .edge_paths import cut_surface, edge_targets
+
+_FLAT = 1e-12  # area of a triangle on the square that counts as turned over
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Surface points (n, 3), those of the mesh first, triangles (m, 3) between them, places (n, 3) on the cube."""
+
+    vertices: Array
+    faces: IntArray
+    places: Array
+
+
+def lay_out(mapped: Array, vertices: Array, faces: IntArray, corners: IntArray) -> Layout:
+    """Cut the surface (n, 3) along the paths that the mapped one (n, 3) suggests; lay its patches out on the cube.
+
+    corners: (8,) vertices. Raises PathError where the mapped surface is too far from a cube.
+    """
+    surface = cut_surface(mapped, faces, corners)
+    vertices, places = surface.cut.carry(vertices), surface.cut.carry(mapped)
+    path, target, _ = edge_targets(places, surface.paths)
+    places[path] = target
+    fixed = np.zeros(len(places), dtype=bool)
+    fixed[path] = True
+    pieces = []
+    for side in range(6):
+        patch = surface.cut.faces[surface.face_labels == side]
+        bridges = _bridges(patch, fixed)
+        patch = split_edges(patch, bridges, len(vertices))
+        vertices, places = (np.concatenate([x, x[bridges].mean(axis=1)]) for x in (vertices, places))
+        fixed = np.concatenate([fixed, np.zeros(len(bridges), dtype=bool)])
+        _spread(places, vertices, patch, fixed, side)
+        pieces.append(patch)
+    return Layout(vertices, np.concatenate(pieces), places)
+
+
+def _bridges(patch: IntArray, fixed: NDArray[np.bool_]) -> IntArray:
+    """Inner edges (k, 2) between two vertices of the rim: a triangle of such edges could end up flat."""
+    edges, count = edge_table(patch)
+    return edges[(count == 2) & fixed[edges].all(axis=1)]
+
+
+def _spread(places: Array, vertices: Array, patch: IntArray, fixed: NDArray[np.bool_], side: int) -> None:
+    """Put the inner vertices of a patch (m, 3) on their cube face, in place."""
+    axis = side // 2
+    plane = [(axis + 1) % 3, (axis + 2) % 3][:: 1 if side % 2 else -1]  # counter-clockwise seen from outside
+    used, triangles = np.unique(patch, return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    flat = places[used][:, plane]
+    inner = ~fixed[used]
+    weights = _combinations(flat, vertices[used], triangles)
+    matrix = eye_array(int(inner.sum()), format="csc") - weights[inner][:, inner].tocsc()
+    flat[inner] = splu(matrix).solve(weights[inner][:, ~inner] @ flat[~inner])
+    places[used[inner][:, None], plane] = flat[inner]
+    places[used[inner], axis] = side % 2
+
+
+def _combinations(flat: Array, vertices: Array, triangles: IntArray) -> csr_array:
+    """Weights (n, n) of the neighbours in each vertex's place, rows of sum 1: mean value coordinates.
+
+    Of the places (n, 2) where the triangles around a vertex lie side by side, else of the surface's triangles.
+    """
+    turned = np.zeros(len(flat), dtype=bool)
+    ab, ac = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
+    turned[triangles[ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] <= _FLAT]] = True
+    rows, columns, values = [], [], []
+    for k in range(3):
+        here, *ends = (triangles[:, (k + shift) % 3] for shift in range(3))
+        of_places, of_surface = (_half_tangents(points, here, *ends) for points in (flat, vertices))
+        for end, by_places, by_surface in zip(ends, of_places, of_surface, strict=True):
+            rows.append(here)
+            columns.append(end)
+            values.append(np.where(turned[here], by_surface, by_places))
+    indices = (np.concatenate(rows), np.concatenate(columns))
+    matrix = csr_array(coo_array((np.concatenate(values), indices), shape=(len(flat),) * 2))
+    return csr_array(matrix.multiply(1.0 / matrix.sum(axis=1)[:, None]))
+
+
+def _half_tangents(points: Array, i: IntArray, j: IntArray, k: IntArray) -> tuple[Array, Array]:
+    """tan(angle / 2) at corner i over the lengths of i-j and i-k."""
+    to_j, to_k = points[j] - points[i], points[k] - points[i]
+    length_j, length_k = (np.maximum(np.linalg.norm(d, axis=1), _TINY) for d in (to_j, to_k))
+    cosine = (to_j * to_k).sum(axis=1) / (length_j * length_k)
+    tangent = np.sqrt(np.maximum(1.0 - cosine, _TINY) / np.maximum(1.0 + cosine, _TINY))
+    return tangent / length_j, tangent / length_k

@@ -1,0 +1,58 @@
+"""First spline from the trained network: least squares on pairs (G(x), x), slightly smoothed (section 4.3.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.sparse import csr_array
+from torch import Tensor
+
+from ..arrays import Array
+from ..spline.bspline import basis_derivatives
+from .cg import conjugate_gradients
+from .tensor_product import BendingOperator, FastDiagonalization, grams, to_torch
+
+
+def fit_pairs(
+    parameters: Array,
+    points: Array,
+    weights: Array,
+    knots: tuple[Array, Array, Array],
+    degree: int,
+    *,
+    fairness: float,
+    device: torch.device,
+) -> Tensor:
+    """Control points (3, n_u, n_v, n_w) that minimise sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
+
+    parameters (m, 3) in the unit cube, points (m, 3), weights (m,) that sum to 1: the discrete form of the paper's
+    least squares on G(F(x)) = x. Where no sample lies, the smoothing term alone decides.
+    """
+    rows = _collocation_3d(parameters, knots, degree)
+    scaled = csr_array(rows * weights[:, None])
+    matrix, transposed = (to_torch(m, device) for m in (rows, csr_array(scaled.T)))
+    mass, slope, curve = grams(knots, degree, device)
+    smooth = BendingOperator(mass, slope, curve, fairness)
+    precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
+    shape = (3, *(len(k) - degree - 1 for k in knots))
+
+    def operator(x: Tensor) -> Tensor:
+        return (transposed @ (matrix @ x.reshape(3, -1).T)).T.reshape(shape) + smooth(x)
+
+    right = (transposed @ torch.as_tensor(points, dtype=torch.float64, device=device)).T.reshape(shape)
+    control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
+    return control.contiguous()  # components first also in memory, as a checkpoint gives them back
+
+
+def _collocation_3d(parameters: Array, knots: tuple[Array, Array, Array], degree: int) -> csr_array:
+    """Rows of tensor-product basis values (m, n_u n_v n_w)."""
+    tables = [basis_derivatives(k, degree, parameters[:, d]) for d, k in enumerate(knots)]
+    sizes = [len(k) - degree - 1 for k in knots]
+    window = np.arange(degree + 1)
+    i, j, k = (first[:, None] + window for first, _ in tables)
+    columns = (i[:, :, None, None] * sizes[1] + j[:, None, :, None]) * sizes[2] + k[:, None, None, :]
+    u, v, w = (values[0] for _, values in tables)
+    values = u[:, :, None, None] * v[:, None, :, None] * w[:, None, None, :]
+    width = (degree + 1) ** 3
+    starts = np.arange(0, len(parameters) * width + 1, width)
+    return csr_array((values.ravel(), columns.ravel(), starts), shape=(len(parameters), int(np.prod(sizes))))

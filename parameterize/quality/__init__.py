@@ -1,0 +1,1 @@
+"""Measures how much a spline volume distorts and how closely it follows its surface."""

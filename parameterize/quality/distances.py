@@ -1,0 +1,144 @@
+"""Distances between a mesh and the boundary of a trivariate spline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array
+from ..spline.volume import BSplineVolume
+from ..surface.geometry import doubled_areas
+
+SAMPLES = 160  # a direction and cube face
+
+_NEWTON_STEPS = 5
+_CONVERGED = 1e-3  # a step that gains less than this share of the distance is the last
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Root mean square, mean and largest of some distances, one unit."""
+
+    rms: float
+    mean: float
+    max: float
+
+    @classmethod
+    def of(cls, values: Array) -> Distances:
+        """From distances (m,); each counts the same. Raises ValueError when there are none."""
+        if values.size == 0:
+            raise ValueError("there are no distances to summarise: the list of points is empty")
+        return cls(float(np.sqrt(np.mean(values**2))), float(np.mean(values)), float(np.max(values)))
+
+    def scaled(self, scale: float) -> Distances:
+        """The same distances in another unit of length."""
+        return Distances(scale * self.rms, scale * self.mean, scale * self.max)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledBoundary:
+    """The spline's boundary sampled on a regular grid a cube face, and the triangles between the samples."""
+
+    parameters: Array  # (6 * samples**2, 3), face after face in the order of FACE_NAMES
+    points: Array  # (6 * samples**2, 3)
+    triangles: NDArray[np.int64]  # (12 * (samples - 1)**2, 3), either orientation
+
+    @classmethod
+    def of(cls, volume: BSplineVolume, samples: int = SAMPLES) -> SampledBoundary:
+        """Sample all six faces, edges included."""
+        if samples < 2:
+            raise ValueError(f"samples must be at least 2, got {samples}")
+        row = np.linspace(0.0, 1.0, samples)
+        number = np.arange(samples**2).reshape(samples, samples)
+        a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+        face = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+        parameters, points = [], []
+        for axis in range(3):
+            for side in (0.0, 1.0):
+                u, v, w = (np.array([side]) if k == axis else row for k in range(3))
+                parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
+                points.append(volume.grid(u, v, w).reshape(-1, 3))
+        triangles = np.concatenate([face + k * samples**2 for k in range(6)])
+        return cls(np.concatenate(parameters), np.concatenate(points), triangles.astype(np.int64))
+
+
+def to_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
+    """Distance of each point (m, 3) to the nearest point of a triangle mesh: (m,)."""
+    return _closest(points, vertices, faces)[0]
+
+
+def nearest_on_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, Array]:
+    """The nearest point of a triangle mesh to each point (m, 3), and the normal of its triangle, of length 1."""
+    _, triangle, weights = _closest(points, vertices, faces)
+    corners = vertices[faces[triangle]]  # (m, 3, 3)
+    cross = doubled_areas(vertices, faces[triangle])
+    normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    return np.einsum("mk,mka->ma", weights, corners), normals
+
+
+def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> Array:
+    """Distance of each point (m, 3) to the boundary of the spline: (m,)."""
+    return foot_points(points, volume, boundary)[2]
+
+
+def foot_points(
+    points: Array, volume: BSplineVolume, boundary: SampledBoundary
+) -> tuple[Array, NDArray[np.int64], Array]:
+    """Closest points of the spline's boundary to points (m, 3): parameters (m, 3), cube faces (m,), distances (m,).
+
+    The nearest point of the sampled triangles gives a cube face and parameters on it; Gauss-Newton steps in that face
+    then lower the distance to the spline itself. The distances are to points of the spline's boundary, so never less
+    than the true ones.
+    """
+    _, triangle, weights = _closest(points, boundary.points, boundary.triangles)
+    corners = boundary.triangles[triangle]  # (m, 3)
+    where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
+    cube_face = 6 * triangle // len(boundary.triangles)
+    axis = cube_face // 2  # the direction that is constant on the face
+    where[np.arange(len(where)), axis] = boundary.parameters[corners[:, 0]][np.arange(len(where)), axis]
+    best: Array = np.linalg.norm(volume(where) - points, axis=1)
+    active = np.arange(len(points))
+    for _ in range(_NEWTON_STEPS):
+        step = _foot_step(volume, where[active], points[active], axis[active])
+        trial = np.clip(where[active] + step, 0.0, 1.0)
+        distance = np.linalg.norm(volume(trial) - points[active], axis=1)
+        gain = best[active] - distance
+        closer = gain > 0.0
+        where[active[closer]], best[active[closer]] = trial[closer], distance[closer]
+        active = active[gain > _CONVERGED * best[active]]
+        if not active.size:
+            break
+    return where, cube_face, best
+
+
+def _foot_step(volume: BSplineVolume, where: Array, points: Array, axis: NDArray[np.int64]) -> Array:
+    """Gauss-Newton step towards the nearest point on each point's cube face: (m, 3), zero along `axis`."""
+    rows = np.arange(len(where))
+    tangents = volume.jacobian(where)  # (m, 3, 3)
+    tangents[rows, :, axis] = 0.0
+    normal = np.swapaxes(tangents, 1, 2) @ tangents
+    size = np.trace(normal, axis1=1, axis2=2)
+    normal[rows, axis, axis] = 1.0
+    damping = np.maximum(1e-12 * size, np.finfo(np.float64).tiny)  # tangents may be parallel at an edge of the cube
+    normal += damping[:, None, None] * np.eye(3)
+    slope = np.einsum("mab,ma->mb", tangents, points - volume(where))
+    return np.asarray(np.linalg.solve(normal, slope[..., None])[..., 0])
+
+
+def _closest(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64], Array]:
+    """For each point (m, 3) the distance (m,) to the mesh, the nearest triangle (m,), barycentric weights (m, 3)."""
+    target = np.ascontiguousarray(vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(faces, dtype=np.int64)
+    squared, index, foot = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(points, dtype=np.float64), target, triangles
+    )
+    nearest = np.asarray(index, dtype=np.int64).ravel()
+    a, b, c = np.moveaxis(target[triangles[nearest]], 1, 0)  # (m, 3) each
+    edges = np.stack([b - a, c - a], axis=-1)  # (m, 3, 2)
+    shares = np.einsum("mkx,mx->mk", np.linalg.pinv(edges), foot - a)  # least squares: a sliver does no harm
+    weights = np.clip(np.column_stack([1.0 - shares.sum(axis=1), shares]), 0.0, 1.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return np.sqrt(np.asarray(squared).ravel()), nearest, weights

@@ -1,0 +1,275 @@
+"""QualityReport: how much a trivariate spline distorts, and how well it fits the mesh it came from."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Any, Generic, TypeVar
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, in_brackets
+from ..certificate.boundary import BoundaryCheck, check_boundary
+from ..certificate.jacobian import Certificate
+from ..cube.boundary_map import BoundaryMap
+from ..spline.bspline import gauss_points
+from ..spline.volume import BSplineVolume
+from .distances import SAMPLES, Distances, SampledBoundary, to_boundary, to_mesh
+
+_SLAB_POINTS = 100_000
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """ARAP distortion: mean is the integral over the cube, max the largest at the quadrature points."""
+
+    mean: float
+    max: float
+
+
+Measure = TypeVar("Measure", Distortion, Distances)
+
+
+@dataclass(frozen=True)
+class BothScales(Generic[Measure]):  # noqa: UP046 - the new syntax needs Python 3.12
+    """A measure twice: with the model brought to volume 1, and in the user's units."""
+
+    unit_volume: Measure
+    as_given: Measure
+
+
+@dataclass(frozen=True)
+class QualityReport:
+    """The `parameterization` section of report.json.
+
+    control_points, degrees: per direction.
+    certificate: whether det J > 0 on the whole cube, its lower bound, the witness of a fold.
+    boundary_check: whether the six boundary surfaces do not meet but at their common edges, and where they do.
+    arap: sum of (sigma_i - 1)^2, the smallest sigma signed with det J, over `arap_points` Gauss points.
+    boundary: ||F(v_p) - v|| over the mesh's own `mesh_vertices` vertices; cuts and subdivisions do not count.
+    mesh_to_spline: from each of `mesh_vertices` vertices to the spline's boundary (foot point refined on the spline).
+    spline_to_mesh: from samples_per_face x samples_per_face points a cube face to the mesh's triangles.
+    """
+
+    control_points: tuple[int, int, int]
+    degrees: tuple[int, int, int]
+    certificate: Certificate
+    arap: BothScales[Distortion]
+    arap_points: int
+    boundary: BothScales[Distances]
+    mesh_to_spline: BothScales[Distances]
+    mesh_vertices: int
+    spline_to_mesh: BothScales[Distances]
+    boundary_check: BoundaryCheck
+    samples_per_face: int = SAMPLES
+
+    def as_dict(self) -> dict[str, Any]:
+        """The section in plain Python types, ready for JSON; a bound that is not finite is None."""
+        bound = self.certificate.lower_bound
+        return {
+            "control_points": list(self.control_points),
+            "degrees": list(self.degrees),
+            "bijective": self.certificate.verdict,
+            **self.boundary_check.as_dict(),
+            "det_lower_bound": bound if isfinite(bound) else None,
+            "witness": None if self.certificate.witness is None else list(self.certificate.witness),
+            "arap": asdict(self.arap),
+            "boundary": asdict(self.boundary),
+            "surface_distance": {
+                "mesh_to_spline": asdict(self.mesh_to_spline),
+                "spline_to_mesh": asdict(self.spline_to_mesh),
+            },
+            "points": {
+                "arap": self.arap_points,
+                "boundary": self.mesh_vertices,
+                "mesh_to_spline": self.mesh_vertices,
+                "spline_to_mesh": 6 * self.samples_per_face**2,
+            },
+        }
+
+    def __str__(self) -> str:
+        certificate = self.certificate
+        verdict = f"{certificate.verdict}, det J >= {certificate.lower_bound:.3g} of its mean"
+        if certificate.witness is not None:
+            verdict = f"folded at {in_brackets(certificate.witness)}"
+        if self.boundary_check.meeting is not None:
+            verdict += f"; the boundary {self.boundary_check.meeting}"
+        size = " x ".join(str(n) for n in self.control_points)
+        lines = [
+            f"{size} control points of degree {', '.join(str(p) for p in self.degrees)}: {verdict}",
+            f"{'':16}  {'at volume 1':<32}  as given",
+            _line("ARAP mean, max", self.arap),
+            f"{'':16}  {'rms, mean, max':<32}  rms, mean, max",
+            _line("boundary", self.boundary),
+            _line("mesh to spline", self.mesh_to_spline),
+            _line("spline to mesh", self.spline_to_mesh),
+        ]
+        return "\n".join(lines)
+
+
+def _line(name: str, measure: BothScales[Any]) -> str:
+    unit, given = (", ".join(f"{v:.4g}" for v in asdict(m).values()) for m in (measure.unit_volume, measure.as_given))
+    return f"{name:16}  {unit:<32}  {given}"
+
+
+def measure(
+    volume: BSplineVolume,
+    surface_vertices: ArrayLike,
+    surface_faces: ArrayLike,
+    scale: float,
+    boundary: BoundaryMap,
+    certificate: Certificate,
+) -> QualityReport:
+    """Measure a volume against the mesh it came from.
+
+    volume, surface_vertices (n, 3), surface_faces (m, 3) and boundary: all in the user's units. The boundary map starts
+    with the surface's vertices, in their order.
+    scale: the factor that brings the model to volume 1 (Surface.scale).
+    Raises ValueError for a scale that is not positive or a boundary map of fewer vertices.
+    """
+    if not (isfinite(scale) and scale > 0.0):
+        raise ValueError(f"scale must be positive, got {scale}; Surface.scale is the one meant")
+    vertices = np.asarray(surface_vertices, dtype=np.float64)
+    faces = np.asarray(surface_faces, dtype=np.int64)
+    n = len(vertices)
+    if len(boundary.vertices) < n:
+        raise ValueError(f"boundary must start with the surface's {n} vertices, it has {len(boundary.vertices)}")
+    sampled = SampledBoundary.of(volume)
+    _, sigma, weights = _singular_grid(volume, n_gauss=3)
+    return QualityReport(
+        control_points=volume.shape,
+        degrees=volume.degrees,
+        certificate=certificate,
+        arap=BothScales(_distortion(scale * sigma, weights), _distortion(sigma, weights)),
+        arap_points=weights.size,
+        boundary=_both(np.linalg.norm(volume(boundary.parameters[:n]) - boundary.vertices[:n], axis=1), scale),
+        mesh_to_spline=_both(to_boundary(vertices, volume, sampled), scale),
+        mesh_vertices=len(vertices),
+        spline_to_mesh=_both(to_mesh(sampled.points, vertices, faces), scale),
+        boundary_check=check_boundary(volume),
+    )
+
+
+def _both(distances: Array, scale: float) -> BothScales[Distances]:
+    as_given = Distances.of(distances)
+    return BothScales(as_given.scaled(scale), as_given)
+
+
+def _distortion(sigma: Array, weights: Array) -> Distortion:
+    values = _arap_of(sigma)
+    return Distortion(float(np.sum(weights * values)), float(values.max()))
+
+
+def arap_grid(
+    volume: BSplineVolume, n_gauss: int = 3, scale: float = 1.0
+) -> tuple[tuple[Array, Array, Array], Array, Array]:
+    """ARAP distortion of scale * F at `n_gauss` Gauss points a direction and span.
+
+    Returns the points per axis, the values (m_u, m_v, m_w), and the weights of the integral over the cube, same shape.
+    """
+    points, sigma, weights = _singular_grid(volume, n_gauss)
+    return points, _arap_of(scale * sigma), weights
+
+
+def _singular_grid(volume: BSplineVolume, n_gauss: int) -> tuple[tuple[Array, Array, Array], Array, Array]:
+    """Gauss points per axis, signed singular values (m_u, m_v, m_w, 3), weights (m_u, m_v, m_w)."""
+    rules = [gauss_points(k, n_gauss) for k in volume.knots]
+    u, v, w = (points.ravel() for points, _ in rules)
+    sigma = np.empty((len(u), len(v), len(w), 3))
+    step = max(1, _SLAB_POINTS // (len(v) * len(w)))
+    for start in range(0, len(u), step):  # slabs bound the memory
+        slab = slice(start, start + step)
+        sigma[slab] = signed_singular_values(volume.grid_jacobian(u[slab], v, w))
+    weights = np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
+    return (u, v, w), sigma, weights
+
+
+def arap(jacobians: ArrayLike) -> Array:
+    """As-rigid-as-possible distortion: the sum of (sigma_i - 1)^2, sigma_3 signed with det: (..., 3, 3) -> (...).
+
+    (Paper, section 3.2, which leaves the sign open: with it the mirror image of a rigid map costs 4, not 0.)
+    """
+    return _arap_of(signed_singular_values(jacobians))
+
+
+def _arap_of(sigma: Array) -> Array:
+    distortion: Array = np.sum((sigma - 1.0) ** 2, axis=-1)
+    return distortion
+
+
+def scaled_jacobian(jacobians: ArrayLike) -> Array:
+    """Det J over the product of its columns' lengths, from -1 to 1; 0 where a column vanishes: (..., 3, 3) -> (...)."""
+    matrices = np.asarray(jacobians, dtype=np.float64)
+    lengths = np.linalg.norm(matrices, axis=-2, keepdims=True)
+    units = np.divide(matrices, lengths, out=np.zeros_like(matrices), where=lengths > 0.0)
+    quality: Array = np.linalg.det(units)
+    return quality
+
+
+def signed_singular_values(jacobians: ArrayLike) -> Array:
+    """Singular values, largest first, the smallest with the sign of det: (..., 3, 3) -> (..., 3).
+
+    Raises ValueError for another shape or entries that are not finite.
+    """
+    matrices = np.asarray(jacobians, dtype=np.float64)
+    if matrices.shape[-2:] != (3, 3):
+        raise ValueError(f"jacobians must have shape (..., 3, 3), got {matrices.shape}")
+    if not np.all(np.isfinite(matrices)):
+        raise ValueError("jacobians must be finite")
+    values = np.empty(matrices.shape[:-1])
+    _one_sided_jacobi(np.ascontiguousarray(matrices).reshape(-1, 3, 3), values.reshape(-1, 3))
+    return values
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _one_sided_jacobi(matrices: Array, out: Array) -> None:
+    """Signed singular values of matrices (m, 3, 3) into out (m, 3).
+
+    Hestenes' method: columns are rotated in pairs until orthogonal; their lengths are the singular values. Accurate for
+    small ones too, unlike the eigenvalues of J^T J (Demmel, Veselic, SIAM J. Matrix Anal. Appl. 13, 1992).
+    """
+    columns = np.empty((3, 3))
+    for m in range(matrices.shape[0]):
+        size = 0.0
+        for entry in matrices[m].flat:
+            size = max(size, abs(entry))
+        if size == 0.0:
+            out[m] = 0.0
+            continue
+        for p in range(3):
+            for i in range(3):
+                columns[p, i] = matrices[m, i, p] / size
+        a, b, c = columns
+        for _ in range(30):  # sweeps; three to six do
+            if max(_make_orthogonal(a, b), _make_orthogonal(a, c), _make_orthogonal(b, c)) < 1e-15:
+                break
+        first, second, third = np.sqrt(_dot(a, a)), np.sqrt(_dot(b, b)), np.sqrt(_dot(c, c))
+        smallest = min(first, second, third)
+        out[m, 0] = size * max(first, second, third)
+        out[m, 1] = size * max(min(first, second), min(max(first, second), third))
+        det = (
+            a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+        )
+        out[m, 2] = -size * smallest if det < 0.0 else size * smallest
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _make_orthogonal(a: Array, b: Array) -> float:
+    """Rotate two columns (3,) into orthogonal ones; return the cosine of the angle they had."""
+    alpha, beta, gamma = _dot(a, a), _dot(b, b), _dot(a, b)
+    if gamma == 0.0:
+        return 0.0
+    zeta = (beta - alpha) / (2.0 * gamma)
+    tangent = np.copysign(1.0, zeta) / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
+    cosine = 1.0 / np.sqrt(1.0 + tangent * tangent)
+    sine = cosine * tangent
+    for i in range(3):
+        a[i], b[i] = cosine * a[i] - sine * b[i], sine * a[i] + cosine * b[i]
+    return float(abs(gamma) / np.sqrt(alpha) / np.sqrt(beta))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _dot(a: Array, b: Array) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

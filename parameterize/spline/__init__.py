@@ -1,0 +1,1 @@
+"""Evaluates and refines B-splines of one and of three parameters."""

@@ -1,0 +1,236 @@
+"""B-splines: knot vectors, basis values and derivatives, collocation, knot insertion, tensor-product evaluation.
+
+A knot vector is *open*: its first and last `degree + 1` knots coincide. The basis has `len(knots) - degree - 1`
+functions. Recurrences are those of Piegl and Tiller, *The NURBS Book* (2nd ed.), chapter 2.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array, identity
+
+from ..arrays import Array
+
+
+def open_uniform_knots(n_control_points: int, degree: int) -> Array:
+    """Open knot vector on [0, 1] with equal spans (the paper's "quasi-uniform" knots, section 3.1).
+
+    Returns an array of shape (n_control_points + degree + 1,).
+    Raises ValueError when there are too few control points for the degree.
+    """
+    if degree < 1:
+        raise ValueError(f"degree must be at least 1, got {degree}")
+    if n_control_points <= degree:
+        raise ValueError(f"degree {degree} needs at least {degree + 1} control points, got {n_control_points}")
+    breaks = np.linspace(0.0, 1.0, n_control_points - degree + 1)
+    return np.concatenate([np.zeros(degree), breaks, np.ones(degree)])
+
+
+def real_array(values: ArrayLike, name: str) -> Array:
+    """`values` in double precision; raises ValueError where they are not real numbers."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must be real numbers, got {array.dtype}")
+    return array.astype(np.float64, copy=False)
+
+
+def check_knots(knots: ArrayLike, degree: int) -> Array:
+    """Return `knots` as a float array; raise ValueError where it is not an open, non-decreasing knot vector."""
+    values = real_array(knots, "knots")
+    if degree < 1:
+        raise ValueError(f"degree must be at least 1, got {degree}")
+    if values.ndim != 1 or values.size < 2 * (degree + 1):
+        raise ValueError(f"a knot vector of degree {degree} needs at least {2 * (degree + 1)} knots in one row")
+    if not np.all(np.isfinite(values)) or np.any(np.diff(values) < 0.0):
+        raise ValueError("knots must be finite and non-decreasing")
+    if values[0] != values[degree] or values[-1] != values[-degree - 1] or values[0] == values[-1]:
+        raise ValueError(f"the knot vector is not open: its first and last {degree + 1} knots must coincide")
+    inner = values[degree + 1 : -degree - 1]
+    if inner.size and (inner[0] == values[0] or inner[-1] == values[-1]):
+        raise ValueError(f"the first and last knot must be repeated {degree + 1} times, not more")
+    if inner.size and np.unique(inner, return_counts=True)[1].max() > degree:
+        raise ValueError(f"an inner knot is repeated more than {degree} times: the spline would be discontinuous")
+    return values
+
+
+def breakpoints(knots: Array) -> Array:
+    """Distinct knots, shape (n_spans + 1,): the boundaries of the spans."""
+    return np.unique(knots)
+
+
+def greville(knots: Array, degree: int) -> Array:
+    """Greville points, shape (n,): with them as control points the spline is the identity."""
+    n = len(knots) - degree - 1
+    return np.array([knots[i + 1 : i + degree + 1].mean() for i in range(n)])
+
+
+def find_spans(knots: Array, degree: int, x: ArrayLike) -> NDArray[np.int64]:
+    """Index i with knots[i] <= x < knots[i + 1] for each x (the last span is closed), same shape as `x`."""
+    n = len(knots) - degree - 1
+    spans = np.searchsorted(knots, np.asarray(x, dtype=np.float64), side="right") - 1
+    last = int(np.searchsorted(knots, knots[n], side="left")) - 1
+    return np.clip(spans, degree, last)
+
+
+def basis_derivatives(knots: Array, degree: int, x: ArrayLike, derivatives: int = 0) -> tuple[NDArray[np.int64], Array]:
+    """Values and derivatives of the `degree + 1` basis functions that are nonzero at each point.
+
+    Returns `first` (m,), the index of the first such function, and `values` (derivatives + 1, m, degree + 1).
+    Points outside the knot range continue the polynomial of the nearest span.
+    (The NURBS Book, algorithms A2.2 and A2.3; derivatives by differencing lower-degree values, eq. 2.7.)
+    """
+    points = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    spans = find_spans(knots, degree, points)
+    lower = _nonzero_by_degree(knots, degree, points, spans)
+    values = np.zeros((derivatives + 1, points.size, degree + 1))
+    values[0] = lower[degree]
+    for k in range(1, min(derivatives, degree) + 1):
+        derived = lower[degree - k]
+        for q in range(degree - k + 1, degree + 1):
+            derived = _differentiate(knots, q, spans, derived)
+        values[k] = derived
+    return spans - degree, values
+
+
+def _nonzero_by_degree(knots: Array, degree: int, x: Array, spans: NDArray[np.int64]) -> list[Array]:
+    """Cox-de Boor: entry q holds the (m, q + 1) nonzero values of degree q."""
+    table = [np.ones((x.size, 1))]
+    for q in range(1, degree + 1):
+        values = np.zeros((x.size, q + 1))
+        for r in range(q):
+            right, left = knots[spans + r + 1], knots[spans + r + 1 - q]
+            share = table[q - 1][:, r] / (right - left)
+            values[:, r] += (right - x) * share
+            values[:, r + 1] += (x - left) * share
+        table.append(values)
+    return table
+
+
+def _differentiate(knots: Array, q: int, spans: NDArray[np.int64], lower: Array) -> Array:
+    """Degree q derivatives (m, q + 1) from degree q - 1 values or derivatives (m, q)."""
+    result = np.zeros((lower.shape[0], q + 1))
+    for r in range(q):
+        slope = q * lower[:, r] / (knots[spans + r + 1] - knots[spans + r + 1 - q])
+        result[:, r] -= slope
+        result[:, r + 1] += slope
+    return result
+
+
+def collocation(knots: Array, degree: int, x: ArrayLike, derivative: int = 0) -> csr_array:
+    """Sparse matrix (m, n) with the given derivative of every basis function at every point."""
+    first, values = basis_derivatives(knots, degree, x, derivative)
+    m, width = values.shape[1:]
+    columns = first[:, None] + np.arange(width)
+    starts = np.arange(0, m * width + 1, width)
+    return csr_array((values[derivative].ravel(), columns.ravel(), starts), shape=(m, len(knots) - degree - 1))
+
+
+def gauss_points(knots: Array, n_points: int) -> tuple[Array, Array]:
+    """Gauss-Legendre points and weights on every span, each of shape (n_spans, n_points)."""
+    nodes, weights = np.polynomial.legendre.leggauss(n_points)
+    breaks = breakpoints(knots)
+    half = np.diff(breaks)[:, None] / 2.0
+    middle = (breaks[:-1] + breaks[1:])[:, None] / 2.0
+    return middle + half * nodes, half * weights
+
+
+def insert_knots(knots: Array, degree: int, new: ArrayLike) -> tuple[Array, csr_array]:
+    """Knot insertion: the finer knot vector and the matrix (n_new, n) that maps control points onto it.
+
+    The spline itself does not change. One knot at a time (Boehm; The NURBS Book, eq. 5.15).
+    Raises ValueError for a knot outside the open range.
+    """
+    current, matrix = knots, csr_array(identity(len(knots) - degree - 1))
+    for t in np.sort(np.atleast_1d(np.asarray(new, dtype=np.float64))):
+        if not knots[0] < t < knots[-1]:
+            raise ValueError(f"new knot {t} lies outside the open interval ({knots[0]}, {knots[-1]})")
+        k = int(find_spans(current, degree, t))
+        n = len(current) - degree - 1
+        i = np.arange(n + 1)
+        inside = (i > k - degree) & (i <= k)
+        alpha = np.where(i <= k - degree, 1.0, 0.0)
+        alpha[inside] = (t - current[i[inside]]) / (current[i[inside] + degree] - current[i[inside]])
+        step = csr_array(
+            (np.concatenate([alpha[:n], 1.0 - alpha[1:]]), (np.concatenate([i[:n], i[1:]]), np.tile(np.arange(n), 2))),
+            shape=(n + 1, n),
+        )
+        matrix = csr_array(step @ matrix)
+        current = np.insert(current, k + 1, t)
+    matrix.eliminate_zeros()
+    return current, matrix
+
+
+def insertion_into(knots: Array, degree: int, finer: Array) -> csr_array:
+    """The matrix (n_finer, n) of inserting what a finer knot vector has more.
+
+    Raises ValueError where that lacks one of the knots, or its ends differ.
+    """
+    own, wanted = Counter(knots.tolist()), Counter(finer.tolist())
+    if own - wanted:
+        raise ValueError("the finer knot vector lacks a knot of the other")
+    return insert_knots(knots, degree, list((wanted - own).elements()))[1]
+
+
+def divided_spans(knots: Array, parts: int) -> Array:
+    """The ends of the spans and of `parts` equal parts of each, in order."""
+    breaks = breakpoints(knots)
+    return np.interp(np.arange(parts * (len(breaks) - 1) + 1) / parts, np.arange(len(breaks)), breaks)
+
+
+def midpoints(knots: Array) -> Array:
+    """The middle of every span: inserting them halves all spans."""
+    breaks = breakpoints(knots)
+    middles: Array = (breaks[:-1] + breaks[1:]) / 2.0
+    return middles
+
+
+def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
+    """Sparse matrix (m, n) times one axis of length n of `field`; that axis then has length m."""
+    moved = np.moveaxis(field, axis, 0)
+    flat = np.asarray(matrix @ moved.reshape(moved.shape[0], -1))
+    return np.moveaxis(flat.reshape(-1, *moved.shape[1:]), 0, axis)
+
+
+def evaluate_at(
+    degrees: Sequence[int],
+    knots: Sequence[Array],
+    coefficients: Array,
+    points: ArrayLike,
+    derivative: Sequence[int] = (0, 0, 0),
+) -> Array:
+    """A trivariate spline, or one of its partial derivatives, at points (m, 3).
+
+    coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
+    """
+    where = np.atleast_2d(np.asarray(points, dtype=np.float64))
+    if where.ndim != 2 or where.shape[1] != 3:
+        raise ValueError(f"points must have shape (m, 3), got {where.shape}")
+    windows, values = [], []
+    for a in range(3):
+        first, table = basis_derivatives(knots[a], degrees[a], where[:, a], derivative[a])
+        windows.append(first[:, None] + np.arange(degrees[a] + 1))
+        values.append(table[derivative[a]])
+    result = np.zeros((*coefficients.shape[3:], len(where)))  # components first, so that weights (m,) broadcast
+    for i in range(degrees[0] + 1):  # one row of the support at a time: memory stays linear in m
+        for j in range(degrees[1] + 1):
+            net = coefficients[windows[0][:, i, None], windows[1][:, j, None], windows[2]]  # (m, degree + 1, ...)
+            result += values[0][:, i] * values[1][:, j] * np.einsum("mk,mk...->...m", values[2], net)
+    return np.moveaxis(result, -1, 0)
+
+
+def evaluate_grid(
+    degrees: Sequence[int],
+    knots: Sequence[Array],
+    coefficients: Array,
+    points: Sequence[ArrayLike],
+    derivative: Sequence[int] = (0, 0, 0),
+) -> Array:
+    """The same on the tensor grid of three point rows: (len(u), len(v), len(w)) or (len(u), len(v), len(w), c)."""
+    field = coefficients
+    for a in sorted(range(3), key=lambda axis: np.size(points[axis])):  # the shortest row first: least work
+        field = apply_along(collocation(knots[a], degrees[a], points[a], derivative[a]), field, a)
+    return field

@@ -1,0 +1,1 @@
+"""Reads, checks and repairs the triangle mesh of a closed surface."""

@@ -1,0 +1,35 @@
+"""Fewer triangles for a surface that has too many: only where the user asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import igl
+import numpy as np
+
+from .errors import MeshError
+from .surface import Surface, surface_from_arrays
+
+
+def decimate(surface: Surface, max_faces: int) -> Surface:
+    """The surface with at most `max_faces` triangles; itself where it has no more.
+
+    Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), none that makes triangles intersect. A
+    notice says the counts and the largest distance moved; `sha256` is that of the new arrays.
+    Raises MeshError where so few triangles cannot be reached.
+    """
+    before = len(surface.faces)
+    if before <= max_faces:
+        return surface
+    name = surface.source or surface.name
+    if max_faces < 4:
+        raise MeshError(f"{name}: max_faces={max_faces}, a closed surface needs at least 4: raise --max-faces")
+    unit = np.asfortranarray(surface.unit_vertices)
+    vertices, faces, *_ = igl.qslim(unit, surface.faces, max_faces, block_intersections=True)
+    if len(faces) > max_faces:
+        raise MeshError(f"{name}: cannot be decimated below {len(faces)} faces: raise --max-faces")
+    moved = igl.hausdorff(unit, surface.faces, vertices, faces) / surface.scale
+    notice = f"decimated from {before} to {len(faces)} faces: moved by at most {moved:.3g}"
+    smaller = surface_from_arrays(surface.from_unit(vertices), faces, surface.name, max_faces=max_faces)
+    # Notices before this one are about the surface as it came, those after it about the surface as it is now.
+    return replace(smaller, source=surface.source, notices=(*surface.notices, notice, *smaller.notices))

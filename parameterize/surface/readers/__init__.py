@@ -1,0 +1,1 @@
+"""Reads surface files of every supported format into vertices and triangles."""

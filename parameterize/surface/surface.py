@@ -1,0 +1,227 @@
+"""The gate: a closed surface as the method needs it, or a MeshError that says why not."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, IntArray, in_brackets
+from .errors import MeshError
+from .inside import deepest_point
+from .readers.file import LARGEST, check_finite, check_indices, read_mesh
+from .readers.headers import check_face_count
+from .self_intersection import SHOWN, crossing_faces, crossing_places, describe_crossings
+from .topology import check_genus, check_manifold, check_volume, choose_component, slivers
+from .welding import orient, signed_volume, weld_and_drop
+
+__all__ = ["MAX_FACES", "MeshError", "Surface", "load_surface", "surface_from_arrays"]
+
+MAX_FACES = 500_000
+USUAL_SIZES = (1e-6, 1e6)
+GRID = 2.0**-24  # of the box's longest side: less than single precision, in which networks train, tells apart
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A closed surface of genus 0, one component, wound outward, with its placement in the unit cube's space.
+
+    name: the input's stem. vertices: (n, 3), user's units. faces: (m, 3) vertex numbers. source: path as given, "" for
+    arrays. sha256: of the file's bytes, or of the arrays. notices: what was mended or is doubtful, one line each.
+    scale, center: to_unit(x) = scale * (x - center) + 1/2 gives volume 1 and puts the deepest interior point at
+    (1/2, 1/2, 1/2). unit_vertices: the vertices (n, 3) placed so, after rounding them to multiples of GRID: the same
+    surface in another unit or at another place then gives the same numbers, and with them the same map.
+    crossings: (k, 2) pairs of faces that intersect.
+    """
+
+    name: str
+    vertices: Array
+    faces: IntArray
+    source: str
+    sha256: str
+    notices: tuple[str, ...]
+    scale: float
+    center: Array
+    unit_vertices: Array
+    crossings: IntArray
+
+    def to_unit(self, points: ArrayLike) -> Array:
+        """Points (..., 3) in the user's units -> placed."""
+        placed: Array = self.scale * (np.asarray(points, dtype=np.float64) - self.center) + 0.5
+        return placed
+
+    def from_unit(self, points: ArrayLike) -> Array:
+        """Placed points (..., 3) -> the user's units."""
+        restored: Array = (np.asarray(points, dtype=np.float64) - 0.5) / self.scale + self.center
+        return restored
+
+    @property
+    def volume(self) -> float:
+        """Enclosed volume, user's units."""
+        return float(self.scale**-3.0)
+
+    @property
+    def bbox(self) -> tuple[Array, Array]:
+        """Lowest and highest corner of the bounding box, (3,) each, user's units."""
+        return self.vertices.min(axis=0), self.vertices.max(axis=0)
+
+    def summary(self) -> dict[str, Any]:
+        """The section `input` of report.json."""
+        first = self.crossings[:SHOWN]
+        return {
+            "file": self.source or self.name,
+            "sha256": self.sha256,
+            "vertices": len(self.vertices),
+            "faces": len(self.faces),
+            "volume": self.volume,
+            "bbox": [corner.tolist() for corner in self.bbox],
+            "self_intersections": {
+                "pairs": len(self.crossings),
+                "first": [
+                    {"faces": pair, "near": place}
+                    for pair, place in zip(first.tolist(), self._places(first).tolist(), strict=True)
+                ],
+            },
+            "notices": list(self.notices),
+        }
+
+    def refuse_crossings(self) -> None:
+        """Raise MeshError where faces intersect."""
+        if len(self.crossings):
+            found = describe_crossings(self.vertices, self.faces, self.crossings)
+            name = self.source or self.name
+            raise MeshError(f"{name}: {found}: pull the sheets apart there, or check without --strict")
+
+    def _places(self, pairs: IntArray) -> Array:
+        return crossing_places(self.vertices, self.faces, pairs)
+
+
+def load_surface(path: str | Path, *, component: int | None = None, max_faces: int = MAX_FACES) -> Surface:
+    """Read a surface (.obj, .stl, .ply, .off) or the boundary of tetrahedra (.mesh, .msh, .vtu), each also as .gz.
+
+    component: which one to take where the file holds several, 0 the largest. max_faces: refuse more.
+    Raises MeshError (a ValueError) of one line for a file that cannot be read or is no closed surface of genus 0,
+    TypeError for a path that is none.
+    """
+    if not isinstance(path, (str, Path)):
+        raise TypeError(f"path must be a str or Path, got {path!r:.80}; for arrays there is surface_from_arrays")
+    source = str(path)
+    try:
+        raw = read_mesh(Path(path), max_faces)
+        name = Path(path).name.split(".")[0] or Path(path).name
+        surface = _gate(raw.vertices, raw.faces, name, source, raw.sha256, raw.notices, component, max_faces)
+    except MeshError as error:
+        raise MeshError(f"{source}: {error}") from None
+    logger.debug("%s: %d vertices, %d faces", source, len(surface.vertices), len(surface.faces))
+    return surface
+
+
+def surface_from_arrays(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    name: str = "surface",
+    *,
+    component: int | None = None,
+    max_faces: int = MAX_FACES,
+) -> Surface:
+    """Surface from vertices (n, 3) and triangles (m, 3) of vertex numbers; the same checks as load_surface.
+
+    Raises MeshError (a ValueError) naming what is wrong with the arrays or the surface.
+    """
+    try:
+        points = np.array(vertices, dtype=np.float64)
+        triangles = np.asarray(faces)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise MeshError(f"vertices must have shape (n, 3), got {points.shape}")
+        if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
+            raise MeshError(f"faces must be integers of shape (m, 3), got {triangles.dtype} of shape {triangles.shape}")
+        triangles = triangles.astype(np.int64)
+        digest = hashlib.sha256(points.tobytes() + triangles.tobytes()).hexdigest()
+        return _gate(points, triangles, name, "", digest, (), component, max_faces)
+    except MeshError as error:
+        raise MeshError(f"{name}: {error}") from None
+
+
+def _gate(
+    vertices: Array,
+    faces: IntArray,
+    name: str,
+    source: str,
+    sha256: str,
+    notices: tuple[str, ...],
+    component: int | None,
+    max_faces: int,
+) -> Surface:
+    """Check, normalise, weld, choose the component, check the topology, orient, place."""
+    check_face_count(len(faces), max_faces)
+    if len(faces) < 4:
+        raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
+    check_finite(vertices)
+    check_indices(vertices, faces)
+    middle, size, remarks = _box(vertices, faces)
+    kept, triangles, mended = weld_and_drop((vertices - middle) / size, faces)
+    if len(triangles) < 4:
+        raise MeshError(f"{len(triangles)} faces that are not degenerate, at least 4 are needed: export it again")
+
+    def where(vertex: int) -> str:
+        return in_brackets(vertices[kept[vertex]])
+
+    triangles, chosen = choose_component((vertices[kept] - middle) / size, triangles, component)
+    used, compact = np.unique(triangles, return_inverse=True)
+    kept, triangles = kept[used], compact.reshape(-1, 3).astype(np.int64)
+    points = (vertices[kept] - middle) / size
+    check_manifold(triangles, where)
+    triangles, turned = _wind_outward(points, triangles)
+    check_genus(triangles)
+    doubts = slivers(points, triangles, where)
+    crossings = crossing_faces(points, triangles)
+    if len(crossings):
+        doubts.append(describe_crossings(vertices[kept], triangles, crossings))
+    points = GRID * np.rint(points / GRID)
+    deepest, _ = deepest_point(points, triangles)
+    unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
+    return Surface(
+        name=name,
+        vertices=vertices[kept],
+        faces=triangles,
+        source=source,
+        sha256=sha256,
+        notices=(*notices, *remarks, *mended, *chosen, *turned, *doubts),
+        scale=unit_scale / size,
+        center=deepest * size + middle,
+        unit_vertices=unit_scale * (points - deepest) + 0.5,
+        crossings=crossings,
+    )
+
+
+def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:
+    """Middle (3,) and longest side of the box of the used vertices, and what to say about it."""
+    used = vertices[np.unique(faces)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    size = float((high - low).max())
+    if size < 1.0 / LARGEST:
+        raise MeshError(f"longest side {size:g}: the surface is a single point or far too small; choose a smaller unit")
+    remarks = []
+    if not USUAL_SIZES[0] < size < USUAL_SIZES[1]:
+        remarks.append(f"unusual size, longest side {size:g}: computed at size 1 and scaled back")
+    middle = (low + high) / 2.0
+    if abs(middle).max() > 1e6 * size:
+        remarks.append(f"far from the origin ({abs(middle).max() / size:.1e} times its size): digits are lost")
+    return middle, size, remarks
+
+
+def _wind_outward(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
+    wound = orient(faces)
+    if wound is None:
+        raise MeshError("one-sided surface (no consistent orientation): it bounds no solid")
+    faces, notices = wound
+    check_volume(vertices, faces)
+    if signed_volume(vertices, faces) < 0:
+        return faces[:, ::-1].copy(), [*notices, "inverted orientation flipped: faces now point outward"]
+    return faces, notices

@@ -1,0 +1,121 @@
+"""What the gate refuses (open, non-manifold, several components, genus, no volume) and what it warns of.
+
+Positions in messages are the user's: the caller passes `where`, which turns a vertex number into text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import igl
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ..arrays import Array, IntArray
+from .edges import edge_table
+from .errors import MeshError
+from .welding import components, signed_volume
+
+Where = Callable[[int], str]
+LEAST_VOLUME = 1e-12  # of the cube over the box's longest side
+SLIVER_DEGREES = 0.5
+LISTED = 8
+
+
+def choose_component(vertices: Array, faces: IntArray, component: int | None) -> tuple[IntArray, list[str]]:
+    """Faces of the only component, or of the one asked for (0 the largest), and notices.
+
+    Raises MeshError listing the components, and saying which lies inside the largest.
+    """
+    groups = components(faces)
+    if component is None and len(groups) == 1:
+        return faces, []
+    sizes = ", ".join(f"{i}: {len(group)} faces" for i, group in enumerate(groups[:LISTED]))
+    sizes += f", and {len(groups) - LISTED} more" if len(groups) > LISTED else ""
+    if component is not None:
+        if not 0 <= component < len(groups):
+            raise MeshError(f"no component {component}: counted from 0 there are {len(groups)} ({sizes})")
+        notice = [f"component {component} taken of {len(groups)} ({sizes})"] if len(groups) > 1 else []
+        return faces[groups[component]], notice
+    outer, nested = _inside(vertices, faces, groups)
+    if nested:
+        raise MeshError(
+            f"{len(groups)} nested shells ({sizes}), component {nested[0]} lies inside component {outer}: one cube has "
+            f"no cavity; remove the inner shell, or fill it by choosing --component {outer}"
+        )
+    raise MeshError(f"{len(groups)} components ({sizes}): choose one with --component N, or join them")
+
+
+def _inside(vertices: Array, faces: IntArray, groups: list[IntArray]) -> tuple[int, list[int]]:
+    """Number of the widest component, and of those that lie inside it with every vertex, not only overlap it."""
+    listed = [vertices[np.unique(faces[group])] for group in groups[: LISTED + 1]]
+    outer = int(np.argmax([np.linalg.norm(np.ptp(points, axis=0)) for points in listed]))
+    nested = []
+    for i, points in enumerate(listed):
+        if i != outer:
+            winding = igl.fast_winding_number(vertices, faces[groups[outer]], points)
+            if np.all(np.abs(winding) > 0.5):
+                nested.append(i)
+    return outer, nested
+
+
+def check_manifold(faces: IntArray, where: Where) -> None:
+    """Raise MeshError for an edge with more than two faces, an open boundary, or a vertex where sheets touch."""
+    edges, counts = edge_table(faces)
+    crowded = edges[counts > 2]
+    if len(crowded):
+        raise MeshError(
+            f"{len(crowded)} non-manifold edges (more than two faces), the first at {where(crowded[0, 0])}: "
+            "remove inner or doubled faces there"
+        )
+    border = edges[counts == 1]
+    if len(border):
+        loops = _loops(border)
+        raise MeshError(
+            f"open surface: {loops} boundary {'loop' if loops == 1 else 'loops'} ({len(border)} edges), the first at "
+            f"{where(border[0, 0])}: close the {'hole' if loops == 1 else 'holes'}"
+        )
+    pinched = np.flatnonzero(~igl.is_vertex_manifold(faces))
+    if len(pinched):
+        raise MeshError(
+            f"{len(pinched)} non-manifold vertices (sheets touch in a point), the first at {where(int(pinched[0]))}: "
+            "pull the sheets apart there"
+        )
+
+
+def _loops(border: IntArray) -> int:
+    names, ends = np.unique(border, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(names), len(names)))
+    return int(connected_components(graph, directed=False)[0])
+
+
+def check_genus(faces: IntArray) -> None:
+    """Raise MeshError for a closed, oriented component that is no sphere (Euler: V - E + F = 2 - 2 g)."""
+    genus = (2 - (len(np.unique(faces)) - len(faces) // 2)) // 2
+    if genus:
+        raise MeshError(
+            f"genus {genus} ({genus} {'handle' if genus == 1 else 'handles'}), expected 0: a cube has no handle, so "
+            "one cube cannot be mapped one-to-one onto it; fill the tunnels or cut the model into pieces"
+        )
+
+
+def check_volume(vertices: Array, faces: IntArray) -> None:
+    """Raise MeshError for a surface (box of side 1) that encloses nothing."""
+    if abs(signed_volume(vertices, faces)) < LEAST_VOLUME:
+        raise MeshError("encloses no volume (a flat or doubled sheet): give it thickness")
+
+
+def slivers(vertices: Array, faces: IntArray, where: Where) -> list[str]:
+    """A notice of the triangles with a tiny angle, if any: accepted, but they may spoil the result."""
+    corners = vertices[faces]  # (m, 3, 3)
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    doubled = np.linalg.norm(np.cross(ahead[:, 0], behind[:, 0]), axis=1)  # (m,) twice the area
+    angles = np.degrees(np.arctan2(doubled[:, None], np.sum(ahead * behind, axis=2)))  # (m, 3)
+    thin = np.flatnonzero(angles.min(axis=1) < SLIVER_DEGREES)
+    if not len(thin):
+        return []
+    return [
+        f"{len(thin)} slivers (an angle below {SLIVER_DEGREES} degrees), the first at {where(int(faces[thin[0], 0]))}"
+    ]

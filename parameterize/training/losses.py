@@ -1,0 +1,120 @@
+"""The terms of the training loss, one function a term (paper, section 4.4)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from ..optimization.polar import closest_rotation, cofactor, determinant
+from .samples import OFFSETS, gather
+
+_POSITION = {tuple(int(v) for v in offset): i for i, offset in enumerate(OFFSETS)}
+_UNITS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+
+def _neighbour(mapped: Tensor, *steps: tuple[int, int, int]) -> Tensor:
+    """Mapped stencil point at the sum of the given lattice steps: (r, 3)."""
+    x, y, z = (sum(s) for s in zip(*steps, strict=True))
+    return mapped[:, _POSITION[(x, y, z)]]
+
+
+def _minus(step: tuple[int, int, int]) -> tuple[int, int, int]:
+    return (-step[0], -step[1], -step[2])
+
+
+def stencil_jacobian(mapped: Tensor, cell: float) -> Tensor:
+    """Central differences of G at the stencil centres (r, 19, 3) -> (3, 3, r), second index the space direction."""
+    columns = [(_neighbour(mapped, e) - _neighbour(mapped, _minus(e))).T for e in _UNITS]
+    return torch.stack(columns, dim=1) / (2.0 * cell)
+
+
+def bijectivity(det: Tensor, alpha: float) -> Tensor:
+    """L_bij: mean of (alpha - det)_+^2. The square keeps the gradient continuous where a fold opens."""
+    return (alpha - det).clamp_min(0.0).square().mean()
+
+
+def distortion(jacobian: Tensor, det: Tensor, det_floor: float) -> Tensor:
+    """L_arap: mean of det * sum (1 / sigma - 1)^2, the ARAP energy of the inverse of G (section 4.4.2).
+
+    With A = J^-1 and R its closest rotation this is det * |A - R|^2. Below `det_floor` the determinant in A is
+    held there: the bijectivity term rules over such points, and 1 / det must not blow up.
+    """
+    safe = det.clamp_min(det_floor)
+    inverse = cofactor(jacobian).transpose(0, 1) / safe
+    return (safe * (inverse - closest_rotation(inverse)).square().sum(dim=(0, 1))).mean()
+
+
+def fairness(mapped: Tensor, cell: float) -> Tensor:
+    """L_fair: mean over the stencils of the squared Frobenius norms of the three Hessians of G."""
+    total = mapped.new_zeros(())
+    centre = mapped[:, 0]
+    for a in range(3):
+        ea = _UNITS[a]
+        second = (_neighbour(mapped, ea) - 2.0 * centre + _neighbour(mapped, _minus(ea))) / cell**2
+        total = total + second.square().sum(dim=1).mean()
+        for b in range(a + 1, 3):
+            eb = _UNITS[b]
+            mixed = (
+                _neighbour(mapped, ea, eb)
+                - _neighbour(mapped, ea, _minus(eb))
+                - _neighbour(mapped, _minus(ea), eb)
+                + _neighbour(mapped, _minus(ea), _minus(eb))
+            ) / (4.0 * cell**2)
+            total = total + 2.0 * mixed.square().sum(dim=1).mean()
+    return total
+
+
+def distance(mapped: Tensor, target: Tensor) -> Tensor:
+    """L_dist and L_cor: mean squared distance of points (m, 3)."""
+    return (mapped - target).square().sum(dim=1).mean()
+
+
+def triangle_normals(corners: Tensor) -> Tensor:
+    """Unit normals of triangles (m, 3, 3), last index the coordinate; zero for a triangle without area."""
+    cross = torch.linalg.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return cross / cross.norm(dim=1, keepdim=True).clamp_min(1e-12)
+
+
+def normal_difference(normals: Tensor, target: Tensor, wrong_side: float) -> Tensor:
+    """L_norm: mean squared difference of unit normals, plus `wrong_side` times the mean of (-<n, n_target>)_+."""
+    opposed = (-(normals * target).sum(dim=1)).clamp_min(0.0).mean()
+    return (normals - target).square().sum(dim=1).mean() + wrong_side * opposed
+
+
+def star_shape(corners: Tensor, normals: Tensor) -> Tensor:
+    """L_star: mean of (-<A v, n> / |A v|)_+^2 with A the cube's centre and v a corner of the triangle (Lemma 1)."""
+    arm = corners[:, 0] - 0.5
+    facing = (arm * normals).sum(dim=1) / arm.norm(dim=1).clamp_min(1e-12)
+    return (-facing).clamp_min(0.0).square().mean()
+
+
+def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float = 1e-3) -> Tensor:
+    """L_edge: positions of path points (k, 3) on the cube's edges and, weakly, directions to the next point.
+
+    following: (s, 2) pairs of consecutive path points.
+    """
+    step = gather(mapped, following[:, 1]) - gather(mapped, following[:, 0])
+    aim = target[following[:, 1]] - target[following[:, 0]]
+    direction = step / step.norm(dim=1, keepdim=True).clamp_min(1e-12)
+    aim = aim / aim.norm(dim=1, keepdim=True).clamp_min(1e-12)
+    return distance(mapped, target) + weight * (direction - aim).square().sum(dim=1).mean()
+
+
+def folded(det: Tensor) -> int:
+    """Number of stencils whose Jacobian determinant is not positive."""
+    return int((det <= 0.0).sum())
+
+
+__all__ = [
+    "bijectivity",
+    "determinant",
+    "distance",
+    "distortion",
+    "edge_path",
+    "fairness",
+    "folded",
+    "normal_difference",
+    "star_shape",
+    "stencil_jacobian",
+    "triangle_normals",
+]

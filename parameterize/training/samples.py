@@ -1,0 +1,104 @@
+"""What the losses are evaluated on: interior stencils (section 4.4.2) and surface triangles, both seeded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ..arrays import Array
+from ..surface.geometry import doubled_areas
+
+# The 19 of 3^3 lattice offsets that first and second differences need, centre first.
+OFFSETS = (
+    np.array(
+        sorted(
+            (o for o in np.ndindex(3, 3, 3) if np.count_nonzero(np.array(o) != 1) <= 2),
+            key=lambda o: np.count_nonzero(np.array(o) != 1),
+        )
+    )
+    - 1
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Stencils:
+    """A lattice that covers the domain, and for each stencil centre its 19 lattice points.
+
+    nodes: (n, 3) positions; index: (r, 19) into nodes, ordered as OFFSETS; cell: the lattice spacing h.
+    """
+
+    nodes: Tensor
+    index: Tensor
+    cell: float
+
+    def shifted(self, generator: torch.Generator) -> Tensor:
+        """The nodes moved together by one random vector of [-h/2, h/2]^3."""
+        shift = torch.rand(3, generator=generator, dtype=self.nodes.dtype) - 0.5
+        return self.nodes + (self.cell * shift).to(self.nodes.device)
+
+
+def gather(rows: Tensor, index: Tensor) -> Tensor:
+    """rows[index] for rows (n, k) and any index shape, with a repeatable gradient.
+
+    Plain indexing adds the gradients of repeated rows in the order in which threads happen to come.
+    """
+    return rows.index_select(0, index.flatten()).view(*index.shape, rows.shape[1])
+
+
+def signed_distance(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
+    """Distance to the surface, negative inside: (m, 3) -> (m,)."""
+    kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
+    return np.asarray(igl.signed_distance(points, vertices, faces, sign_type=kind)[0])
+
+
+def lattice(vertices: Array, cell: float, margin: float) -> tuple[Array, NDArray[np.int64]]:
+    """Lattice points (k, 3) that fill the bounding box grown by `margin`, and their integer coordinates."""
+    low = np.floor((vertices.min(0) - margin) / cell).astype(int)
+    high = np.ceil((vertices.max(0) + margin) / cell).astype(int)
+    axes = [np.arange(a, b + 1) for a, b in zip(low, high, strict=True)]
+    index = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return index * cell, index
+
+
+def stencils(
+    vertices: Array, faces: NDArray[np.int64], cell: float, *, device: torch.device, dtype: torch.dtype
+) -> Stencils:
+    """Centres at every lattice point inside the surface or within h/2 of it: about the domain, whatever the shift."""
+    points, index = lattice(vertices, cell, cell / 2.0)
+    centres = index[signed_distance(points, vertices, faces) < cell / 2.0]
+    needed, inverse = np.unique((centres[:, None, :] + OFFSETS).reshape(-1, 3), axis=0, return_inverse=True)
+    return Stencils(
+        torch.as_tensor(needed * cell, dtype=dtype, device=device),
+        torch.as_tensor(inverse.reshape(-1, len(OFFSETS)), device=device),
+        cell,
+    )
+
+
+def interior_points(vertices: Array, faces: NDArray[np.int64], cell: float) -> Array:
+    """Lattice points inside the surface: (k, 3)."""
+    points, _ = lattice(vertices, cell, 0.0)
+    return points[signed_distance(points, vertices, faces) < 0.0]
+
+
+class TriangleSampler:
+    """Draws triangles with probability proportional to area; all of them where `count` covers the mesh."""
+
+    def __init__(self, vertices: Array, faces: NDArray[np.int64], count: int, device: torch.device) -> None:
+        area = np.linalg.norm(doubled_areas(vertices, faces), axis=1)
+        self._cumulative = torch.as_tensor(np.cumsum(area / area.sum()))
+        self._count = min(count, len(faces))
+        self._device = device
+
+    def draw(self, generator: torch.Generator) -> Tensor:
+        """Indices (count,) of triangles: systematic sampling, one random offset along the cumulated area."""
+        if self._count == len(self._cumulative):
+            return torch.arange(self._count, device=self._device)
+        start = torch.rand(1, generator=generator, dtype=torch.float64)
+        ticks = (torch.arange(self._count) + start) / self._count
+        picks = torch.searchsorted(self._cumulative, ticks).clamp(max=len(self._cumulative) - 1)
+        return picks.to(self._device)
