@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from parameterize.surface.surface import MAX_FACES, MeshError
-from solve.expressions import ExpressionError
+from solve.forms.formula import ExpressionError
 
 from . import advice, console, pipeline
 from . import report as reports

@@ -172,8 +172,8 @@ def _section_beside(solution: Path) -> tuple[str, dict[str, Any]] | None:
 
 def _load_solution(path: Path, volume: BSplineVolume, section: tuple[str, dict[str, Any]] | None) -> SplineField:
     """A solution on that volume: every knot of the map is one of its own, and its report's h is that of its mesh."""
+    from solve.discretization.space import TrialSpace, longest_edge
     from solve.field import SplineField
-    from solve.space import TrialSpace, longest_edge
 
     with input_errors():
         field = SplineField.load(path)

@@ -21,7 +21,7 @@ from typing import Literal
 from parameterize.arrays import Array
 from parameterize.progress import Progress
 from parameterize.surface.surface import MeshError
-from solve.expressions import ExpressionError
+from solve.forms.formula import ExpressionError
 
 from . import pipeline
 from .console import LOGGERS

@@ -13,7 +13,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.files import save_arrays
-from solve.frame import UnitFrame
+from solve.forms.frame import UnitFrame
 
 from . import advice
 from . import report as reports

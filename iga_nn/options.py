@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from parameterize.config import Config
     from parameterize.spline.volume import BSplineVolume
     from solve import Elasticity, Poisson
-    from solve.frame import UnitFrame
+    from solve.forms.frame import UnitFrame
 
 _CORNERS_BYTES = 65_536
 _LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
@@ -242,7 +242,7 @@ def check_space(refine: Sequence[int], degree: int | None) -> None:
 
 def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1) -> int:
     """The unknowns of a mesh on a volume of these knots. Raises InputError where these are too many."""
-    from solve.space import trial_space
+    from solve.discretization.space import trial_space
 
     dofs = components * trial_space(volume, refine, degree).dofs
     if dofs > MAX_DOFS:

@@ -16,7 +16,7 @@ import numpy as np
 
 from parameterize.files import save_text
 from parameterize.spline.volume import BSplineVolume
-from solve.frame import UnitFrame
+from solve.forms.frame import UnitFrame
 
 from . import studies
 from .command import command_line, gives_the_same

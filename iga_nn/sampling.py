@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array
 from parameterize.quality.quality import arap
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
-from solve.frame import UnitFrame
+from solve.forms.frame import UnitFrame
 
 if TYPE_CHECKING:
     from solve import Elasticity, Poisson, Solution

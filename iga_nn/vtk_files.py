@@ -29,7 +29,7 @@ from parameterize.quality.quality import arap
 from parameterize.spline.bernstein import elevation, extraction
 from parameterize.spline.bspline import apply_along, divided_spans, insert_knots
 from parameterize.spline.volume import BSplineVolume
-from solve.frame import UnitFrame
+from solve.forms.frame import UnitFrame
 
 from .sampling import error_at
 

@@ -1,6 +1,6 @@
 """Isogeometric solver on a B-spline volume F: Poisson's problem and elasticity, their errors, convergence studies.
 
-Problem (`problem`). On the image of the cube, with data on its six faces u0, u1, v0, v1, w0, w1,
+Problem (`forms`). On the image of the cube, with data on its six faces u0, u1, v0, v1, w0, w1,
 
     -div(kappa grad u) + c u = f,     u = g,    kappa du/dn = g,    or    kappa du/dn + alpha u = g,
 
@@ -8,7 +8,7 @@ and in weak form, tests v zero where u is given,
 
     int grad v . kappa grad u + c v u + int_Robin alpha v u  =  int v f + int_Neumann v g + int_Robin v g.
 
-Discretisation (`space`, `operators`, `boundary`). The trial space holds the splines of F's own degrees and knots, every
+Discretisation (`discretization`). The trial space holds the splines of F's own degrees and knots, every
 span halved `refine` times, or of another `degree`; F itself stays as it is. With J the derivative of F,
 
     int grad v . kappa grad u dx = int (grad v)^T G (grad u) d(u, v, w),    G = det J  J^-1 kappa J^-T,
@@ -17,7 +17,7 @@ gradients by the parameters on the right. p Gauss points a span and direction in
 only continuous). The matrix A is not assembled: six numbers of G a Gauss point are kept, and sum factorization applies
 it. Given values of u are interpolated at the cube's corners, and projected in L2 on its edges, then on its faces.
 
-Preconditioner (`precondition`; Sangalli, Tani, SIAM J. Sci. Comput. 38, 2016). G is replaced by its diagonal, and that
+Preconditioner (`linear`; Sangalli, Tani, SIAM J. Sci. Comput. 38, 2016). G is replaced by its diagonal, and that
 by products of functions of one parameter, fitted in the sense of least squares of logarithms:
 
     G_dd(t_1, t_2, t_3)  ~  a_d(t_d) b_e(t_e) b_f(t_f)        e, f: the two other directions
@@ -30,7 +30,7 @@ added to the K_d,
     P^-1 = U (L_1 (+) L_2 (+) L_3 + c_0)^-1 U^T    a diagonal matrix: the sums of one eigenvalue of each direction
     A^-1 ~ D P^-1 D,    D^2 = diag(P) / diag(A).
 
-It costs three small matrix products each way. Conjugate gradients (`linear`) end at |r| <= tolerance |b|.
+It costs three small matrix products each way. Conjugate gradients (`linear.cg`) end at |r| <= tolerance |b|.
 
 Elasticity (`elasticity`). A displacement u of three components; eps = (grad u + grad u^T) / 2,
 
@@ -43,7 +43,7 @@ Errors (`norms`, `estimate`, `study`). Against an exact solution with p + 2 Gaus
 smooth solutions the L2 norm falls like h^(p + 1), the H1 seminorm like h^p. Without one the L2 norm is estimated from
 the residual, which for Poisson's problem is close to kappa (2 pi / h)^2 times the error.
 
-Formulas (`expressions`, `frame`). Beside x, y, z they know X, Y, Z: with c the middle of F's bounding box and V its
+Formulas (`forms`). Beside x, y, z they know X, Y, Z: with c the middle of F's bounding box and V its
 volume, (X, Y, Z) = ((x, y, z) - c) / V^(1/3). `meaning` finds data that do not vary on the domain.
 
 >>> from solve import Poisson, benchmark_volume, convergence
@@ -54,13 +54,13 @@ volume, (X, Y, Z) = ((x, y, z) - c) / V^(1/3). `meaning` finds data that do not 
 (True, True)
 """
 
-from .elastic_problem import Elasticity
 from .elasticity import check_elastic_data, solve_elasticity
-from .expressions import Expression, ExpressionError
 from .failure import ConvergenceError
 from .field import SplineField
+from .forms.elastic_problem import Elasticity
+from .forms.formula import Expression, ExpressionError
+from .forms.problem import Poisson
 from .poisson import check_data, check_device, solve_poisson
-from .problem import Poisson
 from .report import SolveReport
 from .solution import Solution
 from .solver import check_problem, solve_problem

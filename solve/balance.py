@@ -7,10 +7,10 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
-from .planes import PlaneField, map_planes
-from .problem import Poisson
-from .quadrature import gauss_rule
-from .space import TrialSpace
+from .discretization.planes import PlaneField, map_planes
+from .discretization.quadrature import gauss_rule
+from .discretization.space import TrialSpace
+from .forms.problem import Poisson
 
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 

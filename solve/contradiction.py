@@ -6,8 +6,8 @@ import numpy as np
 
 from parameterize.spline.volume import AXES, BSplineVolume
 
-from .expressions import ExpressionError
-from .problem import Poisson
+from .forms.formula import ExpressionError
+from .forms.problem import Poisson
 
 SAMPLES = np.linspace(0.05, 0.95, 7)  # parameters per direction
 TOLERANCE = 1e-6

@@ -11,20 +11,20 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
-from .boundary import boundary_coefficients
-from .elastic_operator import assemble_elasticity
-from .elastic_problem import Elasticity
+from .discretization.dirichlet import boundary_coefficients
+from .discretization.elastic_operator import assemble_elasticity
+from .discretization.natural import face_rule
+from .discretization.norms import Errors, squared_errors
+from .discretization.operator import free_window
+from .discretization.planes import map_planes
+from .discretization.quadrature import gauss_rule
+from .discretization.space import TrialSpace, trial_space
 from .failure import announce, check_solver, check_unknowns, solve_notices
-from .linear import conjugate_gradients
+from .forms.elastic_problem import Elasticity
+from .linear.cg import conjugate_gradients
+from .linear.preconditioner import fast_diagonalization
 from .meaning import doubts
-from .norms import Errors, squared_errors
-from .operators import free_window
-from .planes import map_planes
-from .precondition import fast_diagonalization
-from .quadrature import gauss_rule
 from .solution import Solution, solution_of, with_estimate
-from .space import TrialSpace, trial_space
-from .surface import face_rule
 from .threads import checked_threads, one_blas_thread
 
 

@@ -19,10 +19,10 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, breakpoints, collocation
 from parameterize.spline.volume import BSplineVolume
 
-from .expressions import PAIRS
-from .problem import SYMMETRIC
-from .quadrature import GaussRule, gauss_rule
-from .space import TrialSpace
+from .discretization.quadrature import GaussRule, gauss_rule
+from .discretization.space import TrialSpace
+from .forms.formula import PAIRS
+from .forms.problem import SYMMETRIC
 
 Orders = tuple[int, int, int]
 UNITS: tuple[Orders, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))

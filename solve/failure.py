@@ -11,13 +11,13 @@ from parameterize.arrays import Array
 from parameterize.quality.quality import scaled_jacobian
 from parameterize.spline.volume import AXES, BSplineVolume
 
-from .elastic_operator import ElasticSystem
-from .linear import LinearResult
-from .operators import System, free_window
-from .planes import map_planes
-from .quadrature import gauss_rule
+from .discretization.elastic_operator import ElasticSystem
+from .discretization.operator import System, free_window
+from .discretization.planes import map_planes
+from .discretization.quadrature import gauss_rule
+from .discretization.space import TrialSpace
+from .linear.cg import LinearResult
 from .solution import Solution
-from .space import TrialSpace
 
 log = logging.getLogger(__name__)
 

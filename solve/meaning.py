@@ -7,8 +7,8 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
-from .data import ProblemData, in_scaled
-from .norms import Errors
+from .discretization.norms import Errors
+from .forms.data import ProblemData, in_scaled
 
 SAMPLES = np.linspace(0.0, 1.0, 9)  # parameters per direction
 SMALLEST = 1e-150  # values whose squares underflow

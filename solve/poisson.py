@@ -13,22 +13,22 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
 from .balance import balanced, missing_mean
-from .boundary import boundary_coefficients
 from .contradiction import contradictions
-from .elastic_problem import Elasticity
+from .discretization.dirichlet import boundary_coefficients
+from .discretization.natural import FaceMass, RobinOperator, face_rule
+from .discretization.norms import error_norms
+from .discretization.operator import Operator, System, assemble, free_window, prepare
+from .discretization.planes import map_planes
+from .discretization.quadrature import GaussRule, gauss_rule
+from .discretization.space import TrialSpace, embedded, trial_space
 from .failure import announce, check_solver, check_unknowns, solve_notices
 from .field import SplineField
-from .linear import LinearResult, conjugate_gradients
+from .forms.elastic_problem import Elasticity
+from .forms.problem import Poisson
+from .linear.cg import LinearResult, conjugate_gradients
+from .linear.preconditioner import FastDiagonalization, fast_diagonalization
 from .meaning import doubts
-from .norms import error_norms
-from .operators import Operator, System, assemble, free_window, prepare
-from .planes import map_planes
-from .precondition import FastDiagonalization, fast_diagonalization
-from .problem import Poisson
-from .quadrature import GaussRule, gauss_rule
 from .solution import Solution, solution_of, with_estimate
-from .space import TrialSpace, embedded, trial_space
-from .surface import FaceMass, RobinOperator, face_rule
 from .threads import checked_threads, one_blas_thread
 
 DEVICES = ("cpu", "cuda")
@@ -120,7 +120,7 @@ def check_device(device: str, problem: Poisson | Elasticity) -> None:
             raise ValueError(f"device {device!r} does not know elasticity; use device='cpu'")
         if problem.robin:
             raise ValueError(f"device {device!r} does not know Robin faces; use device='cpu'")
-        from .cuda import check_available  # torch comes in here only
+        from .linear.cuda import check_available  # torch comes in here only
 
         check_available(device)
 
@@ -185,7 +185,7 @@ def _iterate(
 ) -> LinearResult:
     if device == "cpu":
         return conjugate_gradients(operator.apply_free, right, preconditioner, tolerance, max_iterations, start)
-    from .cuda import solve_on_device
+    from .linear.cuda import solve_on_device
 
     assert isinstance(operator, Operator)
     return solve_on_device(operator, preconditioner, right, tolerance, max_iterations, device, start)

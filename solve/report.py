@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from .discretization.norms import Errors
 from .estimate import Estimate
-from .norms import Errors
 
 NORMS = ("l2_relative", "l2", "h1_relative", "h1_seminorm", "error_estimate_relative", "error_estimate")  # as shown
 

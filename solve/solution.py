@@ -11,12 +11,12 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
+from .discretization.norms import Errors
+from .discretization.space import TrialSpace, longest_edge
 from .estimate import Problem, error_estimate
 from .field import SplineField
-from .linear import LinearResult
-from .norms import Errors
+from .linear.cg import LinearResult
 from .report import SolveReport
-from .space import TrialSpace, longest_edge
 
 
 @dataclass(frozen=True, eq=False)

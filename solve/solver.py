@@ -6,10 +6,10 @@ from typing import Any
 
 from parameterize.spline.volume import BSplineVolume
 
-from .elastic_problem import Elasticity
 from .elasticity import check_elastic_data, solve_elasticity
+from .forms.elastic_problem import Elasticity
+from .forms.problem import Poisson
 from .poisson import check_data, solve_poisson
-from .problem import Poisson
 from .solution import Solution
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
-from .elastic_problem import Elasticity
-from .problem import Poisson
+from .forms.elastic_problem import Elasticity
+from .forms.problem import Poisson
 from .report import SolveReport
 from .solver import solve_problem
 

@@ -46,8 +46,8 @@ from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import MAX_FACES, MeshError
-from solve.expressions import Expression, ExpressionError
 from solve.field import SplineField
+from solve.forms.formula import Expression, ExpressionError
 from solve.study import benchmark_volume
 
 OUTCOMES = ("accepted", "refused", "crashed", "slow")

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from parameterize.spline.bspline import collocation, gauss_points
-from solve.boundary import boundary_coefficients
-from solve.space import trial_space
+from solve.discretization.dirichlet import boundary_coefficients
+from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
 
 

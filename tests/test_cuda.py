@@ -5,12 +5,12 @@ torch = pytest.importorskip("torch")
 
 from parameterize.spline.volume import FACE_NAMES  # noqa: E402
 from solve import Poisson, benchmark_volume, solve_poisson  # noqa: E402
-from solve.cuda import DeviceOperator, device_preconditioner, solve_on_device  # noqa: E402
-from solve.linear import conjugate_gradients  # noqa: E402
-from solve.operators import assemble, free_window  # noqa: E402
-from solve.precondition import fast_diagonalization  # noqa: E402
-from solve.quadrature import gauss_rule  # noqa: E402
-from solve.space import trial_space  # noqa: E402
+from solve.discretization.operator import assemble, free_window  # noqa: E402
+from solve.discretization.quadrature import gauss_rule  # noqa: E402
+from solve.discretization.space import trial_space  # noqa: E402
+from solve.linear.cg import conjugate_gradients  # noqa: E402
+from solve.linear.cuda import DeviceOperator, device_preconditioner, solve_on_device  # noqa: E402
+from solve.linear.preconditioner import fast_diagonalization  # noqa: E402
 
 DEVICES = ["cpu", pytest.param("cuda", marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU"))]
 
@@ -34,7 +34,7 @@ def close(tensor, array):
 )
 @pytest.mark.parametrize("layer_bytes", [1, 2**28], ids=["layer by layer", "at once"])
 def test_same_numbers_as_the_compiled_kernels(device, degree, dirichlet, reaction, layer_bytes, monkeypatch):
-    monkeypatch.setattr("solve.cuda.LAYER_BYTES", layer_bytes)
+    monkeypatch.setattr("solve.linear.cuda.LAYER_BYTES", layer_bytes)
     operator, preconditioner = build(degree, dirichlet, reaction)
     x = np.random.default_rng(0).standard_normal(tuple(s.stop - s.start for s in operator.window))
     there = torch.as_tensor(x, device=device)

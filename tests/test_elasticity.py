@@ -4,10 +4,10 @@ import pytest
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import ConvergenceError, Elasticity, SplineField, benchmark_volume, convergence, solve_elasticity
-from solve.elastic_operator import assemble_elasticity
-from solve.operators import free_window
-from solve.quadrature import gauss_rule
-from solve.space import trial_space
+from solve.discretization.elastic_operator import assemble_elasticity
+from solve.discretization.operator import free_window
+from solve.discretization.quadrature import gauss_rule
+from solve.discretization.space import trial_space
 
 WAVE = ("exp(x)*sin(y)", "cos(x*z)", "x*y*z+sin(z)")
 STEEL = {"young": 210.0, "poisson_ratio": 0.3}

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from solve.expressions import PAIRS, Expression, ExpressionError
+from solve.forms.formula import PAIRS, Expression, ExpressionError
 
 POINTS = np.random.default_rng(0).uniform(0.3, 1.2, (3, 20))
 

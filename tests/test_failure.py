@@ -3,8 +3,8 @@ import pytest
 
 from parameterize.spline.volume import BSplineVolume
 from solve import ConvergenceError, Poisson, solve_poisson
+from solve.discretization.space import trial_space
 from solve.failure import worst_place
-from solve.space import trial_space
 
 
 def pressed_corner(height):

@@ -19,7 +19,7 @@ from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from solve import Poisson, solve_poisson
 from solve.field import SplineField
-from solve.frame import UnitFrame
+from solve.forms.frame import UnitFrame
 from solve.study import benchmark_volume
 
 POINTS = np.random.default_rng(7).random((50, 3))

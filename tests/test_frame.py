@@ -5,9 +5,9 @@ import pytest
 
 import iga_nn
 from solve import benchmark_volume, solve_poisson
-from solve.expressions import Expression, ExpressionError
-from solve.frame import UnitFrame
-from solve.problem import DEFAULT_EXACT
+from solve.forms.formula import Expression, ExpressionError
+from solve.forms.frame import UnitFrame
+from solve.forms.problem import DEFAULT_EXACT
 
 BOX = iga_nn.BSplineVolume.uniform(
     np.stack(np.meshgrid([2.0, 6.0], [-1.0, 1.0], [0.0, 1.0], indexing="ij"), axis=-1), 1

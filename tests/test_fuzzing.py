@@ -16,8 +16,8 @@ from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.files import save_arrays
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import MeshError
-from solve.expressions import Expression, ExpressionError
 from solve.field import SplineField
+from solve.forms.formula import Expression, ExpressionError
 
 SLICE = 20  # files a reader
 QUICK = settings(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from solve.linear import conjugate_gradients
+from solve.linear.cg import conjugate_gradients
 
 
 def identity(r):

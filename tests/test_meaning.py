@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solve import Elasticity, Poisson, benchmark_volume, solve_elasticity, solve_poisson
-from solve.expressions import ExpressionError
+from solve.forms.formula import ExpressionError
 
 UNIT = benchmark_volume(3)
 MILLIMETRES = UNIT.transformed(430.0, [-564.0, -300.0, -564.0])

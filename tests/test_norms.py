@@ -3,8 +3,8 @@ import pytest
 
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
-from solve.norms import error_norms
-from solve.space import trial_space
+from solve.discretization.norms import error_norms
+from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
 
 

@@ -3,9 +3,9 @@ import pytest
 
 from parameterize.spline.bspline import collocation
 from parameterize.spline.volume import BSplineVolume
-from solve.operators import assemble, free_window
-from solve.quadrature import gauss_rule
-from solve.space import trial_space
+from solve.discretization.operator import assemble, free_window
+from solve.discretization.quadrature import gauss_rule
+from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
 
 

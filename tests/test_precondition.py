@@ -4,11 +4,11 @@ import pytest
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Poisson, solve_poisson
-from solve.linear import conjugate_gradients
-from solve.operators import assemble, free_window
-from solve.precondition import fast_diagonalization
-from solve.quadrature import gauss_rule
-from solve.space import trial_space
+from solve.discretization.operator import assemble, free_window
+from solve.discretization.quadrature import gauss_rule
+from solve.discretization.space import trial_space
+from solve.linear.cg import conjugate_gradients
+from solve.linear.preconditioner import fast_diagonalization
 from solve.study import benchmark_volume
 
 

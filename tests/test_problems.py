@@ -5,8 +5,8 @@ import pytest
 
 from parameterize.spline.volume import FACE_NAMES
 from solve import ExpressionError, Poisson, benchmark_volume, check_data, convergence, solve_poisson
-from solve.space import trial_space
-from solve.surface import FaceMass, face_rule
+from solve.discretization.natural import FaceMass, face_rule
+from solve.discretization.space import trial_space
 
 WAVE = "exp(x+z)*sin(y)"
 KAPPA = "1+x*x+0.5*sin(y)"

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from solve.quadrature import gauss_rule
-from solve.space import trial_space
+from solve.discretization.quadrature import gauss_rule
+from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from parameterize.spline.bspline import evaluate_at, greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
-from solve.space import embedded, longest_edge, trial_space
+from solve.discretization.space import embedded, longest_edge, trial_space
 from solve.study import benchmark_volume
 
 

@@ -4,8 +4,8 @@ import pytest
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from solve import Poisson, SolveReport, benchmark_volume, convergence, poisson, rates
-from solve.norms import Errors
-from solve.space import TrialSpace
+from solve.discretization.norms import Errors
+from solve.discretization.space import TrialSpace
 
 WAVE = Poisson(exact="exp(x+z)*sin(y)")
 

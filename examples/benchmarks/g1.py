@@ -30,7 +30,7 @@ from iga_nn.data import DATA_FOLDER
 from iga_nn.machine import calibrate, processor
 from iga_nn.options import InputError, MapOptions, one_line
 from parameterize.files import save_text
-from solve.problem import DEFAULT_EXACT
+from solve.forms.problem import DEFAULT_EXACT
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAPER_EXACT = {"conch": "exp(x+z)*sin(y)"}  # where the paper solves Poisson's equation (section 5.5)

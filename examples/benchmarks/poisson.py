@@ -33,8 +33,8 @@ from iga_nn.machine import calibrate, processor
 from iga_nn.report import versions
 from parameterize.files import save_text
 from solve import Poisson, benchmark_volume, solve_poisson
-from solve.norms import error_norms
-from solve.space import trial_space
+from solve.discretization.norms import error_norms
+from solve.discretization.space import trial_space
 
 EXACT = "exp(x+z)*sin(y)"
 TOLERANCE = 1e-10

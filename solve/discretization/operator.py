@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
+from ..threads import colours, in_parallel
 from . import kernels, product
 from .planes import map_planes
 from .quadrature import GaussRule, SpanTable, Table, gauss_rule, span_tables
 from .space import TrialSpace
-from .threads import colours, in_parallel
 
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six factors
 Window = tuple[slice, slice, slice]

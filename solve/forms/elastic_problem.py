@@ -11,7 +11,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES
 
 from .data import Data, Parsed, ProblemData, check_faces, finite, parse, values
-from .expressions import Expression
+from .formula import Expression
 from .problem import SYMMETRIC
 
 VectorData = Sequence[Data]  # three entries, one a component

@@ -11,7 +11,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES
 
 from .data import Data, Parsed, ProblemData, check_faces, demand, finite, parse, values
-from .expressions import PAIRS, Expression
+from .formula import PAIRS, Expression
 
 DEFAULT_EXACT = "exp(X+Z)*sin(Y)"  # the paper's solution (section 5.5), at volume 1: it means the same in any unit
 SYMMETRIC = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # place of a tensor's entry (i, j) among its six: xx, xy, xz, yy, yz, zz

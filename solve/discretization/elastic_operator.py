@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
+from ..threads import colours, in_parallel
 from . import elastic_kernels, kernels
-from .operators import PAIRS, Operator, Window, to_blocks
+from .operator import PAIRS, Operator, Window, to_blocks
 from .planes import PlaneField, map_planes
 from .quadrature import GaussRule, Table, span_tables
 from .space import TrialSpace
-from .threads import colours, in_parallel
 
 VectorFunction = Callable[[Array, Array, Array], Array]
 

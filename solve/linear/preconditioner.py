@@ -19,9 +19,9 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import FACE_NAMES
 
-from .operators import Operator, from_blocks
-from .quadrature import GaussRule, Table
-from .threads import in_parallel
+from ..discretization.operator import Operator, from_blocks
+from ..discretization.quadrature import GaussRule, Table
+from ..threads import in_parallel
 
 
 @dataclass(frozen=True, eq=False)

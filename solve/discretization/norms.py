@@ -10,11 +10,11 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
+from ..threads import in_parallel
 from . import kernels
 from .planes import PlaneField, map_planes
 from .quadrature import gauss_rule
 from .space import TrialSpace
-from .threads import in_parallel
 
 PLANES = 16  # of points of u, in a piece of work
 

@@ -12,7 +12,7 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation, gauss_points
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .operators import Operator
+from .operator import Operator
 from .space import TrialSpace
 
 

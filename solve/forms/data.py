@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .expressions import Expression, ExpressionError
+from .formula import Expression, ExpressionError
 from .frame import UnitFrame
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow

@@ -15,7 +15,7 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation, gauss_points
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .operators import ScalarFunction
+from .operator import ScalarFunction
 from .space import TrialSpace
 
 FREE = None

@@ -2,7 +2,7 @@
 
 Where a CPU gains from knowing that few functions are nonzero at a point, a GPU gains from large matrix products: the
 bases of directions v and w are dense matrices here, direction u goes layer by layer. Everything is double precision.
-Geometry factors and load come from `operators.assemble` on the CPU.
+Geometry factors and load come from `operator.assemble` on the CPU.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from torch import Tensor
 
 from parameterize.arrays import Array
 
-from .linear import LinearResult, conjugate_gradients
-from .operators import Operator
-from .precondition import FastDiagonalization
-from .quadrature import Table
+from ..discretization.operator import Operator
+from ..discretization.quadrature import Table
+from .cg import LinearResult, conjugate_gradients
+from .preconditioner import FastDiagonalization
 
 LAYER_BYTES = 2**28  # of one field on a layer of points of u
 

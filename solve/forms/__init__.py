@@ -1,0 +1,1 @@
+"""Describes a boundary value problem: its equation, its data, and formulas for them."""

@@ -1,0 +1,1 @@
+"""Solves the linear system by preconditioned conjugate gradients."""
