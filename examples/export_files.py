@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import iga_nn
-from iga_nn.rendering import can_draw
+from iga_nn.figures.render import can_draw
 from solve.study import benchmark_volume
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import iga_nn
-from iga_nn.plotting import draw_faces
-from iga_nn.rendering import can_draw
+from iga_nn.figures import draw_faces
+from iga_nn.figures.render import can_draw
 
 
 def main(name: str = "bean", config: object = None, levels: int = 2, out: str | Path = "out/first_run") -> Path:

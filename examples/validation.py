@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import iga_nn
-from iga_nn.cli import main as iga_nn_main
-from iga_nn.plotting import draw_errors
-from iga_nn.rendering import can_draw
-from iga_nn.report import read
+from iga_nn.cli.commands import main as iga_nn_main
+from iga_nn.figures import draw_errors
+from iga_nn.figures.render import can_draw
+from iga_nn.report.document import read
 
 EXACT = "exp(x+z)*sin(y)"  # the paper's, in the units the models came in
 ABSENT, FAILED = "model not public", "run failed"

@@ -1,7 +1,7 @@
 """From a closed surface mesh to a solved PDE on a certified trivariate B-spline.
 
 The docstrings of these modules explain what is done, with formulas: `parameterize` the method and the certificate,
-`solve` the discretisation and its preconditioner, `iga_nn.formats` the files.
+`solve` the discretisation and its preconditioner, `iga_nn.io.formats` the files.
 
 The public names below are loaded on first use: importing the package brings in neither torch nor VTK.
 """
@@ -44,10 +44,10 @@ if TYPE_CHECKING:
     from solve import Elasticity, Poisson, convergence
     from solve import solve_problem as solve
 
-    from .formats import export, load_volume
+    from .io.formats import export, load_volume
     from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions
-    from .pipeline import run
     from .samples import sample
+    from .workflow.pipeline import run
 
 _HOME = {
     "BSplineVolume": "parameterize.spline.volume",
@@ -62,12 +62,12 @@ _HOME = {
     "Surface": "parameterize.surface.surface",
     "certify": "parameterize.certificate.jacobian",
     "convergence": "solve",
-    "export": "iga_nn.formats",
+    "export": "iga_nn.io.formats",
     "load_surface": "parameterize.surface.surface",
-    "load_volume": "iga_nn.formats",
+    "load_volume": "iga_nn.io.formats",
     "parameterize": "parameterize.run",
     "preset": "parameterize.config",
-    "run": "iga_nn.pipeline",
+    "run": "iga_nn.workflow.pipeline",
     "sample": "iga_nn.samples",
     "solve": "solve:solve_problem",
 }

@@ -6,7 +6,7 @@ import sys
 def run_and_exit() -> None:
     """Run the command line on the program's arguments."""
     try:
-        from .cli import main
+        from .cli.commands import main
 
         code = main(sys.argv[1:])
     except KeyboardInterrupt:

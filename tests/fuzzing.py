@@ -37,10 +37,11 @@ import numpy as np
 import torch
 from test_mesh import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
 
-from iga_nn import pipeline, spline_files
-from iga_nn.formats import is_volume
+from iga_nn.io import splinepy as spline_files
+from iga_nn.io.formats import is_volume
 from iga_nn.options import InputError, input_errors, one_line, read_corners
 from iga_nn.samples import sample
+from iga_nn.workflow import pipeline
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
@@ -55,7 +56,7 @@ SECONDS = 20  # for one file; the processor's
 MEMORY = 2 << 30  # bytes a reader may grow by
 ADDRESSES = 16 << 30  # bytes of address space, so that a failing reader does not take the machine along
 
-REFUSALS = (InputError, MeshError, ExpressionError, OSError)  # exit code 2: as in iga_nn.cli.main
+REFUSALS = (InputError, MeshError, ExpressionError, OSError)  # exit code 2: as in iga_nn.cli.commands.main
 SCRATCH = "/dev/shm"  # noqa: S108 - 200 000 files are written to memory where that is possible
 
 Pieces = list[bytes]

@@ -21,10 +21,10 @@ import torch._dynamo  # Adam would load it in every process
 from test_mesh import obj
 from test_run import small_surface, tiny_config
 
-from iga_nn import pipeline
-from iga_nn.cli import main as command
-from iga_nn.folder import has_checkpoint
+from iga_nn.cli.commands import main as command
 from iga_nn.options import MapOptions
+from iga_nn.workflow import pipeline
+from iga_nn.workflow.output_folder import has_checkpoint
 
 FORK = multiprocessing.get_context("fork")
 

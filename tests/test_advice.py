@@ -9,9 +9,12 @@ from conftest import formula_parameterization
 from test_examples import shown
 from test_injective import bent, mapped
 
-from iga_nn import advice, page, plotting, report
-from iga_nn.cli import main
+from iga_nn import figures as plotting
+from iga_nn.cli.commands import main
 from iga_nn.options import MapOptions
+from iga_nn.report import advice
+from iga_nn.report import document as report
+from iga_nn.report import html as page
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.jacobian import certify
 from solve.study import benchmark_volume
@@ -122,7 +125,7 @@ def shown_in_grey(picture):
     """Whether there are many grey and some black points, or nothing can be drawn here."""
     from matplotlib.image import imread
 
-    from iga_nn.rendering import can_draw
+    from iga_nn.figures.render import can_draw
 
     if not can_draw():
         return not picture.exists()

@@ -20,10 +20,10 @@ from shapes import ball
 from test_mesh import CUBE, TRIANGLES, obj
 
 import iga_nn
-from iga_nn.cli import main
-from iga_nn.formats import load_volume
+from iga_nn.cli.commands import main
+from iga_nn.figures.evaluate import FACE_COLORS
+from iga_nn.io.formats import load_volume
 from iga_nn.samples import write_obj
-from iga_nn.sampling import FACE_COLORS
 from parameterize.surface.surface import surface_from_arrays
 
 QUICK = ("--steps-factor", "0.02", "--control-points", "6", "--refine", "0")
@@ -204,7 +204,8 @@ def test_only_results_are_given_out(page):
 
 def test_a_page_without_its_packages_says_what_to_install(tmp_path):
     code = (
-        "import sys; sys.modules['trame'] = None\nfrom iga_nn.cli import main\nsys.exit(main(['app', '--port', '0']))\n"
+        "import sys; sys.modules['trame'] = None\n"
+        "from iga_nn.cli.commands import main\nsys.exit(main(['app', '--port', '0']))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 2 and done.stdout == ""

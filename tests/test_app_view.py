@@ -5,12 +5,12 @@ import json
 
 import numpy as np
 
-from iga_nn.app_view import CONTENT, colors, places, row, triangles
-from iga_nn.folder import DEFECT_FILES, MAP_FILES, SOLUTION_FILES
-from iga_nn.jobs import Job
-from iga_nn.report import FILE_NAME, PAGE_NAME
+from iga_nn.figures.evaluate import FACE_COLORS
+from iga_nn.live.queue import Job
+from iga_nn.live.state import CONTENT, colors, places, row, triangles
+from iga_nn.report.document import FILE_NAME, PAGE_NAME
 from iga_nn.samples import sample
-from iga_nn.sampling import FACE_COLORS
+from iga_nn.workflow.output_folder import DEFECT_FILES, MAP_FILES, SOLUTION_FILES
 from parameterize.progress import Progress
 
 

@@ -17,10 +17,10 @@ import pytest
 
 import iga_nn
 import solve
-from iga_nn import report as reports
-from iga_nn.cli import main
-from iga_nn.folder import open_folder
-from iga_nn.rendering import can_draw
+from iga_nn.cli.commands import main
+from iga_nn.figures.render import can_draw
+from iga_nn.report import document as reports
+from iga_nn.workflow.output_folder import open_folder
 from parameterize.checkpoint import CheckpointError
 from parameterize.spline.volume import FACE_NAMES
 from solve.study import benchmark_volume
@@ -357,7 +357,9 @@ def small_disk(size):
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 @pytest.mark.parametrize("size", [100, 1500, 4000])
 def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training, in_folder, capsys, monkeypatch):
-    monkeypatch.setattr("iga_nn.folder.RunFolder.draw", lambda *_: None)  # figures come last and take longest
+    monkeypatch.setattr(
+        "iga_nn.workflow.output_folder.RunFolder.draw", lambda *_: None
+    )  # figures come last and take longest
     formula_training()
     benchmark_volume(6).save("map.npz")
     for arguments in (["solve", "poisson", "map.npz", "--refine", "0"], ["parameterize", "cube"]):
@@ -375,7 +377,7 @@ def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training,
 
 
 def test_what_a_killed_run_left_half_written_goes(formula_training, in_folder, monkeypatch):
-    monkeypatch.setattr("iga_nn.folder.RunFolder.draw", lambda *_: None)
+    monkeypatch.setattr("iga_nn.workflow.output_folder.RunFolder.draw", lambda *_: None)
     formula_training()
     Path("cube").mkdir()
     Path("cube/.volume.1.part.npz").write_bytes(b"half")

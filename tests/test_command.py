@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from iga_nn.cli import app
-from iga_nn.command import command_line
+from iga_nn.cli.commands import app
 from iga_nn.options import ElasticityOptions, MapOptions, PoissonOptions, StudyOptions
+from iga_nn.workflow.repeat import command_line
 
 
 def options_of(line: str) -> tuple[object, ...]:

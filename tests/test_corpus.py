@@ -9,7 +9,7 @@ import pytest
 from corpus import CASES, large
 
 import iga_nn
-from iga_nn.cli import main
+from iga_nn.cli.commands import main
 
 MEMORY = 2 << 30  # bytes resident
 SECONDS = 20  # the processor's

@@ -10,9 +10,9 @@ import numpy as np
 import pooch
 import pytest
 
-from iga_nn import data
-from iga_nn.cli import main
-from iga_nn.data import MODELS, Model, fetch, fetch_all, resolve
+from iga_nn import models as data
+from iga_nn.cli.commands import main
+from iga_nn.models import MODELS, Model, fetch, fetch_all, resolve
 from iga_nn.samples import sample, write_obj
 from parameterize.surface.surface import MeshError
 

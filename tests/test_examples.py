@@ -14,9 +14,9 @@ from conftest import formula_parameterization
 from matplotlib.image import imread
 
 import iga_nn
-from iga_nn.cli import main
+from iga_nn.cli.commands import main
+from iga_nn.figures.render import can_draw
 from iga_nn.options import read_corners
-from iga_nn.rendering import can_draw
 
 EXAMPLES = Path(iga_nn.__file__).resolve().parents[1] / "examples"
 

@@ -9,10 +9,13 @@ import pytest
 
 import iga_nn
 import solve
-from iga_nn import page, pipeline, plotting, rendering
-from iga_nn.cli import main
-from iga_nn.color_range import error_range, even_range
+from iga_nn import figures as plotting
+from iga_nn.cli.commands import main
+from iga_nn.figures import render as rendering
+from iga_nn.figures.color_range import error_range, even_range
 from iga_nn.options import PoissonOptions, StudyOptions
+from iga_nn.report import html as page
+from iga_nn.workflow import pipeline
 from solve.study import benchmark_volume
 
 MAP = {"draw_history": "history.png", "draw_faces": "faces.png", "draw_lines": "lines.png", "draw_cut": "cut.png"}
@@ -74,7 +77,7 @@ def test_the_figures_of_a_solve_and_of_a_study_cost_themselves_alone(all_drawn, 
 def test_without_the_interactive_view_the_page_is_whole(in_folder, monkeypatch, chromium, tmp_path):
     from browser import browse
 
-    monkeypatch.setattr("iga_nn.scene.scene_of", broken)
+    monkeypatch.setattr("iga_nn.report.viewer.scene_of", broken)
     benchmark_volume(2).save("map.npz")
     report, text = look(pipeline.solve_to("map.npz", "out").folder)
     assert report["not_drawn"] == {"interactive view": "Invalid vmin or vmax"}
@@ -127,7 +130,7 @@ def test_errors_of_any_size_are_drawn(size, tmp_path, monkeypatch):
     plotting.draw_error(tmp_path / "error.png", volume, field, zero)
     plotting.draw_values(tmp_path / "values.png", volume, field, "u")
     plotting.draw_study(tmp_path / "study.png", {3: [solve.ConvergenceRow(solution.report, None, None)]})
-    from iga_nn.scene import scene_of
+    from iga_nn.report.viewer import scene_of
 
     ends = {entry["name"]: (entry["low"], entry["high"]) for entry in scene_of(volume, field, zero)["fields"]}
     assert ("everywhere" in ends["solution"][0]) and (("everywhere" in ends["error"][0]) == (size < 1e-200))

@@ -13,9 +13,10 @@ import pytest
 import torch
 
 import iga_nn
-from iga_nn import machine, report
-from iga_nn.cli import main
-from iga_nn.forecast import Forecast, forecast
+from iga_nn.cli.commands import main
+from iga_nn.report import document as report
+from iga_nn.workflow import machine
+from iga_nn.workflow.cost_estimate import Forecast, forecast
 from parameterize.config import preset
 
 CPU = torch.device("cpu")
@@ -55,8 +56,8 @@ import json, resource, sys, time
 import torch
 torch.set_num_threads(1)
 import iga_nn
-from iga_nn.forecast import forecast
-from iga_nn.cli import main
+from iga_nn.workflow.cost_estimate import forecast
+from iga_nn.cli.commands import main
 from parameterize.config import preset
 config = preset("fast").scaled(0.05).with_control_points(8)
 said = forecast(iga_nn.sample("bean"), config, device=torch.device("cpu"), clock=time.process_time)
@@ -94,7 +95,7 @@ def test_quiet_and_json_keep_stdout_for_the_verdict(formula_training, in_folder,
 
 def test_too_little_memory_is_a_warning_even_when_quiet(formula_training, in_folder, capsys, monkeypatch):
     formula_training()
-    monkeypatch.setattr("iga_nn.mapping.available_memory_mb", lambda: 100.0)
+    monkeypatch.setattr("iga_nn.workflow.train.available_memory_mb", lambda: 100.0)
     assert main(["parameterize", "cube", "--out", "out", "--quiet"]) == 0
     assert "GB of memory are needed, 0.1 GB are free" in capsys.readouterr().err
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from test_mesh import CUBE, TRIANGLES, obj
 
-from iga_nn import job_process
-from iga_nn.data import resolve
-from iga_nn.job_process import End, Line, Step
-from iga_nn.jobs import Jobs, safe_name
+from iga_nn.live import worker as job_process
+from iga_nn.live.queue import Jobs, safe_name
+from iga_nn.live.worker import End, Line, Step
+from iga_nn.models import resolve
 from iga_nn.options import MapOptions, PoissonOptions
 from parameterize.progress import Progress
 

@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 
-from iga_nn.cli import main
+from iga_nn.cli.commands import main
 from iga_nn.samples import sample, write_obj
 from parameterize.surface.decimation import decimate
 from parameterize.surface.surface import MeshError
@@ -54,7 +54,7 @@ def test_check_decimates_only_when_asked(in_folder, capsys):
 def test_a_run_with_decimation_says_so(formula_training, in_folder, capsys):
     formula_training()
     assert main(["parameterize", "bean", "--max-faces", "1000", "--decimate", "--out", "out"]) == 0
-    from iga_nn import report
+    from iga_nn.report import document as report
 
     found = report.read(in_folder / "out")
     assert found["input"]["faces"] == 1000 and found["command"].endswith("--max-faces 1000 --decimate --out out")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_formats import spans_at
 
-from iga_nn.spline_files import write_mfem
+from iga_nn.io.splinepy import write_mfem
 from parameterize.spline.volume import FACE_NAMES
 from solve import Poisson, benchmark_volume, solve_poisson
 

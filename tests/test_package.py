@@ -24,7 +24,7 @@ def python(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     "use",
     [
         "import iga_nn",
-        "import iga_nn.cli",
+        "import iga_nn.cli.commands",
         "import iga_nn; iga_nn.sample; iga_nn.load_surface; iga_nn.preset; iga_nn.BSplineVolume",
         "import iga_nn; iga_nn.Poisson; iga_nn.solve; iga_nn.certify",
     ],

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import iga_nn
-from iga_nn import folder, pipeline
+from iga_nn.figures.render import can_draw
 from iga_nn.options import ElasticityOptions, InputError, MapOptions, PoissonOptions
-from iga_nn.rendering import can_draw
+from iga_nn.workflow import output_folder as folder
+from iga_nn.workflow import pipeline
 from parameterize.spline.volume import BSplineVolume
 from solve import benchmark_volume
 
@@ -80,7 +81,7 @@ def test_a_hidden_file_has_a_folder_of_its_own():
 def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, monkeypatch):
     formula_training()
     seen = []
-    monkeypatch.setattr("iga_nn.plotting.draw_map", lambda *given: seen.append(given[-1]) or {})
+    monkeypatch.setattr("iga_nn.figures.draw_map", lambda *given: seen.append(given[-1]) or {})
     Path("corners.json").write_text("[7, 6, 5, 4, 3, 2, 1, 0]")
     pipeline.parameterize_to("cube", "out", mapping=MapOptions(corners=Path("corners.json")))
     pipeline.parameterize_to("cube", "out", force=True)

@@ -11,8 +11,11 @@ from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.image import imread
 
 import solve
-from iga_nn import octant, plotting, rendering, sampling
-from iga_nn.cli import main
+from iga_nn import figures as plotting
+from iga_nn.cli.commands import main
+from iga_nn.figures import cutaway as octant
+from iga_nn.figures import evaluate as sampling
+from iga_nn.figures import render as rendering
 from solve.study import benchmark_volume
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import iga_nn
-from iga_nn.cli import main
+from iga_nn.cli.commands import main
 
 ROOT = Path(iga_nn.__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 
-from iga_nn import report as reports
+from iga_nn.report import document as reports
 
 
 def test_plain_writes_null_for_what_is_no_number_and_lists_for_arrays():

@@ -25,10 +25,10 @@ from typing import Any, Literal
 import processes
 
 import iga_nn
-from iga_nn import report as reports
-from iga_nn.data import DATA_FOLDER
-from iga_nn.machine import calibrate, processor
+from iga_nn.models import DATA_FOLDER
 from iga_nn.options import InputError, MapOptions, one_line
+from iga_nn.report import document as reports
+from iga_nn.workflow.machine import calibrate, processor
 from parameterize.files import save_text
 from solve.forms.problem import DEFAULT_EXACT
 

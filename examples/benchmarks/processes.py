@@ -19,7 +19,7 @@ from tempfile import TemporaryFile
 from typing import IO, Any, NoReturn, TypeVar
 
 from iga_nn.options import one_line
-from iga_nn.report import plain
+from iga_nn.report.document import plain
 
 BAD_INPUT, INTERRUPTED = 2, 130
 POLL = 0.2  # seconds

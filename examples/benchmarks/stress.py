@@ -25,12 +25,12 @@ import processes
 from hard_shapes import KINDS, hard_shape, kind_of
 
 import iga_nn
-from iga_nn import report as reports
-from iga_nn.advice import span_places
-from iga_nn.machine import calibrate, processor
+from iga_nn.figures.render import can_draw, widest_view
 from iga_nn.options import InputError, MapOptions, one_line
-from iga_nn.rendering import can_draw, widest_view
+from iga_nn.report import document as reports
+from iga_nn.report.advice import span_places
 from iga_nn.samples import write_obj
+from iga_nn.workflow.machine import calibrate, processor
 from parameterize.arrays import Array
 from parameterize.files import replacing, save_text
 from parameterize.surface.surface import Surface

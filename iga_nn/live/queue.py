@@ -18,9 +18,9 @@ from parameterize.arrays import Array
 from parameterize.progress import Progress
 from parameterize.surface.surface import MeshError, Surface
 
-from .folder import default_folder
-from .job_process import Line, Message, Step
-from .options import one_line
+from ..options import one_line
+from ..workflow.output_folder import default_folder
+from .worker import Line, Message, Step
 
 log = logging.getLogger(__name__)
 

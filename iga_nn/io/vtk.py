@@ -31,12 +31,12 @@ from parameterize.spline.bspline import apply_along, divided_spans, insert_knots
 from parameterize.spline.volume import BSplineVolume
 from solve.forms.frame import UnitFrame
 
-from .sampling import error_at
+from ..figures.evaluate import error_at
 
 if TYPE_CHECKING:
     from solve.field import SplineField
 
-    from .sampling import Problem
+    from ..figures.evaluate import Problem
 
 SAMPLES = 3  # intervals of the view a span and direction
 BEZIER_HEXAHEDRON = 79

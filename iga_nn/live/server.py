@@ -20,15 +20,15 @@ from trame.app import get_server
 from parameterize.arrays import Array
 from parameterize.surface.surface import Surface
 
-from . import job_process
-from .app_layout import lay_out
-from .app_view import CONTENT, MEGABYTE, colors, places, row, triangles
-from .folder import has_checkpoint
-from .job_process import Message
-from .jobs import Job, Jobs
-from .mapping import load
-from .options import MapOptions, PoissonOptions, one_line
-from .samples import SAMPLES, sample, write_obj
+from ..options import MapOptions, PoissonOptions, one_line
+from ..samples import SAMPLES, sample, write_obj
+from ..workflow.output_folder import has_checkpoint
+from ..workflow.train import load
+from . import worker as job_process
+from .layout import lay_out
+from .queue import Job, Jobs
+from .state import CONTENT, MEGABYTE, colors, places, row, triangles
+from .worker import Message
 
 HOST = "127.0.0.1"  # the page is for this computer's user: there is no option for another one
 POLICY = (  # the browser itself refuses to fetch anything from elsewhere; Vue compiles templates, hence unsafe-eval

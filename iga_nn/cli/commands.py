@@ -15,12 +15,14 @@ from cyclopts import App, CycloptsError, Parameter
 from parameterize.surface.surface import MAX_FACES, MeshError
 from solve.forms.formula import ExpressionError
 
-from . import advice, console, pipeline
-from . import report as reports
-from .folder import Outcome
-from .formats import export, is_volume
-from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
-from .version import __version__
+from ..io.formats import export, is_volume
+from ..options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
+from ..report import advice
+from ..report import document as reports
+from ..version import __version__
+from ..workflow import pipeline
+from ..workflow.output_folder import Outcome
+from . import progress as console
 
 FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--body-force", "--displacement")
 ONE_TO_ONE = {True: "proved", False: "no: the boundary meets itself", None: "not decided"}
@@ -220,8 +222,8 @@ def write_sample(name: str, /, *, out: Path | None = None, force: bool = False) 
         out: file to write; NAME.obj in the current folder by default.
         force: replace that file where it exists with other content.
     """
-    from .data import obj_path, save_new
-    from .samples import obj_text, sample
+    from ..models import obj_path, save_new
+    from ..samples import obj_text, sample
 
     with input_errors():
         surface = sample(name)
@@ -240,7 +242,7 @@ def fetch_model(name: str, /, *, out: Path | None = None, force: bool = False) -
         out: file to write; NAME.obj in the current folder by default.
         force: replace that file where it exists with other content.
     """
-    from .data import fetch_all
+    from ..models import fetch_all
 
     for path in fetch_all(name, out, force=force):
         _say(str(path))
@@ -288,7 +290,7 @@ def serve_page(
         open_browser: open the page in the browser.
         max_upload: megabytes a surface's file may have.
     """
-    from .app import serve
+    from ..live.app import serve
 
     serve(_say, port=port, open_browser=open_browser, max_upload=max_upload, mapping=mapping, poisson=poisson)
     return DONE

@@ -16,7 +16,7 @@ import numpy as np
 from parameterize.files import save_text
 from solve.report import NORMS
 
-from .version import __version__
+from ..version import __version__
 
 SCHEMA = 1
 FILE_NAME = "report.json"

@@ -17,12 +17,12 @@ from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import BSplineVolume
 
+from ..options import one_line
+from ..report.tables import Study
 from .curves import draw_history, draw_study
-from .map_figures import draw_cut, draw_distortion, draw_faces, draw_folds, draw_lines, draw_meeting
-from .options import one_line
-from .rendering import can_draw
-from .solution_figures import draw_error, draw_errors, draw_values
-from .studies import Study
+from .map import draw_cut, draw_distortion, draw_faces, draw_folds, draw_lines, draw_meeting
+from .render import can_draw
+from .solution import draw_error, draw_errors, draw_values
 
 if TYPE_CHECKING:
     from solve import Elasticity, Poisson, Solution

@@ -15,12 +15,12 @@ from parameterize.arrays import Array
 from parameterize.files import save_arrays
 from solve.forms.frame import UnitFrame
 
-from . import advice
-from . import report as reports
-from .folder import CHECKPOINT, DEFECT_FILES, MAP_FILES, SOLUTION_FILES, RunFolder, has_checkpoint
-from .forecast import Forecast, forecast
+from ..options import InputError, MapOptions, input_errors, read_corners
+from ..report import advice
+from ..report import document as reports
+from .cost_estimate import Forecast, forecast
 from .machine import available_memory_mb
-from .options import InputError, MapOptions, input_errors, read_corners
+from .output_folder import CHECKPOINT, DEFECT_FILES, MAP_FILES, SOLUTION_FILES, RunFolder, has_checkpoint
 from .verdict import tell
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool
     from parameterize.surface import decimation as mesh_decimate
     from parameterize.surface.surface import MAX_FACES
 
-    from .data import resolve
+    from ..models import resolve
 
     if not decimate:
         return resolve(str(mesh), component=component, max_faces=max_faces)

@@ -12,8 +12,8 @@ from parameterize.arrays import Array
 from parameterize.files import replacing
 
 from .color_range import ColorRange
-from .rendering import Patch, View, draw, widest_view
-from .sampling import FACE_COLORS, MAP, face_labels
+from .evaluate import FACE_COLORS, MAP, face_labels
+from .render import Patch, View, draw, widest_view
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,8 +11,8 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import AXES, BSplineVolume
 
-from .rendering import Patch, View, widest_view
-from .sampling import FACE_COLORS, face_grid, points_on, section_grid
+from .evaluate import FACE_COLORS, face_grid, points_on, section_grid
+from .render import Patch, View, widest_view
 
 Octant = tuple[int, int, int]  # the corner of the cube it holds: a side of u, of v and of w
 

@@ -17,23 +17,14 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
-from .color_range import ColorRange, error_range, even_range
-from .rendering import widest_view
-from .sampling import (
-    FACE_COLORS,
-    MAP,
-    all_grids,
-    distortions,
-    error_on,
-    face_labels,
-    points_on,
-    solution_on,
-)
+from ..figures.color_range import ColorRange, error_range, even_range
+from ..figures.evaluate import FACE_COLORS, MAP, all_grids, distortions, error_on, face_labels, points_on, solution_on
+from ..figures.render import widest_view
 
 if TYPE_CHECKING:
     from solve import Solution
 
-    from .sampling import Problem
+    from ..figures.evaluate import Problem
 
 SAMPLES = 81  # a direction and patch
 TILT = 0.45  # radians: more than one side is seen

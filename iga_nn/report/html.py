@@ -14,11 +14,11 @@ from typing import Any
 
 from parameterize.files import save_text
 
-from . import report as reports
+from ..options import one_line
+from . import document as reports
 from .advice import in_words
-from .options import one_line
-from .report import Report
-from .scene import Scene
+from .document import Report
+from .viewer import Scene
 
 log = logging.getLogger(__name__)
 

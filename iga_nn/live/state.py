@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from parameterize.arrays import Array
 from parameterize.surface.surface import Surface
 
-from .folder import has_checkpoint
-from .jobs import Job
-from .sampling import FACE_COLORS
+from ..figures.evaluate import FACE_COLORS
+from ..workflow.output_folder import has_checkpoint
+from .queue import Job
 
 MEGABYTE = 1 << 20
 STAGES = {

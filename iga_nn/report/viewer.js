@@ -1,5 +1,5 @@
 "use strict";
-// Draws the scene of report.html (see scene.py) with WebGL 2: parallel projection, drag to turn, no library.
+// Draws the scene of report.html (see viewer.py) with WebGL 2: parallel projection, drag to turn, no library.
 
 const VERTEX_SHADER = `#version 300 es
 in vec3 place, normal;

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from .options import InputError, MapOptions, PoissonOptions, input_errors
+from ..options import InputError, MapOptions, PoissonOptions, input_errors
 
 INSTALL = "pip install 'iga-nn[app]'"
 
@@ -33,7 +33,7 @@ def serve(
     if max_upload < 1:
         raise InputError(f"max upload {max_upload}: must be at least 1 megabyte")
     try:
-        from .app_server import Page
+        from .server import Page
     except ModuleNotFoundError as error:
         package = (error.name or "trame").partition(".")[0]
         raise InputError(f"the live page needs {package}, which is not installed: {INSTALL}") from None

@@ -11,9 +11,9 @@ import numpy as np
 from parameterize.spline.volume import BSplineVolume
 
 from .color_range import error_range, even_range
-from .figure import PANEL, SAMPLES, color_bar, colors, panels_of, save, show_around
-from .rendering import Patch, draw, widest_view
-from .sampling import SECTIONS, all_grids, points_on, sampled_error, solution_on
+from .evaluate import SECTIONS, all_grids, points_on, sampled_error, solution_on
+from .render import Patch, draw, widest_view
+from .style import PANEL, SAMPLES, color_bar, colors, panels_of, save, show_around
 
 if TYPE_CHECKING:
     from solve import Elasticity, Poisson, Solution

@@ -18,12 +18,8 @@ from parameterize.files import save_text
 from parameterize.spline.volume import BSplineVolume
 from solve.forms.frame import UnitFrame
 
-from . import studies
-from .command import command_line, gives_the_same
-from .folder import SOLUTION_FILES, STUDY_FILES, Outcome, RunFolder, open_folder
-from .formats import load_volume
-from .mapping import load, map_surface
-from .options import (
+from ..io.formats import load_volume
+from ..options import (
     InputError,
     MapOptions,
     PoissonOptions,
@@ -33,6 +29,10 @@ from .options import (
     input_errors,
     one_line,
 )
+from ..report import tables as studies
+from .output_folder import SOLUTION_FILES, STUDY_FILES, Outcome, RunFolder, open_folder
+from .repeat import command_line, gives_the_same
+from .train import load, map_surface
 from .verdict import certified_facts, write_certificate
 
 if TYPE_CHECKING:
@@ -260,12 +260,12 @@ def _finish(
     equation: Poisson | Elasticity | None = None,
 ) -> Outcome:
     """Close the report, and write the page that shows it; without a view where that cannot be drawn."""
-    from . import page
+    from ..report import html as page
 
     scene = None
     with state.timed("report"):
         try:
-            from .scene import scene_of
+            from ..report.viewer import scene_of
 
             scene = scene_of(volume, solution, equation)
         except Exception as error:  # no figure ends a run

@@ -15,8 +15,8 @@ from typing import Any
 
 from parameterize.files import unfinished
 
-from . import report as reports
-from .options import InputError, one_line
+from ..options import InputError, one_line
+from ..report import document as reports
 
 log = logging.getLogger(__name__)
 
@@ -62,13 +62,13 @@ class RunFolder:
         self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
 
     def draw(self, draw: Callable[[Any], dict[str, str]]) -> None:
-        """Figures by functions of plotting.py, timed; importing matplotlib and VTK takes part of it.
+        """Figures by functions of iga_nn.figures, timed; importing matplotlib and VTK takes part of it.
 
         Those that fail are listed in the report as `not_drawn`, with the reason.
         """
         with self.timed("report"):
             try:
-                from . import plotting
+                from .. import figures as plotting
 
                 self.note_failures(draw(plotting))
             except Exception as error:  # matplotlib itself is missing, say: whatever it is, it ends no run

@@ -12,10 +12,10 @@ from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import BSplineVolume
 
 from .color_range import ColorRange
-from .figure import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, view_of
-from .octant import best_cut, face_patches, octant_label, section_patches, without_octant
-from .rendering import Patch, draw, widest_view
-from .sampling import SECTIONS, all_grids, distortions, face_grid, face_window, points_on, section_grid
+from .cutaway import best_cut, face_patches, octant_label, section_patches, without_octant
+from .evaluate import SECTIONS, all_grids, distortions, face_grid, face_window, points_on, section_grid
+from .render import Patch, draw, widest_view
+from .style import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, view_of
 
 EVERY = 14  # samples between two parameter lines: a tenth of the cube
 DISTORTION = "tanh(√ARAP / 2), at volume 1"

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .figure import blank, positive, save
-from .sampling import FACE_COLORS
-from .studies import Study
+from ..report.tables import Study
+from .evaluate import FACE_COLORS
+from .style import blank, positive, save
 
 TERMS = {  # of the loss, as parameterize names them
     "arap": "ARAP distortion",

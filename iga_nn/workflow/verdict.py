@@ -10,10 +10,10 @@ from typing import Any
 from parameterize.arrays import in_brackets
 from parameterize.spline.volume import BSplineVolume
 
-from . import advice
-from . import report as reports
-from .folder import RunFolder
-from .options import MapOptions
+from ..options import MapOptions
+from ..report import advice
+from ..report import document as reports
+from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 

@@ -20,8 +20,8 @@ Our own files are NumPy archives without pickles. volume.npz holds, in the units
 True
 
 A solution, a number or a displacement of three, goes with its volume into every foreign format: `vtk` and `view` hold
-it as the point data `u`; of the others it becomes a second file beside the volume's. `spline_files` explains G+Smo XML,
-MFEM meshes and splinepy's JSON, which are read, too; `vtk_files` those for ParaView.
+it as the point data `u`; of the others it becomes a second file beside the volume's. `io.splinepy` explains G+Smo XML,
+MFEM meshes and splinepy's JSON, which are read, too; `io.vtk` those for ParaView.
 IGES and STEP know no trivariate splines, so they are not among them.
 """
 
@@ -36,15 +36,15 @@ from parameterize.files import replacing
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS
 
-from . import report as reports
-from . import spline_files
-from .options import InputError, input_errors
-from .spline_gate import kind_of
+from ..options import InputError, input_errors
+from ..report import document as reports
+from . import splinepy as spline_files
+from .splinepy_gate import kind_of
 
 if TYPE_CHECKING:
     from solve.field import SplineField
 
-    from .sampling import Problem
+    from ..figures.evaluate import Problem
 
 ENDINGS = {
     "gismo": ".xml",
@@ -130,7 +130,7 @@ def export(
 
 
 def _write(path: Path, to: str, volume: BSplineVolume, field: SplineField | None, problem: Problem | None) -> None:
-    from . import vtk_files
+    from . import vtk as vtk_files
 
     match to:
         case "gismo":

@@ -1,6 +1,6 @@
 """The live page's parts, as trame's widgets; what is in double braces or a tuple is evaluated in the browser.
 
-State: `jobs`, rows of app_view.row; `current`, the job a new tab shows; `shown`, the one this tab's user chose; for
+State: `jobs`, rows of state.row; `current`, the job a new tab shows; `shown`, the one this tab's user chose; for
 each job `points_N`, `polys_N` and `colors_N` for vtk.js (get(name) gives Vue's reference to a state, hence `.value`).
 """
 
@@ -12,14 +12,15 @@ from typing import Any
 from trame.ui.html import DivLayout
 from trame.widgets import client, html, vtk
 
-from .app_view import MEGABYTE
-from .samples import SAMPLES
+from ..samples import SAMPLES
+from .state import MEGABYTE
 
 
 def lay_out(server: Any, limit: int) -> None:
     """The whole page; limit: bytes an upload may have."""
     here = files(__package__)
-    css = "".join((here / name).read_text(encoding="utf-8") for name in ("page.css", "app.css"))
+    sheets = (files("iga_nn.report") / "page.css", here / "app.css")
+    css = "".join(sheet.read_text(encoding="utf-8") for sheet in sheets)
     with DivLayout(server):
         client.Style(css)
         client.Script((here / "app.js").read_text(encoding="utf-8"))

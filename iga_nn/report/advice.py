@@ -11,13 +11,13 @@ from parameterize.certificate.jacobian import Certificate
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import BSplineVolume
 
-from .options import MAX_CONTROL_POINTS
-from .report import Report, is_certified
+from ..options import MAX_CONTROL_POINTS
+from .document import Report, is_certified
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .options import MapOptions
+    from ..options import MapOptions
 
 SHOWN = 5  # places
 

@@ -23,9 +23,9 @@ from parameterize.progress import Progress
 from parameterize.surface.surface import MeshError
 from solve.forms.formula import ExpressionError
 
-from . import pipeline
-from .console import LOGGERS
-from .options import InputError, MapOptions, PoissonOptions, one_line
+from ..cli.progress import LOGGERS
+from ..options import InputError, MapOptions, PoissonOptions, one_line
+from ..workflow import pipeline
 
 INTERVAL = 0.4  # seconds between two steps that are told
 SHARE = 0.05  # of the job's time, at most, goes into telling them

@@ -1,0 +1,1 @@
+"""Runs the command line: commands, options, exit codes and progress."""

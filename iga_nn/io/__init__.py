@@ -1,0 +1,1 @@
+"""Reads and writes spline volumes in the file formats of other programs."""

@@ -1,0 +1,1 @@
+"""Serves the live page, which runs jobs in a queue and shows them in the browser."""

@@ -1,0 +1,1 @@
+"""Carries a run from the surface to the finished output folder."""
