@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 from shapes import ball as round_surface
-from test_mesh import ACCEPTED, CUBE, QUADS, REFUSED, TRIANGLES, ball, binary_stl, joined, obj, ply
+from test_surface import ACCEPTED, CUBE, QUADS, REFUSED, TRIANGLES, ball, binary_stl, joined, obj, ply
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import pytest
 from browser import running
 from matplotlib.colors import rgb_to_hsv, to_rgb
 from shapes import ball
-from test_mesh import CUBE, TRIANGLES, obj
+from test_surface import CUBE, TRIANGLES, obj
 
 import iga_nn
 from iga_nn.cli.commands import main
