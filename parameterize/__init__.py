@@ -75,7 +75,8 @@ det J > 0 makes F one-to-one near every point, and with a boundary that does not
 >>> bool(np.linalg.det(pushed.jacobian([certify(pushed).witness]))[0] < 0.0)
 True
 
-The names below are loaded on first use. None of them brings in torch: only `parameterize.run` does, with the training.
+The names below are loaded on first use. Only `parameterize` and `Parameterization` bring in torch, for
+the training.
 """
 
 from __future__ import annotations
@@ -88,6 +89,7 @@ if TYPE_CHECKING:
     from .config import Config, preset
     from .cube.boundary_map import BoundaryMap
     from .quality.quality import QualityReport, measure
+    from .run import Parameterization, parameterize
     from .spline.volume import BSplineVolume
     from .surface.surface import MeshError, Surface, load_surface, surface_from_arrays
 
@@ -97,11 +99,13 @@ _HOME = {
     "Certificate": "certificate.jacobian",
     "Config": "config",
     "MeshError": "surface.surface",
+    "Parameterization": "run",
     "QualityReport": "quality.quality",
     "Surface": "surface.surface",
     "certify": "certificate.jacobian",
     "load_surface": "surface.surface",
     "measure": "quality.quality",
+    "parameterize": "run",
     "preset": "config",
     "surface_from_arrays": "surface.surface",
 }
@@ -112,11 +116,13 @@ __all__ = [
     "Certificate",
     "Config",
     "MeshError",
+    "Parameterization",
     "QualityReport",
     "Surface",
     "certify",
     "load_surface",
     "measure",
+    "parameterize",
     "preset",
     "surface_from_arrays",
 ]
