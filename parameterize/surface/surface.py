@@ -24,7 +24,6 @@ __all__ = ["MAX_FACES", "MeshError", "Surface", "load_surface", "surface_from_ar
 
 MAX_FACES = 500_000
 USUAL_SIZES = (1e-6, 1e6)
-GRID = 2.0**-24  # of the box's longest side: less than single precision, in which networks train, tells apart
 logger = logging.getLogger(__name__)
 
 
@@ -35,8 +34,8 @@ class Surface:
     name: the input's stem. vertices: (n, 3), user's units. faces: (m, 3) vertex numbers. source: path as given, "" for
     arrays. sha256: of the file's bytes, or of the arrays. notices: what was mended or is doubtful, one line each.
     scale, center: to_unit(x) = scale * (x - center) + 1/2 gives volume 1 and puts the deepest interior point at
-    (1/2, 1/2, 1/2). unit_vertices: the vertices (n, 3) placed so, after rounding them to multiples of GRID: the same
-    surface in another unit or at another place then gives the same numbers, and with them the same map.
+    (1/2, 1/2, 1/2). unit_vertices: the vertices (n, 3) placed so and rounded to single precision, in which networks
+    train: the same surface in another unit or at another place then gives the same numbers, and with them the same map.
     crossings: (k, 2) pairs of faces that intersect.
     """
 
@@ -183,9 +182,9 @@ def _gate(
     crossings = crossing_faces(points, triangles)
     if len(crossings):
         doubts.append(describe_crossings(vertices[kept], triangles, crossings))
-    points = GRID * np.rint(points / GRID)
     deepest, _ = deepest_point(points, triangles)
     unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
+    placed = unit_scale * (points - deepest) + 0.5
     return Surface(
         name=name,
         vertices=vertices[kept],
@@ -195,7 +194,7 @@ def _gate(
         notices=(*notices, *remarks, *mended, *chosen, *turned, *doubts),
         scale=unit_scale / size,
         center=deepest * size + middle,
-        unit_vertices=unit_scale * (points - deepest) + 0.5,
+        unit_vertices=placed.astype(np.float32).astype(np.float64),
         crossings=crossings,
     )
 
