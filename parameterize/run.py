@@ -23,9 +23,10 @@ from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap
 from .cube.correspondence import boundary_map
+from .cube.cube import nearest_faces
 from .cube.cutting import subdivide_long_edges
 from .cube.edge_paths import PathError, choose_corners
-from .cube.flips import flipped, sides, untangle
+from .cube.flips import flipped, untangle
 from .cube.tutte import Layout, lay_out
 from .history import History
 from .optimization.least_squares import fit_pairs
@@ -247,7 +248,7 @@ def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> 
         vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
         vertex_weights(layout.vertices, layout.faces, task.own),
         layout.places,
-        sides(layout.places),
+        nearest_faces(layout.places),
         layout.faces,
         device=task.device,
         given_corners=None if task.given_corners is None else task.vertices[task.given_corners],

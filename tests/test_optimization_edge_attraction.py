@@ -3,8 +3,7 @@ import pytest
 import torch
 from shapes import ball
 
-from parameterize.cube.edge_paths import CORNERS
-from parameterize.cube.flips import sides, snap
+from parameterize.cube.cube import CORNERS, nearest_faces, snap
 from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
 from parameterize.optimization.surface_distance import SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
@@ -24,7 +23,7 @@ def anchors_on_a_ball(radius=0.5, given_corners=None):
         vertex_quadrics(points, faces, TANGENTIAL),
         vertex_weights(points, faces, len(points)),
         snap(points),
-        sides(points),
+        nearest_faces(points),
         faces,
         device=torch.device("cpu"),
         given_corners=given_corners,

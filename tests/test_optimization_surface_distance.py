@@ -4,7 +4,8 @@ import torch
 from shapes import ball, rounded_cube
 
 from iga_nn.samples import sample
-from parameterize.cube.flips import flipped, snap
+from parameterize.cube.cube import snap
+from parameterize.cube.flips import flipped
 from parameterize.optimization.surface_distance import SurfaceFit, fold_over_edges
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume

@@ -13,7 +13,7 @@ from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig, preset
 from parameterize.cube.boundary_map import BoundaryMap
-from parameterize.cube.edge_paths import CORNERS
+from parameterize.cube.cube import CORNERS
 from parameterize.run import choose_device, corner_vertices, parameterize
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.training.trainer import start_map

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, IntArray
-from .bezier_patches import TANGENTS, Mask, Pieces, as_rows, contact
+from ..cube.cube import VARYING_AXES
+from .bezier_patches import Mask, Pieces, as_rows, contact
 
 _CHUNK = 4096  # pairs at a time
 _PLANES = 64  # steps towards a separating plane
@@ -69,7 +70,7 @@ def _turned(
     pieces: Pieces, rows: NDArray[np.int64], along: NDArray[np.int64], edge: NDArray[np.int64], *, edge_last: bool
 ) -> Array:
     """Nets whose axis 2 runs `along` the shared edge, and which have it last, or first, on axis 1."""
-    nets, tangents = pieces.nets[rows], TANGENTS[pieces.axes[rows]]
+    nets, tangents = pieces.nets[rows], VARYING_AXES[pieces.axes[rows]]
     swap = tangents[:, 0] == along
     nets = np.where(swap[:, None, None, None], nets.swapaxes(1, 2), nets)
     across = np.where(swap, tangents[:, 1], tangents[:, 0])[:, None]
@@ -89,7 +90,7 @@ def _corner_proof(pieces: Pieces, first: NDArray[np.int64], second: NDArray[np.i
 def _corner_last(pieces: Pieces, rows: NDArray[np.int64], corner: NDArray[np.int64]) -> Array:
     """Control points (n, (q + 1)^2, 3), the one at the shared corner last."""
     nets = pieces.nets[rows]
-    at_high = np.take_along_axis(pieces.high[rows] == corner, TANGENTS[pieces.axes[rows]], axis=1)
+    at_high = np.take_along_axis(pieces.high[rows] == corner, VARYING_AXES[pieces.axes[rows]], axis=1)
     nets = np.where(at_high[:, 0, None, None, None], nets, nets[:, ::-1])
     nets = np.where(at_high[:, 1, None, None, None], nets, nets[:, :, ::-1])
     return as_rows(nets)

@@ -9,8 +9,9 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..spline.volume import BSplineVolume
 from .boundary_map import BoundaryMap
+from .cube import snap
 from .cutting import CutMesh, cut_along_rays
-from .flips import snap, untangle
+from .flips import untangle
 
 _SAME = 1e-7  # share of a mesh edge: cuts this close to a vertex take the vertex, which NEAR_EDGE then puts on the edge
 _NUDGE, _NUDGES = 1e-4, 10

@@ -7,27 +7,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..arrays import Array, IntArray
+from .cube import snap
 
-NEAR_EDGE = 1e-5  # places closer than this to an edge of the cube are put on it: no slivers from later cuts
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
 _SWEEPS = 600
 _PATIENCE = 60
 _UNDO_ROUNDS = 20
-
-
-def snap(parameters: Array) -> Array:
-    """Radially onto the cube's boundary, and onto an edge or corner where within NEAR_EDGE of it."""
-    centred = parameters - 0.5
-    scaled = centred / (2.0 * np.abs(centred).max(axis=1, keepdims=True))
-    at_side = np.abs(scaled) >= 0.5 - NEAR_EDGE
-    return np.where(at_side, 0.5 + 0.5 * np.sign(scaled), 0.5 + scaled)
-
-
-def sides(places: Array) -> IntArray:
-    """The cube face of each place (n, 3), numbered u0, u1, v0, v1, w0, w1; one of them on an edge: (n,)."""
-    centred = places - 0.5
-    axis = np.abs(centred).argmax(axis=1)
-    return 2 * axis + (centred[np.arange(len(axis)), axis] > 0.0)
 
 
 def flipped(places: Array, faces: IntArray) -> NDArray[np.bool_]:

@@ -9,13 +9,11 @@ crosses itself beside them.
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from torch import Tensor
 
 from ..arrays import Array
-from ..cube.flips import sides
+from ..cube.cube import CORNERS, EDGES, nearest_faces
 from ..quality.distances import nearest_on_mesh
 from ..spline.bspline import divided_spans
 from .surface_distance import SurfaceFit
@@ -29,12 +27,10 @@ _GIVEN = 0.5  # weight of a given corner, where the distance along the normal ha
 def edge_points(knots: tuple[Array, Array, Array]) -> Array:
     """Parameters (k, 3): the corners of the cube, the ends of the spans along its edges and their middles."""
     points = []
-    for axis in range(3):
-        along = divided_spans(knots[axis], _A_SPAN)
-        for side in product((0.0, 1.0), repeat=2):
-            rows: list[Array | float] = [*side]
-            rows.insert(axis, along)
-            points.append(np.stack(np.broadcast_arrays(*rows), axis=1))
+    for i, j in EDGES:
+        direction = CORNERS[j] - CORNERS[i]
+        along = divided_spans(knots[int(direction.argmax())], _A_SPAN)
+        points.append(CORNERS[i] + along[:, None] * direction)
     return np.unique(np.concatenate(points), axis=0)
 
 
@@ -52,7 +48,7 @@ class EdgeAnchors:
             np.zeros((count, 3, 3)),
             np.full(count, 1.0 / count),
             places,
-            sides(places),
+            nearest_faces(places),
             np.zeros((0, 3), dtype=np.int64),
             device=surface.device,
         )

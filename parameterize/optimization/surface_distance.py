@@ -19,7 +19,8 @@ from scipy.sparse import csr_array
 from torch import Tensor
 
 from ..arrays import Array, IntArray
-from ..cube.flips import new_flips, sides, untangle
+from ..cube.cube import axis_and_side, face_number, nearest_faces, tangent_axes
+from ..cube.flips import new_flips, untangle
 from ..spline.bspline import basis_derivatives, breakpoints
 from ..surface.geometry import vertex_normals
 from .cg import Operator
@@ -116,7 +117,7 @@ class SurfaceFit:
         rows = self._slopes()
         indices, _, d_a, d_b = rows
         _, ta, tb = _contracted(rows, control)
-        normals = np.where(self.cube_faces % 2 == 1, 1.0, -1.0)[:, None] * self._normals
+        normals = np.where(axis_and_side(self.cube_faces)[1] == 1, 1.0, -1.0)[:, None] * self._normals
         low = np.einsum("nc,nc->n", np.cross(ta, tb), normals) < _WATCHED * floor
         self._facing = facing_penalty(
             indices[low],
@@ -153,7 +154,7 @@ class SurfaceFit:
         residual = values - self.points
         step = -_solve_2x2(ta, tb, residual)
         step *= np.minimum(1.0, max_step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
-        a, b = _face_axes(self.cube_faces)
+        a, b = tangent_axes(axis_and_side(self.cube_faces)[0])
         moved = self.parameters.copy()
         rows = np.arange(len(moved))
         moved[rows, a] += step[:, 0]
@@ -180,7 +181,7 @@ class SurfaceFit:
         """Lay flipped triangles out anew, within a few sweeps: what sliding tangles must not pile up."""
         places = untangle(self.parameters, self.triangles, sweeps)
         moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
-        self._keep(places, sides(places), moved)
+        self._keep(places, nearest_faces(places), moved)
 
     def _keep(self, parameters: Array, cube_faces: IntArray, chosen: NDArray[np.bool_]) -> None:
         """Take these parameters for the chosen points."""
@@ -201,8 +202,8 @@ class SurfaceFit:
         values = np.stack([t[1] for t in tables])  # (3, 2, N, p + 1)
         sizes = [len(k) - self.degree - 1 for k in self.knots]
         stride = np.array([sizes[1] * sizes[2], sizes[2], 1])
-        axis, side = self.cube_faces // 2, self.cube_faces % 2
-        a, b = _face_axes(self.cube_faces)
+        axis, side = axis_and_side(self.cube_faces)
+        a, b = tangent_axes(axis)
         rows = np.arange(len(axis))
         window = np.arange(self.degree + 1)
         base = side * (np.array(sizes)[axis] - 1) * stride[axis]
@@ -243,12 +244,6 @@ def _contracted(rows: tuple[IntArray, Array, Array, Array], control: Tensor) -> 
     return value, along_a, along_b
 
 
-def _face_axes(cube_faces: IntArray) -> tuple[IntArray, IntArray]:
-    """The two parametric directions within each face."""
-    axis = cube_faces // 2
-    return (axis + 1) % 3, (axis + 2) % 3
-
-
 def _solve_2x2(ta: Array, tb: Array, residual: Array) -> Array:
     """Least-squares coefficients (N, 2) of the residual in the tangents, slightly damped."""
     aa, bb, ab = (ta * ta).sum(1), (tb * tb).sum(1), (ta * tb).sum(1)
@@ -264,12 +259,12 @@ def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, Int
     parameters, cube_faces = parameters.copy(), cube_faces.copy()
     rows = np.arange(len(parameters))
     outside = np.maximum(-parameters, parameters - 1.0)  # (N, 3), positive beyond a side
-    outside[rows, cube_faces // 2] = -1.0
+    constant, side = axis_and_side(cube_faces)
+    outside[rows, constant] = -1.0
     axis = outside.argmax(axis=1)
     overshoot = outside[rows, axis]
     crossed = rows[overshoot > 0.0]
-    old_axis, side = cube_faces[crossed] // 2, cube_faces[crossed] % 2
-    inwards = np.where(side == 1, 1.0 - overshoot[crossed], overshoot[crossed])
-    parameters[crossed, old_axis] = inwards
-    cube_faces[crossed] = 2 * axis[crossed] + (parameters[crossed, axis[crossed]] > 0.5)
+    inwards = np.where(side[crossed] == 1, 1.0 - overshoot[crossed], overshoot[crossed])
+    parameters[crossed, constant[crossed]] = inwards
+    cube_faces[crossed] = face_number(axis[crossed], parameters[crossed, axis[crossed]] > 0.5)
     return np.clip(parameters, 0.0, 1.0), cube_faces

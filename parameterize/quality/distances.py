@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
+from ..cube.cube import axis_and_side
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import doubled_areas
 
@@ -56,11 +57,10 @@ class SampledBoundary:
         a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
         face = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
         parameters, points = [], []
-        for axis in range(3):
-            for side in (0.0, 1.0):
-                u, v, w = (np.array([side]) if k == axis else row for k in range(3))
-                parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
-                points.append(volume.grid(u, v, w).reshape(-1, 3))
+        for axis, side in map(axis_and_side, range(6)):
+            u, v, w = (np.array([float(side)]) if k == axis else row for k in range(3))
+            parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
+            points.append(volume.grid(u, v, w).reshape(-1, 3))
         triangles = np.concatenate([face + k * samples**2 for k in range(6)])
         return cls(np.concatenate(parameters), np.concatenate(points), triangles.astype(np.int64))
 
@@ -97,7 +97,7 @@ def foot_points(
     corners = boundary.triangles[triangle]  # (m, 3)
     where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
     cube_face = 6 * triangle // len(boundary.triangles)
-    axis = cube_face // 2  # the direction that is constant on the face
+    axis, _ = axis_and_side(cube_face)
     where[np.arange(len(where)), axis] = boundary.parameters[corners[:, 0]][np.arange(len(where)), axis]
     best: Array = np.linalg.norm(volume(where) - points, axis=1)
     active = np.arange(len(points))

@@ -16,7 +16,8 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
-from ..cube.edge_paths import CORNERS, CubeSurface, PathError, choose_corners, cut_surface, edge_targets
+from ..cube.cube import CORNERS
+from ..cube.edge_paths import CubeSurface, PathError, choose_corners, cut_surface, edge_targets
 from ..history import History
 from ..progress import Progress, ProgressCallback, ignore
 from . import losses
