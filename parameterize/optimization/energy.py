@@ -16,7 +16,7 @@ from ..config import SplineConfig
 from .cg import Operator, conjugate_gradients
 from .determinant_penalty import SpanBarrier
 from .edge_attraction import EdgeAnchors
-from .polar import closest_rotation, cofactor, cross, least_eigenvalue
+from .polar import closest_rotation, cofactor_and_determinant, cross, least_eigenvalue
 from .surface_distance import SurfaceFit
 from .tensor_product import BendingOperator, FastDiagonalization, gauss_grid, grams
 
@@ -53,8 +53,7 @@ class DistortionEnergy:
         config, weights = self._config, self._weights
         jacobian = self._grid.jacobian(control)
         flat = jacobian.flatten(2)  # (3, 3, m)
-        cofactors = cofactor(flat)
-        det = (flat[0] * cofactors[0]).sum(0)
+        cofactors, det = cofactor_and_determinant(flat)
         shortfall = weights * (config.min_det - det).clamp_min(0.0)
         gap = flat - closest_rotation(flat)
         density = gap.square().sum(dim=(0, 1))
@@ -75,9 +74,8 @@ class DistortionEnergy:
         jacobian = self._rough_grid.jacobian(control.to(_ROUGH))
         flat = jacobian.flatten(2)
         rotation = closest_rotation(flat)
-        cofactors = cofactor(flat)
-        low = (flat[0] * cofactors[0]).sum(0) < config.min_det
-        push = (2.0 * penalty * weights * low).sqrt() * cofactors
+        cofactors, det = cofactor_and_determinant(flat)
+        push = (2.0 * penalty * weights * (det < config.min_det)).sqrt() * cofactors
         gap = flat - rotation
         excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
         pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
@@ -105,8 +103,8 @@ def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
     lift = (2.0 - least_eigenvalue(sums)).clamp_min(0.0)
     for i in range(3):
         sums[i, i] += lift
-    inverse = cofactor(sums)
-    return inverse / (sums[0] * inverse[0]).sum(0)
+    cofactors, det = cofactor_and_determinant(sums)  # of a symmetric matrix
+    return cofactors / det
 
 
 class SplineEnergy:

@@ -2,7 +2,7 @@
 
 A boundary that runs back over itself may have det J > 0 everywhere: the part in between faces inwards, and the closest
 points of the mesh cannot be one-to-one on it. What is asked for is (t_a x t_b) . n >= floor at the surface points, t_a
-and t_b the tangents of F along the cube's face and n the mesh's normal (the paper's normal term, eq. 12, one-sided).
+and t_b the tangents of F along the cube's face and n the mesh's normal (one-sided, unlike L_norm, section 4.4.1).
 """
 
 from __future__ import annotations
@@ -11,25 +11,24 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from scipy.sparse import csr_array
 from torch import Tensor
 
 from ..arrays import Array, IntArray
+from ..spline.bspline import sparse_rows
 from .cg import Operator
 from .polar import cross
-from .tensor_product import to_torch
+from .tensor_product import ControlRows
 
 
 @dataclass(frozen=True, eq=False)
 class FacingPenalty:
     """Sum of weight (floor - (t_a x t_b) . n)_+^2 over k points.
 
-    along: matrices (k, control points) of t_a and t_b; normals (3, k), pointing out of the cube where (a, b, outwards)
-    is right-handed and into it elsewhere; weights (k,).
+    tangents: rows that yield t_a and t_b at the points; normals (3, k), pointing out of the cube where
+    (a, b, outwards) is right-handed and into it elsewhere; weights (k,).
     """
 
-    along: tuple[Tensor, Tensor]
-    back: tuple[Tensor, Tensor]  # their transposes
+    tangents: tuple[ControlRows, ControlRows]
     normals: Tensor
     weights: Tensor
     floor: float
@@ -48,27 +47,24 @@ class FacingPenalty:
         scale = 2.0 * single.weights * (size < self.floor)
 
         def product(x: Tensor) -> Tensor:
-            flat = x.reshape(3, -1).T
-            a, b = ((matrix @ flat).T for matrix in single.along)
+            a, b = (rows(x).T for rows in single.tangents)
             return single._pull(scale * ((by_a * a).sum(0) + (by_b * b).sum(0)), by_a, by_b, x)
 
         return product
 
     def _slopes(self, control: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """(t_a x t_b) . n, last, after its derivatives in t_a and t_b: (3, k) each."""
-        flat = control.reshape(3, -1).T
-        a, b = ((matrix @ flat).T for matrix in self.along)
+        a, b = (rows(control).T for rows in self.tangents)
         by_a, by_b = cross(b[None], self.normals[None])[0], cross(self.normals[None], a[None])[0]
         return by_a, by_b, (a * by_a).sum(0)
 
     def _pull(self, factor: Tensor, by_a: Tensor, by_b: Tensor, like: Tensor) -> Tensor:
-        pulled = self.back[0] @ (factor * by_a).T + self.back[1] @ (factor * by_b).T
-        return pulled.T.reshape(like.shape)
+        along_a, along_b = self.tangents
+        return along_a.adjoint((factor * by_a).T, like) + along_b.adjoint((factor * by_b).T, like)
 
     def _to(self, dtype: torch.dtype) -> FacingPenalty:
-        along = tuple(m.to(dtype) for m in self.along)
-        back = tuple(m.to(dtype) for m in self.back)
-        return FacingPenalty(along, back, self.normals.to(dtype), self.weights.to(dtype), self.floor)  # type: ignore[arg-type]
+        along_a, along_b = (rows.to(dtype) for rows in self.tangents)
+        return FacingPenalty((along_a, along_b), self.normals.to(dtype), self.weights.to(dtype), self.floor)
 
 
 def facing_penalty(
@@ -81,13 +77,9 @@ def facing_penalty(
     device: torch.device,
 ) -> FacingPenalty:
     """From the control points (k, c) of each of k points, their weights in t_a and t_b (k, c), and normals (k, 3)."""
-    starts = np.arange(0, indices.size + 1, indices.shape[1])
-    rows = [csr_array((s.ravel(), indices.ravel(), starts), shape=(len(indices), count)) for s in slopes]
-    a, b = (to_torch(r, device) for r in rows)
-    back_a, back_b = (to_torch(csr_array(r.T), device) for r in rows)
+    along_a, along_b = (ControlRows.of(sparse_rows(slope, indices, count), device) for slope in slopes)
     return FacingPenalty(
-        (a, b),
-        (back_a, back_b),
+        (along_a, along_b),
         torch.as_tensor(np.ascontiguousarray(normals.T), device=device),
         torch.as_tensor(weights, device=device),
         floor,

@@ -15,17 +15,16 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
-from scipy.sparse import csr_array
 from torch import Tensor
 
 from ..arrays import Array, IntArray
 from ..cube.cube import axis_and_side, face_number, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, untangle
-from ..spline.bspline import basis_derivatives, breakpoints
+from ..spline.bspline import basis_derivatives, breakpoints, sparse_rows
 from ..surface.geometry import vertex_normals
 from .cg import Operator
 from .normals import FacingPenalty, facing_penalty
-from .tensor_product import to_torch
+from .tensor_product import ControlRows
 
 _HALVINGS = 3
 _WATCHED = 3.0  # times the floor: points below may fall under it in the next step
@@ -66,10 +65,7 @@ class SurfaceFit:
         self.parameters, self.cube_faces = parameters, cube_faces
         indices, values = self._values()
         count = int(np.prod([len(k) - self.degree - 1 for k in self.knots]))
-        starts = np.arange(0, indices.size + 1, indices.shape[1])
-        rows = csr_array((values.ravel(), indices.ravel(), starts), shape=(len(values), count))
-        columns = csr_array(rows.T)
-        self._matrix, self._transposed = (to_torch(m, self.device) for m in (rows, columns))
+        self._rows = ControlRows.of(sparse_rows(values, indices, count), self.device)
 
     def aim(self, points: Array, quadrics: Array) -> None:
         """Take other points (N, 3) and quadrics (N, 3, 3)."""
@@ -97,18 +93,16 @@ class SurfaceFit:
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """Sum of r^T Q r at the present parameters and its gradient (3, n_u, n_v, n_w)."""
-        residual = self._apply(control) - self._points  # (N, 3)
+        residual = self._rows(control) - self._points  # (N, 3)
         pulled = (self._metric @ residual[:, :, None])[:, :, 0]
-        return float((residual * pulled).sum()), 2.0 * self._apply_transposed(pulled, control)
+        return float((residual * pulled).sum()), 2.0 * self._rows.adjoint(pulled, control)
 
     def hessian(self, dtype: torch.dtype) -> Operator:
         """Second derivative of the energy, parameters held, as an operator on (3, n_u, n_v, n_w)."""
-        matrix, transposed = self._matrix.to(dtype), self._transposed.to(dtype)
-        metric = 2.0 * self._metric.to(dtype)
+        rows, metric = self._rows.to(dtype), 2.0 * self._metric.to(dtype)
 
         def product(direction: Tensor) -> Tensor:
-            moved = matrix @ direction.reshape(3, -1).T
-            return (transposed @ (metric @ moved[:, :, None])[:, :, 0]).T.reshape(direction.shape)
+            return rows.adjoint((metric @ rows(direction)[:, :, None])[:, :, 0], direction)
 
         return product
 
@@ -141,7 +135,7 @@ class SurfaceFit:
 
     def residuals(self, control: Tensor) -> Array:
         """F(p) - v: (N, 3)."""
-        return np.asarray((self._apply(control) - self._points).cpu())
+        return np.asarray((self._rows(control) - self._points).cpu())
 
     def slide(self, control: Tensor, max_step: float, *, keep_layout: bool = False) -> None:
         """One Gauss-Newton step of every parameter towards the point of F's boundary closest to its surface point.
@@ -188,12 +182,6 @@ class SurfaceFit:
         self.place(
             np.where(chosen[:, None], parameters, self.parameters), np.where(chosen, cube_faces, self.cube_faces)
         )
-
-    def _apply(self, control: Tensor) -> Tensor:
-        return self._matrix @ control.reshape(3, -1).T
-
-    def _apply_transposed(self, dual: Tensor, like: Tensor) -> Tensor:
-        return (self._transposed @ dual).T.reshape(like.shape)
 
     def _window(self) -> _Window:
         """The functions that are not zero at the points."""
