@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..spline.volume import BSplineVolume
 from .boundary_map import BoundaryMap
+from .closest_point import damped_fit
 from .cube import snap
 from .cutting import CutMesh, cut_along_rays
 from .flips import untangle
@@ -17,6 +18,7 @@ _SAME = 1e-7  # share of a mesh edge: cuts this close to a vertex take the verte
 _NUDGE, _NUDGES = 1e-4, 10
 _SETTLE_STEPS = 8
 _UNDO_ROUNDS = 10
+_DAMPING = 1e-3  # against parallel directions
 _MARGIN = 1e-2  # share of a mesh edge that a cut keeps from its ends
 
 
@@ -65,7 +67,7 @@ def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameter
         where, carried = best.parameters[new], best.vertices
         along_mesh = carried[cut.parents[new, 1]] - carried[cut.parents[new, 0]]
         along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
-        shift, slide = _fit_two(along_mesh, along_cube, volume(where) - carried[new])
+        shift, slide = damped_fit(along_mesh, -along_cube, volume(where) - carried[new], _DAMPING)
         share, moved = cut.share.copy(), best.parameters.copy()
         share[new] = np.clip(share[new] + shift, _MARGIN, 1.0 - _MARGIN)
         moved[new] = np.where(inner, np.clip(where + slide[:, None], _MARGIN**2, 1.0 - _MARGIN**2), where)
@@ -79,13 +81,3 @@ def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameter
             trial.share[turned] = cut.share[turned]
             moved[turned] = best.parameters[turned]
     return best
-
-
-def _fit_two(first: Array, second: Array, right: Array) -> tuple[Array, Array]:
-    """Coefficients a, b (k,) that minimise |a first - b second - right|, damped against parallel directions."""
-    aa, bb, ab = (first * first).sum(1), (second * second).sum(1), -(first * second).sum(1)
-    ra, rb = (first * right).sum(1), -(second * right).sum(1)
-    damping = 1e-3 * (aa + bb) + 1e-300
-    aa, bb = aa + damping, bb + damping
-    determinant = aa * bb - ab * ab
-    return (bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant

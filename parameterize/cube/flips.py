@@ -15,10 +15,24 @@ _PATIENCE = 60
 _UNDO_ROUNDS = 20
 
 
+def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
+    """Return (p0 - c) . ((p1 - p0) x (p2 - p0)) of triangles (m, 3), c the cube's centre, and its rounding error: (m,).
+
+    The product is positive where a triangle faces outwards, seen from the centre. On a common face of the cube two of
+    the three components of the cross product vanish exactly.
+    """
+    p0, p1, p2 = np.moveaxis(places[faces], 1, 0)  # (m, 3) each
+    a, b = p1 - p0, p2 - p0
+    ahead = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
+    behind = a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+    triple = np.sum((p0 - 0.5) * (ahead - behind), axis=1)
+    noise = 8.0 * np.finfo(np.float64).eps * np.sum(np.abs(p0 - 0.5) * (np.abs(ahead) + np.abs(behind)), axis=1)
+    return triple, noise
+
+
 def flipped(places: Array, faces: IntArray) -> NDArray[np.bool_]:
-    """Which triangles (m, 3) do not face outwards, seen from the cube's centre: (m,)."""
-    a, b, c = np.moveaxis((places - 0.5)[faces], 1, 0)
-    return np.asarray(np.einsum("mi,mi->m", a, np.cross(b, c)) <= _FLAT)
+    """Return which triangles (m, 3) do not face outwards, with a margin for what later steps round: (m,)."""
+    return np.asarray(orientation(places, faces)[0] <= _FLAT)
 
 
 def new_flips(before: Array, after: Array, faces: IntArray) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from scipy.ndimage import binary_dilation
 from torch import Tensor
 
 from ..arrays import Array, IntArray
+from ..cube.closest_point import damped_fit
 from ..cube.cube import axis_and_side, face_number, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, untangle
 from ..spline.bspline import basis_derivatives, breakpoints, sparse_rows
@@ -26,6 +27,7 @@ from .cg import Operator
 from .normals import FacingPenalty, facing_penalty
 from .tensor_product import ControlRows
 
+_DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3
 _WATCHED = 3.0  # times the floor: points below may fall under it in the next step
 
@@ -146,7 +148,7 @@ class SurfaceFit:
         """
         values, ta, tb = _contracted(self._slopes(), control)
         residual = values - self.points
-        step = -_solve_2x2(ta, tb, residual)
+        step = -np.stack(damped_fit(ta, tb, residual, _DAMPING), axis=1)
         step *= np.minimum(1.0, max_step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
         a, b = tangent_axes(axis_and_side(self.cube_faces)[0])
         moved = self.parameters.copy()
@@ -230,16 +232,6 @@ def _contracted(rows: tuple[IntArray, Array, Array, Array], control: Tensor) -> 
     local = np.asarray(control.cpu()).reshape(3, -1).T[indices]  # (N, k, 3)
     value, along_a, along_b = (np.einsum("nk,nkc->nc", w, local) for w in weights)
     return value, along_a, along_b
-
-
-def _solve_2x2(ta: Array, tb: Array, residual: Array) -> Array:
-    """Least-squares coefficients (N, 2) of the residual in the tangents, slightly damped."""
-    aa, bb, ab = (ta * ta).sum(1), (tb * tb).sum(1), (ta * tb).sum(1)
-    damping = 1e-6 * (aa + bb)
-    aa, bb = aa + damping, bb + damping
-    ra, rb = (ta * residual).sum(1), (tb * residual).sum(1)
-    determinant = aa * bb - ab * ab
-    return np.stack([(bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant], axis=1)
 
 
 def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:

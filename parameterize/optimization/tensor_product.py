@@ -82,7 +82,7 @@ class TensorGrid:
         return TensorGrid(values, slopes, self.order)  # type: ignore[arg-type]
 
     def jacobian(self, control: Tensor) -> Tensor:
-        """Return J at control points (3, n_u, n_v, n_w, ...): (3, 3, m_u, m_v, m_w, ...), component, direction, grid."""
+        """Return J (component, direction, grid): (3, n_u, n_v, n_w, ...) -> (3, 3, m_u, m_v, m_w, ...)."""
         i, j, k = self.order
         values, slopes = self.values, self.slopes
         plain, by_i = along(values[i], control, i + 1), along(slopes[i], control, i + 1)
