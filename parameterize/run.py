@@ -23,7 +23,6 @@ from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap
 from .cube.correspondence import boundary_map
-from .cube.cube import nearest_faces
 from .cube.cutting import subdivide_long_edges
 from .cube.edge_paths import PathError, choose_corners
 from .cube.flips import flipped, untangle
@@ -31,6 +30,7 @@ from .cube.tutte import Layout, lay_out
 from .history import History
 from .optimization.least_squares import fit_pairs
 from .optimization.newton import Optimized, optimize
+from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
 from .progress import ProgressCallback, ignore
 from .quality.quality import QualityReport, measure
@@ -242,15 +242,10 @@ def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> 
     mapped = map_points(network, task.vertices, task.device, task.dtype)
     layout = _layout(mapped, corners, task)
     return SurfaceFit(
-        task.knots,
-        spline.degree,
+        SlidingParameters(task.knots, spline.degree, layout.places, layout.faces, device=task.device),
         layout.vertices,
         vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
         vertex_weights(layout.vertices, layout.faces, task.own),
-        layout.places,
-        nearest_faces(layout.places),
-        layout.faces,
-        device=task.device,
         given_corners=None if task.given_corners is None else task.vertices[task.given_corners],
     )
 
@@ -282,7 +277,7 @@ def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Te
         ]
     )
     return fit_pairs(
-        np.concatenate([mapped, fit.parameters]),
+        np.concatenate([mapped, fit.places.parameters]),
         np.concatenate([inside, vertices]),
         weights,
         task.knots,
@@ -296,16 +291,16 @@ def _in_users_units(
     found: Optimized, surface: Surface, task: _Task, fit: SurfaceFit
 ) -> tuple[BSplineVolume, BoundaryMap]:
     """The volume and its boundary map; the parameters are first brought close to this volume's closest points."""
-    spline = task.config.spline
+    places, longest = fit.places, 0.5 / task.config.spline.control_points
     for _ in range(_LAST_SLIDES):
-        fit.slide(found.control, 0.5 / spline.control_points)
-    fit.relax(_LAST_SWEEPS)
+        places.slide(found.control, fit.points, longest)
+    places.relax(_LAST_SWEEPS)
     for _ in range(_LAST_SLIDES):
-        fit.slide(found.control, 0.5 / spline.control_points, keep_layout=True)
+        places.slide(found.control, fit.points, longest, keep_layout=True)
     placed = _as_volume(found, task)
     volume = BSplineVolume(placed.degrees, placed.knots, surface.from_unit(placed.control_points))
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
-    return volume, boundary_map(volume, own, fit.triangles, fit.parameters)
+    return volume, boundary_map(volume, own, places.triangles, places.parameters)
 
 
 @contextmanager

@@ -13,9 +13,10 @@ import numpy as np
 from torch import Tensor
 
 from ..arrays import Array
-from ..cube.cube import CORNERS, EDGES, nearest_faces
+from ..cube.cube import CORNERS, EDGES
 from ..quality.distances import nearest_on_mesh
 from ..spline.bspline import divided_spans
+from .sliding import SlidingParameters
 from .surface_distance import SurfaceFit
 
 _A_SPAN = 2
@@ -39,24 +40,15 @@ class EdgeAnchors:
 
     def __init__(self, surface: SurfaceFit, tangential: float) -> None:
         self._surface, self._tangential = surface, tangential
-        places = edge_points(surface.knots)
-        count = len(places)
-        self.fit = SurfaceFit(
-            surface.knots,
-            surface.degree,
-            places,
-            np.zeros((count, 3, 3)),
-            np.full(count, 1.0 / count),
-            places,
-            nearest_faces(places),
-            np.zeros((0, 3), dtype=np.int64),
-            device=surface.device,
-        )
+        knots, degree, device = surface.places.knots, surface.places.degree, surface.places.device
+        points, no_triangles = edge_points(knots), np.zeros((0, 3), dtype=np.int64)
+        places = SlidingParameters(knots, degree, points, no_triangles, device=device)
+        self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
     def near(self, control: Tensor) -> bool:
         """Whether F is so close to the surface all along the edges that the nearest points are the right ones."""
         here, points, _ = self._nearest(control)
-        longest = _NEAR / (min(control.shape[1:]) - self.fit.degree)
+        longest = _NEAR / (min(control.shape[1:]) - self.fit.places.degree)
         return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= _NEARLY_ALL
 
     def aim(self, control: Tensor, *, hold: bool) -> None:
@@ -79,7 +71,7 @@ class EdgeAnchors:
     def _hold(self, points: Array, quadrics: Array) -> None:
         """Put given corners in place of those."""
         if (given := self._surface.given_corners) is not None:
-            corner = np.isin(self.fit.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
+            corner = np.isin(self.fit.places.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
             points[corner], quadrics[corner] = given, _GIVEN * np.eye(3)
 
     def restore(self, points: Array, yielding: Array) -> None:
@@ -90,4 +82,4 @@ class EdgeAnchors:
     def _nearest(self, control: Tensor) -> tuple[Array, Array, Array]:
         """F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""
         here = self.fit.residuals(control) + self.fit.points
-        return here, *nearest_on_mesh(here, self._surface.points, self._surface.triangles)
+        return here, *nearest_on_mesh(here, self._surface.points, self._surface.places.triangles)

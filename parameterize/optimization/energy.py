@@ -16,12 +16,14 @@ from ..config import SplineConfig
 from .cg import Operator, conjugate_gradients
 from .determinant_penalty import SpanBarrier
 from .edge_attraction import EdgeAnchors
+from .normals import FacingPenalty, facing_penalty
 from .polar import closest_rotation, cofactor_and_determinant, cross, least_eigenvalue
 from .surface_distance import SurfaceFit
 from .tensor_product import BendingOperator, FastDiagonalization, gauss_grid, grams
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
 _PULL = 3e-4  # share of the boundary's weight in the preconditioner: more would hold back what slides along the surface
+_WATCHED = 3.0  # times the least facing: points below may fall under it in the next step
 Knots = tuple[Array, Array, Array]
 
 
@@ -113,6 +115,7 @@ class SplineEnergy:
     def __init__(self, config: SplineConfig, knots: Knots, surface: SurfaceFit, *, device: torch.device) -> None:
         self.config, self.surface = config, surface
         self.anchors = EdgeAnchors(surface, config.tangential)
+        self._facing: FacingPenalty | None = None
         self.penalty = config.penalties[0]
         self._distortion = DistortionEnergy(knots, config, device=device)
         mass, slope, curve = grams(knots, config.degree, device)
@@ -129,10 +132,14 @@ class SplineEnergy:
         self.penalty = penalty
         self._distortion.set_limit(control)
 
+    def watch_facing(self, control: Tensor) -> None:
+        """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
+        self._facing = facing_penalty(self.surface, control, self.config.min_facing, _WATCHED)
+
     def give_way(self, spans: IntArray, factor: float) -> None:
         """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""
         for fit in (self.surface, self.anchors.fit):
-            fit.give_way(np.where(fit.near_spans(spans), factor, 1.0) * fit.yielding)
+            fit.give_way(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.yielding)
 
     def take_back(self, factor: float) -> None:
         """Divide by `factor` what such factors have become, up to 1."""
@@ -152,9 +159,12 @@ class SplineEnergy:
         config = self.config
         off, pull = self.surface.energy_and_gradient(control)
         off_edges, pull_edges = self.anchors.fit.energy_and_gradient(control)
-        turned, push = self.surface.facing_energy_and_gradient(control)
-        energy = config.vertex * (off + config.anchors * off_edges) + self.penalty * turned
-        return energy, config.vertex * (pull + config.anchors * pull_edges) + self.penalty * push
+        energy = config.vertex * (off + config.anchors * off_edges)
+        gradient = config.vertex * (pull + config.anchors * pull_edges)
+        if self._facing is None:
+            return energy, gradient
+        turned, push = self._facing.energy_and_gradient(control)
+        return energy + self.penalty * turned, gradient + self.penalty * push
 
     def newton_direction(self, control: Tensor, right: Tensor) -> Tensor:
         """Approximate solution of Hessian x = right at `control`, the parameters of the surface held."""
@@ -162,7 +172,7 @@ class SplineEnergy:
         surface, anchors = self.surface.hessian(_ROUGH), self.anchors.fit.hessian(_ROUGH)
         distortion = self._distortion.curvature(control, self.penalty)
         barrier = self.barrier.curvature(control)
-        facing = self.surface.facing_curvature(control, _ROUGH)
+        facing = torch.zeros_like if self._facing is None else self._facing.curvature(control, _ROUGH)
 
         def hessian(x: Tensor) -> Tensor:
             inner = distortion(x) + self._rough_bending(x) + self.penalty * (barrier(x) + facing(x))

@@ -135,8 +135,8 @@ def _save(
     tensors = {
         "control": control,
         "best": best.control,
-        "parameters": torch.as_tensor(energy.surface.parameters),
-        "cube_faces": torch.as_tensor(energy.surface.cube_faces),
+        "parameters": torch.as_tensor(energy.surface.places.parameters),
+        "cube_faces": torch.as_tensor(energy.surface.places.cube_faces),
         "yielding": torch.as_tensor(energy.surface.yielding),
         "anchors": torch.as_tensor(energy.anchors.fit.points),
         "anchors_yielding": torch.as_tensor(energy.anchors.fit.yielding),
@@ -150,7 +150,7 @@ def _restore(
 ) -> tuple[int, Tensor, Optimized]:
     """Next round, control points and best result of a checkpoint; parameters and active spans go back in place."""
     device = best.control.device
-    energy.surface.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
+    energy.surface.places.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
     energy.surface.give_way(tensors["yielding"].numpy())
     energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
     energy.barrier.activate(tensors["active"].numpy())
@@ -210,7 +210,7 @@ def _descend(
     steps = energy.config.steps
     usual = steps * (len(energy.config.penalties) + energy.config.polish)  # hard shapes take more
     started = time.perf_counter()
-    energy.surface.watch_facing(control, energy.config.min_facing)
+    energy.watch_facing(control)
     point = _evaluate(control, energy)
     lowest, waited = point.total, 0
     for step in range(steps):
@@ -220,9 +220,9 @@ def _descend(
             break
         gain = point.total - found.total
         for _ in range(_SLIDES):
-            energy.surface.slide(found.control, 0.5 / control.shape[1])
-        energy.surface.relax(_RELAXATIONS)
-        energy.surface.watch_facing(found.control, energy.config.min_facing)
+            energy.surface.places.slide(found.control, energy.surface.points, 0.5 / control.shape[1])
+        energy.surface.places.relax(_RELAXATIONS)
+        energy.watch_facing(found.control)
         point = replace(found, outer=energy.surface_part(found.control))
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})

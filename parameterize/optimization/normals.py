@@ -13,10 +13,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..arrays import Array, IntArray
+from ..cube.cube import axis_and_side
 from ..spline.bspline import sparse_rows
 from .cg import Operator
 from .polar import cross
+from .surface_distance import SurfaceFit
 from .tensor_product import ControlRows
 
 
@@ -34,14 +35,14 @@ class FacingPenalty:
     floor: float
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
-        """The penalty at control points (3, n_u, n_v, n_w), and its gradient."""
+        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
         by_a, by_b, size = self._slopes(control)
         shortfall = (self.floor - size).clamp_min(0.0)
         gradient = self._pull(-2.0 * self.weights * shortfall, by_a, by_b, control)
         return float(self.weights @ shortfall.square()), gradient
 
     def curvature(self, control: Tensor, dtype: torch.dtype) -> Operator:
-        """The Gauss-Newton part of the second derivative at `control`."""
+        """Return the Gauss-Newton part of the second derivative at `control`."""
         single = self._to(dtype)
         by_a, by_b, size = single._slopes(control.to(dtype))
         scale = 2.0 * single.weights * (size < self.floor)
@@ -67,20 +68,23 @@ class FacingPenalty:
         return FacingPenalty((along_a, along_b), self.normals.to(dtype), self.weights.to(dtype), self.floor)
 
 
-def facing_penalty(
-    indices: IntArray,
-    slopes: tuple[Array, Array],
-    count: int,
-    normals: Array,
-    weights: Array,
-    floor: float,
-    device: torch.device,
-) -> FacingPenalty:
-    """From the control points (k, c) of each of k points, their weights in t_a and t_b (k, c), and normals (k, 3)."""
-    along_a, along_b = (ControlRows.of(sparse_rows(slope, indices, count), device) for slope in slopes)
+def facing_penalty(fit: SurfaceFit, control: Tensor, floor: float, margin: float) -> FacingPenalty:
+    """Return the penalty at the points of the surface where (t_a x t_b) . n < margin * floor at these control points.
+
+    With a margin above 1 it also holds points that could fall below the floor in the next step.
+    """
+    window = fit.places.window()
+    _, tangent_a, tangent_b = window.derivatives(control)
+    outward = axis_and_side(fit.places.cube_faces)[1] == 1
+    normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
+    low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < margin * floor
+    along_a, along_b = (
+        ControlRows.of(sparse_rows(weights[low], window.indices[low], control[0].numel()), control.device)
+        for weights in (window.weights(1, 0), window.weights(0, 1))
+    )
     return FacingPenalty(
         (along_a, along_b),
-        torch.as_tensor(np.ascontiguousarray(normals.T), device=device),
-        torch.as_tensor(weights, device=device),
+        torch.as_tensor(np.ascontiguousarray(normals[low].T), device=control.device),
+        torch.as_tensor(fit.weights[low], device=control.device),
         floor,
     )
