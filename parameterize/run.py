@@ -44,10 +44,6 @@ from .training.target_shapes import nearest_on_cube
 from .training.trainer import Trainer, map_points
 
 _log = logging.getLogger(__name__)
-_BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit
-_FEW_FLIPS = 1e-2  # share of the triangles that sliding may sort out
-_LAST_SLIDES = 20
-_LAST_SWEEPS = 600
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +253,7 @@ def _layout(mapped: Array, corners: IntArray | None, task: _Task) -> Layout:
     """
     nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
     untangled = untangle(nearest, task.faces)
-    if flipped(untangled, task.faces).mean() > _FEW_FLIPS:
+    if flipped(untangled, task.faces).mean() > task.config.spline.few_flips:
         try:
             return lay_out(mapped, task.vertices, task.faces, choose_corners(mapped) if corners is None else corners)
         except PathError as error:
@@ -272,8 +268,8 @@ def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Te
     mapped = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
     weights = np.concatenate(
         [
-            np.full(len(inside), (1.0 - _BOUNDARY_SHARE) / max(len(inside), 1)),
-            np.full(len(vertices), _BOUNDARY_SHARE / len(vertices)),
+            np.full(len(inside), (1.0 - spline.boundary_share) / max(len(inside), 1)),
+            np.full(len(vertices), spline.boundary_share / len(vertices)),
         ]
     )
     return fit_pairs(
@@ -291,11 +287,12 @@ def _in_users_units(
     found: Optimized, surface: Surface, task: _Task, fit: SurfaceFit
 ) -> tuple[BSplineVolume, BoundaryMap]:
     """The volume and its boundary map; the parameters are first brought close to this volume's closest points."""
-    places, longest = fit.places, 0.5 / task.config.spline.control_points
-    for _ in range(_LAST_SLIDES):
+    spline, places = task.config.spline, fit.places
+    longest = 0.5 / spline.control_points
+    for _ in range(spline.last_slides):
         places.slide(found.control, fit.points, longest)
-    places.relax(_LAST_SWEEPS)
-    for _ in range(_LAST_SLIDES):
+    places.relax(spline.last_sweeps)
+    for _ in range(spline.last_slides):
         places.slide(found.control, fit.points, longest, keep_layout=True)
     placed = _as_volume(found, task)
     volume = BSplineVolume(placed.degrees, placed.knots, surface.from_unit(placed.control_points))

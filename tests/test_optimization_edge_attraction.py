@@ -3,6 +3,7 @@ import pytest
 import torch
 from shapes import ball
 
+from parameterize.config import SplineConfig
 from parameterize.cube.cube import CORNERS, snap
 from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
 from parameterize.optimization.sliding import SlidingParameters
@@ -24,7 +25,7 @@ def anchors_on_a_ball(radius=0.5, given_corners=None):
         vertex_weights(points, faces, len(points)),
         given_corners=given_corners,
     )
-    return EdgeAnchors(fit, TANGENTIAL)
+    return EdgeAnchors(fit, SplineConfig(tangential=TANGENTIAL))
 
 
 def unit_cube():

@@ -13,6 +13,7 @@ import numpy as np
 from torch import Tensor
 
 from ..arrays import Array
+from ..config import SplineConfig
 from ..cube.cube import CORNERS, EDGES
 from ..quality.distances import nearest_on_mesh
 from ..spline.bspline import divided_spans
@@ -20,9 +21,6 @@ from .sliding import SlidingParameters
 from .surface_distance import SurfaceFit
 
 _A_SPAN = 2
-_NEAR = 0.5  # of a span's length at volume 1
-_NEARLY_ALL = 0.99
-_GIVEN = 0.5  # weight of a given corner, where the distance along the normal has 1
 
 
 def edge_points(knots: tuple[Array, Array, Array]) -> Array:
@@ -38,18 +36,18 @@ def edge_points(knots: tuple[Array, Array, Array]) -> Array:
 class EdgeAnchors:
     """The anchors as a SurfaceFit whose parameters stay; they pull on nothing until they are aimed."""
 
-    def __init__(self, surface: SurfaceFit, tangential: float) -> None:
-        self._surface, self._tangential = surface, tangential
+    def __init__(self, surface: SurfaceFit, config: SplineConfig) -> None:
+        self._surface, self._config = surface, config
         knots, degree, device = surface.places.knots, surface.places.degree, surface.places.device
         points, no_triangles = edge_points(knots), np.zeros((0, 3), dtype=np.int64)
         places = SlidingParameters(knots, degree, points, no_triangles, device=device)
         self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
     def near(self, control: Tensor) -> bool:
-        """Whether F is so close to the surface all along the edges that the nearest points are the right ones."""
+        """Return whether F is so close to the surface along all edges that the nearest points are the right ones."""
         here, points, _ = self._nearest(control)
-        longest = _NEAR / (min(control.shape[1:]) - self.fit.places.degree)
-        return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= _NEARLY_ALL
+        longest = self._config.near_edge / (min(control.shape[1:]) - self.fit.places.degree)
+        return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= self._config.near_share
 
     def aim(self, control: Tensor, *, hold: bool) -> None:
         """Take the points of the surface nearest to F as it is, each with the normal of its triangle.
@@ -57,7 +55,7 @@ class EdgeAnchors:
         hold: leave given corners at their places.
         """
         _, points, normals = self._nearest(control)
-        quadrics = normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3)
+        quadrics = normals[:, :, None] * normals[:, None, :] + self._config.tangential * np.eye(3)
         if hold:
             self._hold(points, quadrics)
         self.fit.aim(points, quadrics)
@@ -72,7 +70,7 @@ class EdgeAnchors:
         """Put given corners in place of those."""
         if (given := self._surface.given_corners) is not None:
             corner = np.isin(self.fit.places.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
-            points[corner], quadrics[corner] = given, _GIVEN * np.eye(3)
+            points[corner], quadrics[corner] = given, self._config.given_corner * np.eye(3)
 
     def restore(self, points: Array, yielding: Array) -> None:
         """Take the state of a checkpoint: the next distances then round as they would have without the interruption."""

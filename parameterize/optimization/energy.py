@@ -22,8 +22,6 @@ from .surface_distance import SurfaceFit
 from .tensor_product import BendingOperator, FastDiagonalization, gauss_grid, grams
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
-_PULL = 3e-4  # share of the boundary's weight in the preconditioner: more would hold back what slides along the surface
-_WATCHED = 3.0  # times the least facing: points below may fall under it in the next step
 Knots = tuple[Array, Array, Array]
 
 
@@ -114,7 +112,7 @@ class SplineEnergy:
 
     def __init__(self, config: SplineConfig, knots: Knots, surface: SurfaceFit, *, device: torch.device) -> None:
         self.config, self.surface = config, surface
-        self.anchors = EdgeAnchors(surface, config.tangential)
+        self.anchors = EdgeAnchors(surface, config)
         self._facing: FacingPenalty | None = None
         self.penalty = config.penalties[0]
         self._distortion = DistortionEnergy(knots, config, device=device)
@@ -123,7 +121,7 @@ class SplineEnergy:
         self._rough_bending = self._bending.to(_ROUGH)
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient, device=device)
         ends = torch.zeros_like(mass[0])
-        ends[0, 0] = ends[-1, -1] = _PULL * config.vertex / 6.0  # the points spread over six faces
+        ends[0, 0] = ends[-1, -1] = config.pull * config.vertex / 6.0  # the points spread over six faces
         rough = tuple(2.0 * k + 2.0 * config.fairness * h + ends for k, h in zip(slope, curve, strict=True))
         self._precondition = FastDiagonalization(rough, mass).to(_ROUGH)
 
@@ -134,7 +132,14 @@ class SplineEnergy:
 
     def watch_facing(self, control: Tensor) -> None:
         """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
-        self._facing = facing_penalty(self.surface, control, self.config.min_facing, _WATCHED)
+        self._facing = facing_penalty(self.surface, control, self.config.min_facing, self.config.facing_margin)
+
+    def slide(self, control: Tensor) -> None:
+        """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
+        for _ in range(self.config.slides):
+            self.surface.places.slide(control, self.surface.points, 0.5 / control.shape[1])
+        self.surface.places.relax(self.config.relaxations)
+        self.watch_facing(control)
 
     def give_way(self, spans: IntArray, factor: float) -> None:
         """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""
