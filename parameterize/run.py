@@ -125,7 +125,8 @@ def parameterize(
         volume, boundary = _in_users_units(found, surface, task, fit)
     with _timed(seconds, "certify"):
         certificate = certify(volume)  # of the volume in the user's units: bringing it there rounds
-        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, certificate)
+        proofs = certificate, check_boundary(volume)
+        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, *proofs)
     return Parameterization(volume, boundary, certificate, quality, history.arrays(), seconds, place.type, seed, config)
 
 

@@ -274,7 +274,7 @@ def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monk
         seen.append(replace(found, certificate=replace(found.certificate, verdict="certified", unproved=none)))
         return seen[-1]
 
-    answers = iter(meets)
+    answers = iter([*meets, False])  # the last one for the volume in the user's units
     monkeypatch.setattr(run, "optimize", certified)
     monkeypatch.setattr(run, "check_boundary", lambda volume: BoundaryCheck(not next(answers), None, 0))
     result = parameterize(surface, replace(tiny_config(), starts=2), seed=3, device="cpu")
