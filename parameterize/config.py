@@ -67,6 +67,8 @@ class SplineConfig:
     degree: int = 3
     fit_cell: float = 0.035  # lattice of inverse samples
     fit_fairness: float = 1e-7
+    boundary_share: float = 0.2  # weight of the surface's samples in the first fit; those inside have the rest of 1
+    few_flips: float = 1e-2  # with a larger share of flipped triangles the surface is cut along traced cube edges
     gauss: int = 3  # Gauss points a direction in the distortion term, on the first and last span
     inner_gauss: int = 1  # likewise on the others
     fairness: float = 1e-3
@@ -74,18 +76,30 @@ class SplineConfig:
     arap_limit: float = 6.0  # distortion above this costs `stiffening` times its squared excess, too
     stiffening: float = 3.0
     anchors: float = 0.03  # share of `vertex` for the distance along the cube's edges, from F to the surface
+    near_edge: float = 0.5  # anchors closer to the surface than this share of a span's length count as near
+    near_share: float = 0.99  # the anchors act from the first round on if at least this share of them is near
+    given_corner: float = 0.5  # share of `anchors` that holds a corner given by the user, in all directions
     tangential: float = 2e-4  # share of `vertex` for the distance within the tangent plane
     min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
     min_facing: float = 0.1  # likewise (t_a x t_b) . n of the boundary's tangents and the mesh's normals
+    facing_margin: float = 3.0  # times `min_facing`: points below may fall under it in the next step and are watched
     penalties: tuple[float, ...] = (20.0, 100.0, 500.0, 2500.0)  # one a round, then the last one again
     rounds: int = 16  # at most
     polish: int = 3  # of them, after the map is certified for the first time
+    patient_rounds: int = 2  # after these the anchors let go, and the surface gives way at unproved spans
+    giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most
+    least_steps: int = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
+    slides: int = 2  # of the boundary parameters after each step
+    relaxations: int = 1  # sweeps over the triangles that these flipped
+    last_slides: int = 20  # before the boundary map is made, and again after `last_sweeps`
+    last_sweeps: int = 600  # over the triangles that the last slides flipped, at most
     first_gain: float = 4e-3  # the first round ends once a step lowers the energy by less than this share of it
     gain: float = 5e-4  # likewise the later ones
     tolerance: float = 0.1  # of the inner solves, relative
     iterations: int = 20  # of an inner solve, at most
+    pull: float = 3e-4  # share of `vertex` in the preconditioner: more would hold back what slides along the surface
 
 
 @dataclass(frozen=True)

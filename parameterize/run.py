@@ -25,11 +25,12 @@ from .cube.boundary_map import BoundaryMap
 from .cube.correspondence import boundary_map
 from .cube.cutting import subdivide_long_edges
 from .cube.edge_paths import PathError, choose_corners
-from .cube.flips import flipped, sides, untangle
+from .cube.flips import flipped, untangle
 from .cube.tutte import Layout, lay_out
 from .history import History
 from .optimization.least_squares import fit_pairs
 from .optimization.newton import Optimized, optimize
+from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
 from .progress import ProgressCallback, ignore
 from .quality.quality import QualityReport, measure
@@ -43,10 +44,6 @@ from .training.target_shapes import nearest_on_cube
 from .training.trainer import Trainer, map_points
 
 _log = logging.getLogger(__name__)
-_BOUNDARY_SHARE = 0.2  # weight of the surface's pairs in the first fit
-_FEW_FLIPS = 1e-2  # share of the triangles that sliding may sort out
-_LAST_SLIDES = 20
-_LAST_SWEEPS = 600
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +125,8 @@ def parameterize(
         volume, boundary = _in_users_units(found, surface, task, fit)
     with _timed(seconds, "certify"):
         certificate = certify(volume)  # of the volume in the user's units: bringing it there rounds
-        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, certificate)
+        proofs = certificate, check_boundary(volume)
+        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, *proofs)
     return Parameterization(volume, boundary, certificate, quality, history.arrays(), seconds, place.type, seed, config)
 
 
@@ -241,15 +239,10 @@ def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> 
     mapped = map_points(network, task.vertices, task.device, task.dtype)
     layout = _layout(mapped, corners, task)
     return SurfaceFit(
-        task.knots,
-        spline.degree,
+        SlidingParameters(task.knots, spline.degree, layout.places, layout.faces, device=task.device),
         layout.vertices,
         vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
         vertex_weights(layout.vertices, layout.faces, task.own),
-        layout.places,
-        sides(layout.places),
-        layout.faces,
-        device=task.device,
         given_corners=None if task.given_corners is None else task.vertices[task.given_corners],
     )
 
@@ -261,7 +254,7 @@ def _layout(mapped: Array, corners: IntArray | None, task: _Task) -> Layout:
     """
     nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
     untangled = untangle(nearest, task.faces)
-    if flipped(untangled, task.faces).mean() > _FEW_FLIPS:
+    if flipped(untangled, task.faces).mean() > task.config.spline.few_flips:
         try:
             return lay_out(mapped, task.vertices, task.faces, choose_corners(mapped) if corners is None else corners)
         except PathError as error:
@@ -276,12 +269,12 @@ def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Te
     mapped = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
     weights = np.concatenate(
         [
-            np.full(len(inside), (1.0 - _BOUNDARY_SHARE) / max(len(inside), 1)),
-            np.full(len(vertices), _BOUNDARY_SHARE / len(vertices)),
+            np.full(len(inside), (1.0 - spline.boundary_share) / max(len(inside), 1)),
+            np.full(len(vertices), spline.boundary_share / len(vertices)),
         ]
     )
     return fit_pairs(
-        np.concatenate([mapped, fit.parameters]),
+        np.concatenate([mapped, fit.places.parameters]),
         np.concatenate([inside, vertices]),
         weights,
         task.knots,
@@ -295,16 +288,17 @@ def _in_users_units(
     found: Optimized, surface: Surface, task: _Task, fit: SurfaceFit
 ) -> tuple[BSplineVolume, BoundaryMap]:
     """The volume and its boundary map; the parameters are first brought close to this volume's closest points."""
-    spline = task.config.spline
-    for _ in range(_LAST_SLIDES):
-        fit.slide(found.control, 0.5 / spline.control_points)
-    fit.relax(_LAST_SWEEPS)
-    for _ in range(_LAST_SLIDES):
-        fit.slide(found.control, 0.5 / spline.control_points, keep_layout=True)
+    spline, places = task.config.spline, fit.places
+    longest = 0.5 / spline.control_points
+    for _ in range(spline.last_slides):
+        places.slide(found.control, fit.points, longest)
+    places.relax(spline.last_sweeps)
+    for _ in range(spline.last_slides):
+        places.slide(found.control, fit.points, longest, keep_layout=True)
     placed = _as_volume(found, task)
     volume = BSplineVolume(placed.degrees, placed.knots, surface.from_unit(placed.control_points))
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
-    return volume, boundary_map(volume, own, fit.triangles, fit.parameters)
+    return volume, boundary_map(volume, own, places.triangles, places.parameters)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ STAGES = ("S(2)", "S(1)", "cube", "corners", "edges")
 def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
     """A result as training leaves it, from the benchmark map; amplitude 0.4 folds it."""
     from iga_nn.samples import sample
+    from parameterize.certificate.boundary import check_boundary
     from parameterize.certificate.jacobian import certify
     from parameterize.config import preset
     from parameterize.cube.boundary_map import BoundaryMap
@@ -27,7 +28,9 @@ def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
     volume = benchmark_volume(4, amplitude=amplitude)
     boundary = BoundaryMap(volume(cube.vertices), cube.vertices, cube.faces)
     certificate = certify(volume)
-    quality = measure(volume, boundary.vertices, boundary.faces, cube.scale, boundary, certificate)
+    quality = measure(
+        volume, boundary.vertices, boundary.faces, cube.scale, boundary, certificate, check_boundary(volume)
+    )
     steps = np.arange(50)
     history = {
         "stage": np.repeat(STAGES, 10),

@@ -3,7 +3,8 @@ import pytest
 from scipy.spatial import ConvexHull
 from shapes import ball, rounded_cube, turned
 
-from parameterize.cube.edge_paths import CORNERS, EDGES, PathError, choose_corners, cut_surface, edge_targets
+from parameterize.cube.cube import CORNERS, EDGES
+from parameterize.cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
 
 
 def near_cube(seed, power=8.0, noise=0.005):

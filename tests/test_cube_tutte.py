@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from shapes import rounded_cube, turned
 
-from parameterize.cube.edge_paths import CORNERS, PathError, choose_corners
-from parameterize.cube.flips import flipped, snap
+from parameterize.cube.cube import CORNERS, snap
+from parameterize.cube.edge_paths import PathError, choose_corners
+from parameterize.cube.flips import flipped
 from parameterize.cube.tutte import lay_out
 
 

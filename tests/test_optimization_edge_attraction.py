@@ -3,9 +3,10 @@ import pytest
 import torch
 from shapes import ball
 
-from parameterize.cube.edge_paths import CORNERS
-from parameterize.cube.flips import sides, snap
+from parameterize.config import SplineConfig
+from parameterize.cube.cube import CORNERS, snap
 from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
+from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
@@ -18,18 +19,13 @@ def anchors_on_a_ball(radius=0.5, given_corners=None):
     points, faces = ball(2000)
     points = 0.5 + radius * points
     fit = SurfaceFit(
-        KNOTS,
-        3,
+        SlidingParameters(KNOTS, 3, snap(points), faces, device=torch.device("cpu")),
         points,
         vertex_quadrics(points, faces, TANGENTIAL),
         vertex_weights(points, faces, len(points)),
-        snap(points),
-        sides(points),
-        faces,
-        device=torch.device("cpu"),
         given_corners=given_corners,
     )
-    return EdgeAnchors(fit, TANGENTIAL)
+    return EdgeAnchors(fit, SplineConfig(tangential=TANGENTIAL))
 
 
 def unit_cube():
@@ -82,7 +78,7 @@ def test_given_corners_are_held_beside_the_others_and_alone():
     wanted = CORNERS + 0.01 * np.arange(24).reshape(8, 3)
     anchors, control = anchors_on_a_ball(given_corners=wanted), unit_cube()
     anchors.aim(control, hold=True)
-    aimed = anchors.fit.points[np.isin(anchors.fit.parameters, (0.0, 1.0)).all(axis=1)]
+    aimed = anchors.fit.points[np.isin(anchors.fit.places.parameters, (0.0, 1.0)).all(axis=1)]
     np.testing.assert_array_equal(aimed, wanted)
     anchors.release()
     _, gradient = anchors.fit.energy_and_gradient(control)

@@ -8,9 +8,11 @@ from shapes import rounded_cube, turned
 from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
+from parameterize.cube.cube import project_radially
 from parameterize.history import History
 from parameterize.optimization.energy import DistortionEnergy, SplineEnergy
 from parameterize.optimization.newton import optimize
+from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
 from parameterize.quality.quality import arap
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
@@ -36,24 +38,13 @@ def surface_fit():
     """A rounded cube, slightly turned, whose parameters are the radial projection."""
     points, faces = rounded_cube(300, power=12.0)
     centred = points - 0.5
-    axis = np.abs(centred).argmax(axis=1)
-    size = np.abs(centred).max(axis=1, keepdims=True)
-    cube_faces = 2 * axis + (centred[np.arange(len(points)), axis] > 0.0)
     vertices = turned(points)
     quadrics, weights = (
         vertex_quadrics(vertices, faces, CONFIG.tangential),
         vertex_weights(vertices, faces, len(vertices)),
     )
     return SurfaceFit(
-        KNOTS,
-        3,
-        vertices,
-        quadrics,
-        weights,
-        0.5 + centred / (2.0 * size),
-        cube_faces.astype(np.int64),
-        faces,
-        device=CPU,
+        SlidingParameters(KNOTS, 3, 0.5 + project_radially(centred), faces, device=CPU), vertices, quadrics, weights
     )
 
 

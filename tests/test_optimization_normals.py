@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize.optimization.normals import facing_penalty
+from parameterize.optimization.normals import FacingPenalty, facing_penalty
+from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
-from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.optimization.tensor_product import ControlRows
+from parameterize.spline.bspline import greville, open_uniform_knots, sparse_rows
 from parameterize.surface.geometry import vertex_normals
 
 CPU = torch.device("cpu")
@@ -18,7 +20,8 @@ def random_penalty(points=40, controls=50):
     slopes = rng.normal(size=(2, points, 16))
     normals = rng.normal(size=(points, 3))
     weights = rng.uniform(0.5, 1.5, points)
-    penalty = facing_penalty(indices, (slopes[0], slopes[1]), controls, normals, weights, FLOOR, CPU)
+    along_a, along_b = (ControlRows.of(sparse_rows(slope, indices, controls), CPU) for slope in slopes)
+    penalty = FacingPenalty((along_a, along_b), torch.as_tensor(normals.T), torch.as_tensor(weights), FLOOR)
     control = torch.as_tensor(rng.normal(size=(3, 5, 10, 1)))
 
     def shortfall(x):
@@ -58,8 +61,7 @@ def box_fit(triangle_at):
         corners.extend(piece)
     points, faces = np.array(corners), np.array(faces)
     quadrics, weights = np.tile(np.eye(3), (18, 1, 1)), np.full(18, 1.0 / 18.0)
-    sides = np.repeat(np.arange(6), 3)
-    return SurfaceFit(KNOTS, 3, points, quadrics, weights, points, sides, faces, device=CPU), control
+    return SurfaceFit(SlidingParameters(KNOTS, 3, points, faces, device=CPU), points, quadrics, weights), control
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -67,8 +69,7 @@ def test_only_a_boundary_that_faces_the_other_way_is_penalised(mirrored):
     fit, control = box_fit(np.array([[0.2, 0.2], [0.7, 0.3], [0.4, 0.8]]))
     if mirrored:  # all faces now look into the solid, seen with the mesh's normals
         control[2] = 1.0 - control[2]
-    fit.watch_facing(control, FLOOR)
-    energy, _ = fit.facing_energy_and_gradient(control)
+    energy, _ = facing_penalty(fit, control, FLOOR, margin=3.0).energy_and_gradient(control)
     # a unit face has (t_a x t_b) . n = 1, mirrored -1 on the faces across the mirror's plane; n turns with the faces
     expected = (FLOOR + 1.0) ** 2 if mirrored else 0.0
     assert energy == pytest.approx(expected * (2.0 / 3.0 if mirrored else 1.0))

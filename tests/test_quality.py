@@ -6,6 +6,7 @@ import igl
 import numpy as np
 import pytest
 
+from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.jacobian import certify
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.quality.distances import Distances, SampledBoundary, to_boundary, to_mesh
@@ -175,6 +176,10 @@ def icosphere(levels):
     return vertices / np.linalg.norm(vertices, axis=1, keepdims=True), faces
 
 
+def proofs(volume):
+    return certify(volume), check_boundary(volume)
+
+
 def test_report_on_a_ball():
     volume = ball()
     vertices, faces = icosphere(4)
@@ -182,7 +187,7 @@ def test_report_on_a_ball():
     boundary = BoundaryMap(1.25 * volume(parameters), parameters, np.zeros((0, 3), dtype=int))
     scale = (4.0 * np.pi / 3.0) ** (-1.0 / 3.0)
     certificate = certify(volume)
-    report = measure(volume, vertices, faces, scale, boundary, certificate).as_dict()
+    report = measure(volume, vertices, faces, scale, boundary, certificate, check_boundary(volume)).as_dict()
     assert json.loads(json.dumps(report)) == report
     assert report["control_points"] == [14, 14, 14] and report["degrees"] == [3, 3, 3]
     assert report["bijective"] == certificate.verdict and report["det_lower_bound"] == certificate.lower_bound
@@ -208,7 +213,7 @@ def test_report_on_a_ball():
 def test_affine_report_by_hand():
     volume = affine(np.diag([2.0, 1.0, 0.5]))
     boundary = BoundaryMap(CORNERS * [2.0, 1.0, 0.5] + [0.0, 0.0, 0.25], CORNERS, CUBE_FACES)
-    report = measure(volume, CORNERS * [2.0, 1.0, 0.5], CUBE_FACES, 2.0, boundary, certify(volume))
+    report = measure(volume, CORNERS * [2.0, 1.0, 0.5], CUBE_FACES, 2.0, boundary, *proofs(volume))
     section = report.as_dict()
     assert section["bijective"] == "certified" and section["witness"] is None
     assert section["arap"]["as_given"] == {"mean": pytest.approx(1.25), "max": pytest.approx(1.25)}
@@ -224,7 +229,7 @@ def test_affine_report_by_hand():
 def test_folded_report_names_the_witness():
     volume = affine(np.diag([-1.0, 1.0, 1.0]))
     mirrored = CORNERS * [-1.0, 1.0, 1.0]
-    report = measure(volume, mirrored, CUBE_FACES, 1.0, BoundaryMap(mirrored, CORNERS, CUBE_FACES), certify(volume))
+    report = measure(volume, mirrored, CUBE_FACES, 1.0, BoundaryMap(mirrored, CORNERS, CUBE_FACES), *proofs(volume))
     assert report.as_dict()["arap"]["as_given"]["mean"] == pytest.approx(4.0)
     assert report.as_dict()["witness"] == list(report.certificate.witness)
     assert "folded at (" in str(report)
@@ -235,4 +240,4 @@ def test_scale_must_be_positive(scale):
     volume = affine(np.eye(3))
     boundary = BoundaryMap(CORNERS, CORNERS, CUBE_FACES)
     with pytest.raises(ValueError, match="scale must be positive"):
-        measure(volume, CORNERS, CUBE_FACES, scale, boundary, certify(volume))
+        measure(volume, CORNERS, CUBE_FACES, scale, boundary, *proofs(volume))

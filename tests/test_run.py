@@ -13,7 +13,7 @@ from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig, preset
 from parameterize.cube.boundary_map import BoundaryMap
-from parameterize.cube.edge_paths import CORNERS
+from parameterize.cube.cube import CORNERS
 from parameterize.run import choose_device, corner_vertices, parameterize
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.training.trainer import start_map
@@ -274,7 +274,7 @@ def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monk
         seen.append(replace(found, certificate=replace(found.certificate, verdict="certified", unproved=none)))
         return seen[-1]
 
-    answers = iter(meets)
+    answers = iter([*meets, False])  # the last one for the volume in the user's units
     monkeypatch.setattr(run, "optimize", certified)
     monkeypatch.setattr(run, "check_boundary", lambda volume: BoundaryCheck(not next(answers), None, 0))
     result = parameterize(surface, replace(tiny_config(), starts=2), seed=3, device="cpu")

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, IntArray
+from ..cube.cube import VARYING_AXES, axis_and_side
 from ..spline.bernstein import elevation, extraction, halving
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
 
 Mask = NDArray[np.bool_]
-
-TANGENTS = np.array([[1, 2], [0, 2], [0, 1]])  # the axes that vary on a face whose constant axis is given
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +34,10 @@ class Pieces:
 def boundary_pieces(volume: BSplineVolume) -> Pieces:
     """All spans of the six faces, raised to the largest degree."""
     degree = max(volume.degrees)
-    parts = [_face_pieces(volume, axis, side, degree) for axis in range(3) for side in range(2)]
+    parts = [_face_pieces(volume, axis, side, degree) for axis, side in map(axis_and_side, range(6))]
     axes, low, nets = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     high = low.copy()
-    np.put_along_axis(high, TANGENTS[axes], np.take_along_axis(low, TANGENTS[axes], axis=1) + 1, axis=1)
+    np.put_along_axis(high, VARYING_AXES[axes], np.take_along_axis(low, VARYING_AXES[axes], axis=1) + 1, axis=1)
     return Pieces(0, axes, low, high, nets)
 
 
@@ -47,7 +46,7 @@ def _face_pieces(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
     """Constant axes (n,), low corners (n, 3) and nets (n, q + 1, q + 1, 3) of one face's spans."""
     net = volume.face(axis, side)  # (n_a, n_b, 3)
-    a, b = TANGENTS[axis]
+    a, b = VARYING_AXES[axis]
     for direction, position in ((a, 0), (b, 2)):  # (s_a, q + 1, n_b, 3), then (s_a, q + 1, s_b, q + 1, 3)
         own = volume.degrees[direction]
         first, weights = extraction(volume.knots[direction], own)
@@ -72,7 +71,7 @@ def halved(pieces: Pieces, pairs: IntArray) -> tuple[Pieces, IntArray]:
     nets = np.einsum("gij,hkl,njlc->nghikc", halves, halves, pieces.nets[used], optimize=True)
     axes = np.repeat(pieces.axes[used], 4)
     low = np.repeat(2 * pieces.low[used], 4, axis=0)
-    tangents = TANGENTS[axes]
+    tangents = VARYING_AXES[axes]
     corner = np.tile([[0, 0], [0, 1], [1, 0], [1, 1]], (len(used), 1))
     np.put_along_axis(low, tangents, np.take_along_axis(low, tangents, axis=1) + corner, axis=1)
     high = low.copy()

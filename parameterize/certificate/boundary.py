@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, IntArray, in_brackets
+from ..cube.cube import VARYING_AXES
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
-from .bezier_patches import TANGENTS, Pieces, as_rows, boundary_pieces, contact, halved
+from .bezier_patches import Pieces, as_rows, boundary_pieces, contact, halved
 from .box_overlap import overlapping_boxes
 from .patch_proofs import settled
 
@@ -124,7 +125,7 @@ def _search(local: BSplineVolume, pieces: Pieces, pairs: IntArray, error: float)
         return None
     chosen = open_pairs[np.unique(np.linspace(0, len(open_pairs) - 1, _TRIED).astype(np.int64))]
     rows = np.arange(len(chosen))[:, None]
-    tangents = [TANGENTS[pieces.axes[part]] for part in chosen.T]
+    tangents = [VARYING_AXES[pieces.axes[part]] for part in chosen.T]
     where = [_middles(local, pieces, part) for part in chosen.T]  # two (k, 3)
     for _ in range(_NEWTON_STEPS):
         gap = local(where[0]) - local(where[1])

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, IntArray
-from .bezier_patches import TANGENTS, Mask, Pieces, as_rows, contact
+from ..cube.cube import VARYING_AXES
+from .bezier_patches import Mask, Pieces, as_rows, contact
 
 _CHUNK = 4096  # pairs at a time
 _PLANES = 64  # steps towards a separating plane
@@ -44,19 +45,24 @@ def _own_proof(pieces: Pieces, piece: NDArray[np.int64], _: NDArray[np.int64], e
 
 
 def _edge_proof(pieces: Pieces, first: NDArray[np.int64], second: NDArray[np.int64], error: float) -> Mask:
-    """The two side by side: axis 1 of the nets leads from the first over the edge into the second, axis 2 along it."""
-    low = np.maximum(pieces.low[first], pieces.low[second])
-    along = np.argmax(low < np.minimum(pieces.high[first], pieces.high[second]), axis=1)
-    before = _turned(pieces, first, along, low, edge_last=True)
-    behind = _turned(pieces, second, along, low, edge_last=False)
-    along_edge = np.concatenate([_differences(before, 2), _differences(behind, 2)], axis=1)
+    """Return where two pieces with a common edge, unfolded side by side into one rectangle, are monotone together.
+
+    Axis 1 of the nets leads from the first over the edge into the second, axis 2 along the edge.
+    """
+    edge = np.maximum(pieces.low[first], pieces.low[second])  # its lower end
+    along = np.argmax(edge < np.minimum(pieces.high[first], pieces.high[second]), axis=1)
+    nets = [
+        _turned(pieces, first, along, edge, edge_last=True),
+        _turned(pieces, second, along, edge, edge_last=False),
+    ]
+    by_edge = np.concatenate([_differences(net, 2) for net in nets], axis=1)
     # Each side may have a parameter of its own, the unfolded pair stays a rectangle: with equal widths the mean over
     # both sides points out of the solid where the edge is as sharp as a knife's.
-    parts = [_differences(net, 1) for net in (before, behind)]
-    widths = np.stack([_width(part.mean(axis=1), along_edge.mean(axis=1)) for part in parts], axis=1)  # (n, 2)
+    sides = [_differences(net, 1) for net in nets]
+    widths = np.stack([_width(side.mean(axis=1), by_edge.mean(axis=1)) for side in sides], axis=1)  # (n, 2)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        across = np.concatenate([part / widths[:, i, None, None] for i, part in enumerate(parts)], axis=1)
-        return _monotone(across, along_edge, error / widths.min(axis=1), error)
+        across = np.concatenate([side / widths[:, i, None, None] for i, side in enumerate(sides)], axis=1)
+        return _monotone(across, by_edge, error / widths.min(axis=1), error)
 
 
 def _width(vectors: Array, directions: Array) -> Array:
@@ -69,7 +75,7 @@ def _turned(
     pieces: Pieces, rows: NDArray[np.int64], along: NDArray[np.int64], edge: NDArray[np.int64], *, edge_last: bool
 ) -> Array:
     """Nets whose axis 2 runs `along` the shared edge, and which have it last, or first, on axis 1."""
-    nets, tangents = pieces.nets[rows], TANGENTS[pieces.axes[rows]]
+    nets, tangents = pieces.nets[rows], VARYING_AXES[pieces.axes[rows]]
     swap = tangents[:, 0] == along
     nets = np.where(swap[:, None, None, None], nets.swapaxes(1, 2), nets)
     across = np.where(swap, tangents[:, 1], tangents[:, 0])[:, None]
@@ -89,7 +95,7 @@ def _corner_proof(pieces: Pieces, first: NDArray[np.int64], second: NDArray[np.i
 def _corner_last(pieces: Pieces, rows: NDArray[np.int64], corner: NDArray[np.int64]) -> Array:
     """Control points (n, (q + 1)^2, 3), the one at the shared corner last."""
     nets = pieces.nets[rows]
-    at_high = np.take_along_axis(pieces.high[rows] == corner, TANGENTS[pieces.axes[rows]], axis=1)
+    at_high = np.take_along_axis(pieces.high[rows] == corner, VARYING_AXES[pieces.axes[rows]], axis=1)
     nets = np.where(at_high[:, 0, None, None, None], nets, nets[:, ::-1])
     nets = np.where(at_high[:, 1, None, None, None], nets, nets[:, :, ::-1])
     return as_rows(nets)
@@ -101,24 +107,32 @@ def _differences(nets: Array, axis: int) -> Array:
 
 
 def _monotone(across: Array, along: Array, across_error: Array | float, along_error: float) -> Mask:
-    """Whether a plane and coordinates in it are found in which [F_s F_t] has a positive definite symmetric part: (n,).
+    """Return whether a plane with coordinates is found in which [F_s F_t] has a positive definite symmetric part: (n,).
 
     across, along (n, k, 3): vectors whose convex hulls hold F_s and F_t. The coordinates are those in which their means
     are the unit vectors. The entries then lie in [[>= a, <= d], [<= c, >= b]] in magnitude, and with a, b > 0 and
     a b > c d, one coordinate, in the domain and in the plane, can be scaled so that the symmetric part is definite.
     The errors are those of the control points that the vectors are differences of.
     """
-    s, t = across.mean(axis=1), along.mean(axis=1)  # (n, 3)
-    ss, st, tt = (np.sum(a * b, axis=1, keepdims=True) for a, b in ((s, s), (s, t), (t, t)))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        dual_s, dual_t = ((tt * s - st * t) / (ss * tt - st**2), (ss * t - st * s) / (ss * tt - st**2))
-        slack_s, slack_t = (8.0 * np.abs(dual).sum(axis=1) for dual in (dual_s, dual_t))
-        a = _along(across, dual_s).min(axis=1) - across_error * slack_s
-        b = _along(along, dual_t).min(axis=1) - along_error * slack_t
-        c = np.abs(_along(across, dual_t)).max(axis=1) + across_error * slack_t
-        d = np.abs(_along(along, dual_s)).max(axis=1) + along_error * slack_s
+        dual_s, dual_t = _dual_basis(across.mean(axis=1), along.mean(axis=1))
+        a, c = _entry_bounds(across, dual_s, dual_t, across_error)
+        b, d = _entry_bounds(along, dual_t, dual_s, along_error)
     proved: Mask = (a > 0.0) & (b > 0.0) & (a * b > 1.0001 * c * d)
     return proved
+
+
+def _dual_basis(s: Array, t: Array) -> tuple[Array, Array]:
+    """Return the vectors (n, 3) in the plane of s and t whose products with s and t are 1, 0 and 0, 1."""
+    ss, st, tt = (np.sum(a * b, axis=1, keepdims=True) for a, b in ((s, s), (s, t), (t, t)))
+    return (tt * s - st * t) / (ss * tt - st**2), (ss * t - st * s) / (ss * tt - st**2)
+
+
+def _entry_bounds(vectors: Array, own: Array, other: Array, error: Array | float) -> tuple[Array, Array]:
+    """Return the least product of vectors (n, k, 3) with `own`, and the largest with `other` in magnitude: (n,)."""
+    slack_own, slack_other = (8.0 * np.abs(dual).sum(axis=1) for dual in (own, other))
+    least = _along(vectors, own).min(axis=1) - error * slack_own
+    return least, np.abs(_along(vectors, other)).max(axis=1) + error * slack_other
 
 
 def _along(vectors: Array, direction: Array) -> Array:

@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..files import load_arrays, save_arrays
 from ..spline.bspline import real_array
 from ..spline.volume import FACE_NAMES
+from .flips import orientation
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,17 +71,11 @@ class BoundaryMap:
         return faces
 
     def flipped(self) -> NDArray[np.int64]:
-        """Indices of the triangles whose orientation, seen from the cube's centre c, is not positive.
+        """Return the indices of the triangles that do not face outwards, seen from the cube's centre.
 
-        The orientation is the sign of (p0 - c) . ((p1 - p0) x (p2 - p0)); a triangle without area, within rounding
-        error, counts as flipped. On a common face two of the three cross components vanish exactly.
+        A triangle without area, within rounding error, counts as flipped.
         """
-        p0, p1, p2 = np.moveaxis(self.parameters[self.faces], 1, 0)  # (m, 3) each
-        a, b = p1 - p0, p2 - p0
-        ahead = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
-        behind = a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
-        triple = np.sum((p0 - 0.5) * (ahead - behind), axis=1)
-        noise = 8.0 * np.finfo(np.float64).eps * np.sum(np.abs(p0 - 0.5) * (np.abs(ahead) + np.abs(behind)), axis=1)
+        triple, noise = orientation(self.parameters, self.faces)
         return np.flatnonzero(triple <= noise)
 
     def save(self, path: str | Path) -> None:

@@ -9,13 +9,16 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..spline.volume import BSplineVolume
 from .boundary_map import BoundaryMap
+from .closest_point import damped_fit
+from .cube import snap
 from .cutting import CutMesh, cut_along_rays
-from .flips import snap, untangle
+from .flips import untangle
 
 _SAME = 1e-7  # share of a mesh edge: cuts this close to a vertex take the vertex, which NEAR_EDGE then puts on the edge
 _NUDGE, _NUDGES = 1e-4, 10
 _SETTLE_STEPS = 8
 _UNDO_ROUNDS = 10
+_DAMPING = 1e-3  # against parallel directions
 _MARGIN = 1e-2  # share of a mesh edge that a cut keeps from its ends
 
 
@@ -50,41 +53,40 @@ def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int) -> Array
 
 
 def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameters: Array) -> BoundaryMap:
-    """Move each cut vertex along its mesh edge and its parameter along the cube's edge until F(p) is close to it.
-
-    Gauss-Newton in those two unknowns; corners of the cube and cuts within a face keep their parameter. Steps that turn
-    a triangle are undone.
-    """
-    n = len(vertices)
-    new = np.arange(n, len(parameters))
-    inner = (parameters[new] > 0.0) & (parameters[new] < 1.0)  # (k, 3)
-    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; ends of cuts within a face stay
+    """Move each cut vertex along its mesh edge and its parameter along the cube's edge until F(p) is close to it."""
     best = BoundaryMap(cut.carry(vertices), parameters, cut.faces)
     for _ in range(_SETTLE_STEPS):
-        where, carried = best.parameters[new], best.vertices
-        along_mesh = carried[cut.parents[new, 1]] - carried[cut.parents[new, 0]]
-        along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
-        shift, slide = _fit_two(along_mesh, along_cube, volume(where) - carried[new])
-        share, moved = cut.share.copy(), best.parameters.copy()
-        share[new] = np.clip(share[new] + shift, _MARGIN, 1.0 - _MARGIN)
-        moved[new] = np.where(inner, np.clip(where + slide[:, None], _MARGIN**2, 1.0 - _MARGIN**2), where)
-        trial = replace(cut, share=share)
-        for _ in range(_UNDO_ROUNDS):
-            candidate = BoundaryMap(trial.carry(vertices), moved, cut.faces)
-            turned = np.setdiff1d(cut.faces[candidate.flipped()].ravel(), np.arange(n))
-            if not turned.size:
-                cut, best = trial, candidate
-                break
-            trial.share[turned] = cut.share[turned]
-            moved[turned] = best.parameters[turned]
+        share, moved = _settled_once(volume, cut, best, len(vertices))
+        cut, best = _without_flips(vertices, cut, best, share, moved)
     return best
 
 
-def _fit_two(first: Array, second: Array, right: Array) -> tuple[Array, Array]:
-    """Coefficients a, b (k,) that minimise |a first - b second - right|, damped against parallel directions."""
-    aa, bb, ab = (first * first).sum(1), (second * second).sum(1), -(first * second).sum(1)
-    ra, rb = (first * right).sum(1), -(second * right).sum(1)
-    damping = 1e-3 * (aa + bb) + 1e-300
-    aa, bb = aa + damping, bb + damping
-    determinant = aa * bb - ab * ab
-    return (bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant
+def _settled_once(volume: BSplineVolume, cut: CutMesh, best: BoundaryMap, count: int) -> tuple[Array, Array]:
+    """Return shares (n,) and parameters (n, 3) after a Gauss-Newton step in these two unknowns of each cut vertex.
+
+    The first `count` vertices are those of the input. Corners of the cube and cuts within a face keep their parameter.
+    """
+    where, new = best.parameters[count:], best.vertices[count:]
+    inner = (where > 0.0) & (where < 1.0)  # (k, 3)
+    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; ends of cuts within a face stay
+    start, end = best.vertices[cut.parents[count:].T]
+    along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
+    shift, slide = damped_fit(end - start, -along_cube, volume(where) - new, _DAMPING)
+    share, moved = cut.share.copy(), best.parameters.copy()
+    share[count:] = np.clip(share[count:] + shift, _MARGIN, 1.0 - _MARGIN)
+    moved[count:] = np.where(inner, np.clip(where + slide[:, None], _MARGIN**2, 1.0 - _MARGIN**2), where)
+    return share, moved
+
+
+def _without_flips(
+    vertices: Array, cut: CutMesh, best: BoundaryMap, share: Array, moved: Array
+) -> tuple[CutMesh, BoundaryMap]:
+    """Undo the steps to `share` and `moved` at flipped triangles; return the old cuts and map if some stay flipped."""
+    for _ in range(_UNDO_ROUNDS):
+        trial = replace(cut, share=share)
+        candidate = BoundaryMap(trial.carry(vertices), moved, cut.faces)
+        turned = np.setdiff1d(cut.faces[candidate.flipped()].ravel(), np.arange(len(vertices)))
+        if not turned.size:
+            return trial, candidate
+        share[turned], moved[turned] = cut.share[turned], best.parameters[turned]
+    return cut, best

@@ -11,10 +11,9 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ..arrays import Array, IntArray
 from ..surface.edges import directed_edges, edge_table
+from .cube import CORNERS, EDGES, face_number, project_radially
 from .cutting import CutMesh, cut_along_rays
 
-CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)  # (8, 3), (0,0,0) ... (1,1,1)
-EDGES = [(i, j) for i in range(8) for j in range(i + 1, 8) if np.abs(CORNERS[i] - CORNERS[j]).sum() == 1.0]
 _SNAP = 0.1  # crossings nearer than this share of a mesh edge to a vertex use the vertex: no slivers along the paths
 _STRAY = 20.0  # how much dearer a path gets at one cell's distance from its cube edge
 _CELL = 0.05
@@ -83,7 +82,7 @@ def _trace_in_order(
     """Shortest paths, made dear away from the cube edge they stand for; and the first edge that found no way."""
     edges = edge_table(faces)[0]
     length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
-    radial = 0.5 + (position - 0.5) / (2.0 * np.abs(position - 0.5).max(axis=1, keepdims=True))
+    radial = 0.5 + project_radially(position - 0.5)
     free = np.ones(len(position), dtype=bool)
     free[corners] = False
     paths: dict[int, IntArray] = {}
@@ -133,7 +132,7 @@ def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntAr
             raise PathError(f"a patch between the edge paths has {inside.sum()} corners, not 4")
         spread = np.ptp(CORNERS[inside], axis=0)
         axis = int(np.argmin(spread))
-        labels[k] = 2 * axis + int(CORNERS[inside][0, axis])
+        labels[k] = face_number(axis, int(CORNERS[inside][0, axis]))
     if len(set(labels.tolist())) != 6:
         raise PathError("two patches belong to the same face of the cube")
     return np.asarray(labels[patch], dtype=np.int64)

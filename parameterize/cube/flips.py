@@ -7,33 +7,32 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..arrays import Array, IntArray
+from .cube import snap
 
-NEAR_EDGE = 1e-5  # places closer than this to an edge of the cube are put on it: no slivers from later cuts
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
 _SWEEPS = 600
 _PATIENCE = 60
 _UNDO_ROUNDS = 20
 
 
-def snap(parameters: Array) -> Array:
-    """Radially onto the cube's boundary, and onto an edge or corner where within NEAR_EDGE of it."""
-    centred = parameters - 0.5
-    scaled = centred / (2.0 * np.abs(centred).max(axis=1, keepdims=True))
-    at_side = np.abs(scaled) >= 0.5 - NEAR_EDGE
-    return np.where(at_side, 0.5 + 0.5 * np.sign(scaled), 0.5 + scaled)
+def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
+    """Return (p0 - c) . ((p1 - p0) x (p2 - p0)) of triangles (m, 3), c the cube's centre, and its rounding error: (m,).
 
-
-def sides(places: Array) -> IntArray:
-    """The cube face of each place (n, 3), numbered u0, u1, v0, v1, w0, w1; one of them on an edge: (n,)."""
-    centred = places - 0.5
-    axis = np.abs(centred).argmax(axis=1)
-    return 2 * axis + (centred[np.arange(len(axis)), axis] > 0.0)
+    The product is positive where a triangle faces outwards, seen from the centre. On a common face of the cube two of
+    the three components of the cross product vanish exactly.
+    """
+    p0, p1, p2 = np.moveaxis(places[faces], 1, 0)  # (m, 3) each
+    a, b = p1 - p0, p2 - p0
+    ahead = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
+    behind = a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+    triple = np.sum((p0 - 0.5) * (ahead - behind), axis=1)
+    noise = 8.0 * np.finfo(np.float64).eps * np.sum(np.abs(p0 - 0.5) * (np.abs(ahead) + np.abs(behind)), axis=1)
+    return triple, noise
 
 
 def flipped(places: Array, faces: IntArray) -> NDArray[np.bool_]:
-    """Which triangles (m, 3) do not face outwards, seen from the cube's centre: (m,)."""
-    a, b, c = np.moveaxis((places - 0.5)[faces], 1, 0)
-    return np.asarray(np.einsum("mi,mi->m", a, np.cross(b, c)) <= _FLAT)
+    """Return which triangles (m, 3) do not face outwards, with a margin for what later steps round: (m,)."""
+    return np.asarray(orientation(places, faces)[0] <= _FLAT)
 
 
 def new_flips(before: Array, after: Array, faces: IntArray) -> NDArray[np.bool_]:

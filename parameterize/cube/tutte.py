@@ -16,6 +16,7 @@ from scipy.sparse.linalg import splu
 
 from ..arrays import Array, IntArray
 from ..surface.edges import edge_table
+from .cube import axis_and_side, tangent_axes
 from .cutting import split_edges
 from .edge_paths import cut_surface, edge_targets
 
@@ -44,13 +45,13 @@ def lay_out(mapped: Array, vertices: Array, faces: IntArray, corners: IntArray) 
     fixed = np.zeros(len(places), dtype=bool)
     fixed[path] = True
     pieces = []
-    for side in range(6):
-        patch = surface.cut.faces[surface.face_labels == side]
+    for face in range(6):
+        patch = surface.cut.faces[surface.face_labels == face]
         bridges = _bridges(patch, fixed)
         patch = split_edges(patch, bridges, len(vertices))
         vertices, places = (np.concatenate([x, x[bridges].mean(axis=1)]) for x in (vertices, places))
         fixed = np.concatenate([fixed, np.zeros(len(bridges), dtype=bool)])
-        _spread(places, vertices, patch, fixed, side)
+        _spread(places, vertices, patch, fixed, face)
         pieces.append(patch)
     return Layout(vertices, np.concatenate(pieces), places)
 
@@ -61,10 +62,10 @@ def _bridges(patch: IntArray, fixed: NDArray[np.bool_]) -> IntArray:
     return edges[(count == 2) & fixed[edges].all(axis=1)]
 
 
-def _spread(places: Array, vertices: Array, patch: IntArray, fixed: NDArray[np.bool_], side: int) -> None:
+def _spread(places: Array, vertices: Array, patch: IntArray, fixed: NDArray[np.bool_], face: int) -> None:
     """Put the inner vertices of a patch (m, 3) on their cube face, in place."""
-    axis = side // 2
-    plane = [(axis + 1) % 3, (axis + 2) % 3][:: 1 if side % 2 else -1]  # counter-clockwise seen from outside
+    axis, end = axis_and_side(face)
+    plane = tangent_axes(axis)[:: 1 if end else -1]  # counter-clockwise seen from outside
     used, triangles = np.unique(patch, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
     flat = places[used][:, plane]
@@ -73,7 +74,7 @@ def _spread(places: Array, vertices: Array, patch: IntArray, fixed: NDArray[np.b
     matrix = eye_array(int(inner.sum()), format="csc") - weights[inner][:, inner].tocsc()
     flat[inner] = splu(matrix).solve(weights[inner][:, ~inner] @ flat[~inner])
     places[used[inner][:, None], plane] = flat[inner]
-    places[used[inner], axis] = side % 2
+    places[used[inner], axis] = end
 
 
 def _combinations(flat: Array, vertices: Array, triangles: IntArray) -> csr_array:

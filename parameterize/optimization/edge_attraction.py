@@ -9,59 +9,45 @@ crosses itself beside them.
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from torch import Tensor
 
 from ..arrays import Array
-from ..cube.flips import sides
+from ..config import SplineConfig
+from ..cube.cube import CORNERS, EDGES
 from ..quality.distances import nearest_on_mesh
 from ..spline.bspline import divided_spans
+from .sliding import SlidingParameters
 from .surface_distance import SurfaceFit
 
 _A_SPAN = 2
-_NEAR = 0.5  # of a span's length at volume 1
-_NEARLY_ALL = 0.99
-_GIVEN = 0.5  # weight of a given corner, where the distance along the normal has 1
 
 
 def edge_points(knots: tuple[Array, Array, Array]) -> Array:
     """Parameters (k, 3): the corners of the cube, the ends of the spans along its edges and their middles."""
     points = []
-    for axis in range(3):
-        along = divided_spans(knots[axis], _A_SPAN)
-        for side in product((0.0, 1.0), repeat=2):
-            rows: list[Array | float] = [*side]
-            rows.insert(axis, along)
-            points.append(np.stack(np.broadcast_arrays(*rows), axis=1))
+    for i, j in EDGES:
+        direction = CORNERS[j] - CORNERS[i]
+        along = divided_spans(knots[int(direction.argmax())], _A_SPAN)
+        points.append(CORNERS[i] + along[:, None] * direction)
     return np.unique(np.concatenate(points), axis=0)
 
 
 class EdgeAnchors:
     """The anchors as a SurfaceFit whose parameters stay; they pull on nothing until they are aimed."""
 
-    def __init__(self, surface: SurfaceFit, tangential: float) -> None:
-        self._surface, self._tangential = surface, tangential
-        places = edge_points(surface.knots)
-        count = len(places)
-        self.fit = SurfaceFit(
-            surface.knots,
-            surface.degree,
-            places,
-            np.zeros((count, 3, 3)),
-            np.full(count, 1.0 / count),
-            places,
-            sides(places),
-            np.zeros((0, 3), dtype=np.int64),
-            device=surface.device,
-        )
+    def __init__(self, surface: SurfaceFit, config: SplineConfig) -> None:
+        self._surface, self._config = surface, config
+        knots, degree, device = surface.places.knots, surface.places.degree, surface.places.device
+        points, no_triangles = edge_points(knots), np.zeros((0, 3), dtype=np.int64)
+        places = SlidingParameters(knots, degree, points, no_triangles, device=device)
+        self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
     def near(self, control: Tensor) -> bool:
-        """Whether F is so close to the surface all along the edges that the nearest points are the right ones."""
+        """Return whether F is so close to the surface along all edges that the nearest points are the right ones."""
         here, points, _ = self._nearest(control)
-        longest = _NEAR / (min(control.shape[1:]) - self.fit.degree)
-        return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= _NEARLY_ALL
+        longest = self._config.near_edge / (min(control.shape[1:]) - self.fit.places.degree)
+        return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= self._config.near_share
 
     def aim(self, control: Tensor, *, hold: bool) -> None:
         """Take the points of the surface nearest to F as it is, each with the normal of its triangle.
@@ -69,7 +55,7 @@ class EdgeAnchors:
         hold: leave given corners at their places.
         """
         _, points, normals = self._nearest(control)
-        quadrics = normals[:, :, None] * normals[:, None, :] + self._tangential * np.eye(3)
+        quadrics = normals[:, :, None] * normals[:, None, :] + self._config.tangential * np.eye(3)
         if hold:
             self._hold(points, quadrics)
         self.fit.aim(points, quadrics)
@@ -83,8 +69,8 @@ class EdgeAnchors:
     def _hold(self, points: Array, quadrics: Array) -> None:
         """Put given corners in place of those."""
         if (given := self._surface.given_corners) is not None:
-            corner = np.isin(self.fit.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
-            points[corner], quadrics[corner] = given, _GIVEN * np.eye(3)
+            corner = np.isin(self.fit.places.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
+            points[corner], quadrics[corner] = given, self._config.given_corner * np.eye(3)
 
     def restore(self, points: Array, yielding: Array) -> None:
         """Take the state of a checkpoint: the next distances then round as they would have without the interruption."""
@@ -94,4 +80,4 @@ class EdgeAnchors:
     def _nearest(self, control: Tensor) -> tuple[Array, Array, Array]:
         """F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""
         here = self.fit.residuals(control) + self.fit.points
-        return here, *nearest_on_mesh(here, self._surface.points, self._surface.triangles)
+        return here, *nearest_on_mesh(here, self._surface.points, self._surface.places.triangles)

@@ -16,12 +16,12 @@ from ..config import SplineConfig
 from .cg import Operator, conjugate_gradients
 from .determinant_penalty import SpanBarrier
 from .edge_attraction import EdgeAnchors
-from .polar import closest_rotation, cofactor, cross, least_eigenvalue
+from .normals import FacingPenalty, facing_penalty
+from .polar import closest_rotation, cofactor_and_determinant, cross, least_eigenvalue
 from .surface_distance import SurfaceFit
 from .tensor_product import BendingOperator, FastDiagonalization, gauss_grid, grams
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
-_PULL = 3e-4  # share of the boundary's weight in the preconditioner: more would hold back what slides along the surface
 Knots = tuple[Array, Array, Array]
 
 
@@ -53,8 +53,7 @@ class DistortionEnergy:
         config, weights = self._config, self._weights
         jacobian = self._grid.jacobian(control)
         flat = jacobian.flatten(2)  # (3, 3, m)
-        cofactors = cofactor(flat)
-        det = (flat[0] * cofactors[0]).sum(0)
+        cofactors, det = cofactor_and_determinant(flat)
         shortfall = weights * (config.min_det - det).clamp_min(0.0)
         gap = flat - closest_rotation(flat)
         density = gap.square().sum(dim=(0, 1))
@@ -75,9 +74,8 @@ class DistortionEnergy:
         jacobian = self._rough_grid.jacobian(control.to(_ROUGH))
         flat = jacobian.flatten(2)
         rotation = closest_rotation(flat)
-        cofactors = cofactor(flat)
-        low = (flat[0] * cofactors[0]).sum(0) < config.min_det
-        push = (2.0 * penalty * weights * low).sqrt() * cofactors
+        cofactors, det = cofactor_and_determinant(flat)
+        push = (2.0 * penalty * weights * (det < config.min_det)).sqrt() * cofactors
         gap = flat - rotation
         excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
         pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
@@ -105,8 +103,8 @@ def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
     lift = (2.0 - least_eigenvalue(sums)).clamp_min(0.0)
     for i in range(3):
         sums[i, i] += lift
-    inverse = cofactor(sums)
-    return inverse / (sums[0] * inverse[0]).sum(0)
+    cofactors, det = cofactor_and_determinant(sums)  # of a symmetric matrix
+    return cofactors / det
 
 
 class SplineEnergy:
@@ -114,7 +112,8 @@ class SplineEnergy:
 
     def __init__(self, config: SplineConfig, knots: Knots, surface: SurfaceFit, *, device: torch.device) -> None:
         self.config, self.surface = config, surface
-        self.anchors = EdgeAnchors(surface, config.tangential)
+        self.anchors = EdgeAnchors(surface, config)
+        self._facing: FacingPenalty | None = None
         self.penalty = config.penalties[0]
         self._distortion = DistortionEnergy(knots, config, device=device)
         mass, slope, curve = grams(knots, config.degree, device)
@@ -122,7 +121,7 @@ class SplineEnergy:
         self._rough_bending = self._bending.to(_ROUGH)
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient, device=device)
         ends = torch.zeros_like(mass[0])
-        ends[0, 0] = ends[-1, -1] = _PULL * config.vertex / 6.0  # the points spread over six faces
+        ends[0, 0] = ends[-1, -1] = config.pull * config.vertex / 6.0  # the points spread over six faces
         rough = tuple(2.0 * k + 2.0 * config.fairness * h + ends for k, h in zip(slope, curve, strict=True))
         self._precondition = FastDiagonalization(rough, mass).to(_ROUGH)
 
@@ -131,10 +130,21 @@ class SplineEnergy:
         self.penalty = penalty
         self._distortion.set_limit(control)
 
+    def watch_facing(self, control: Tensor) -> None:
+        """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
+        self._facing = facing_penalty(self.surface, control, self.config.min_facing, self.config.facing_margin)
+
+    def slide(self, control: Tensor) -> None:
+        """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
+        for _ in range(self.config.slides):
+            self.surface.places.slide(control, self.surface.points, 0.5 / control.shape[1])
+        self.surface.places.relax(self.config.relaxations)
+        self.watch_facing(control)
+
     def give_way(self, spans: IntArray, factor: float) -> None:
         """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""
         for fit in (self.surface, self.anchors.fit):
-            fit.give_way(np.where(fit.near_spans(spans), factor, 1.0) * fit.yielding)
+            fit.give_way(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.yielding)
 
     def take_back(self, factor: float) -> None:
         """Divide by `factor` what such factors have become, up to 1."""
@@ -154,9 +164,12 @@ class SplineEnergy:
         config = self.config
         off, pull = self.surface.energy_and_gradient(control)
         off_edges, pull_edges = self.anchors.fit.energy_and_gradient(control)
-        turned, push = self.surface.facing_energy_and_gradient(control)
-        energy = config.vertex * (off + config.anchors * off_edges) + self.penalty * turned
-        return energy, config.vertex * (pull + config.anchors * pull_edges) + self.penalty * push
+        energy = config.vertex * (off + config.anchors * off_edges)
+        gradient = config.vertex * (pull + config.anchors * pull_edges)
+        if self._facing is None:
+            return energy, gradient
+        turned, push = self._facing.energy_and_gradient(control)
+        return energy + self.penalty * turned, gradient + self.penalty * push
 
     def newton_direction(self, control: Tensor, right: Tensor) -> Tensor:
         """Approximate solution of Hessian x = right at `control`, the parameters of the surface held."""
@@ -164,7 +177,7 @@ class SplineEnergy:
         surface, anchors = self.surface.hessian(_ROUGH), self.anchors.fit.hessian(_ROUGH)
         distortion = self._distortion.curvature(control, self.penalty)
         barrier = self.barrier.curvature(control)
-        facing = self.surface.facing_curvature(control, _ROUGH)
+        facing = torch.zeros_like if self._facing is None else self._facing.curvature(control, _ROUGH)
 
         def hessian(x: Tensor) -> Tensor:
             inner = distortion(x) + self._rough_bending(x) + self.penalty * (barrier(x) + facing(x))

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 from torch import Tensor
 
 from ..arrays import Array
-from ..spline.bspline import basis_derivatives
+from ..spline.bspline import basis_derivatives, sparse_rows, window_numbers
 from .cg import conjugate_gradients
 from .tensor_product import BendingOperator, FastDiagonalization, grams, to_torch
 
@@ -45,14 +45,10 @@ def fit_pairs(
 
 
 def _collocation_3d(parameters: Array, knots: tuple[Array, Array, Array], degree: int) -> csr_array:
-    """Rows of tensor-product basis values (m, n_u n_v n_w)."""
+    """Return rows of tensor-product basis values: (m, n_u n_v n_w)."""
     tables = [basis_derivatives(k, degree, parameters[:, d]) for d, k in enumerate(knots)]
     sizes = [len(k) - degree - 1 for k in knots]
-    window = np.arange(degree + 1)
-    i, j, k = (first[:, None] + window for first, _ in tables)
-    columns = (i[:, :, None, None] * sizes[1] + j[:, None, :, None]) * sizes[2] + k[:, None, None, :]
+    columns = window_numbers([first[:, None] + np.arange(degree + 1) for first, _ in tables], sizes)
     u, v, w = (values[0] for _, values in tables)
     values = u[:, :, None, None] * v[:, None, :, None] * w[:, None, None, :]
-    width = (degree + 1) ** 3
-    starts = np.arange(0, len(parameters) * width + 1, width)
-    return csr_array((values.ravel(), columns.ravel(), starts), shape=(len(parameters), int(np.prod(sizes))))
+    return sparse_rows(values.reshape(columns.shape), columns, int(np.prod(sizes)))

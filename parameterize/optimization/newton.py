@@ -29,14 +29,7 @@ from .surface_distance import SurfaceFit
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
-_SLIDES = 2  # of the boundary parameters after each step
-_RELAXATIONS = 1  # sweeps over triangles that they turned over
 _SHORTEST_STEP = 1e-6
-_LEAST_STEPS = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
-# After so many rounds the anchors let go, and the surface gives way where the map is not proved: a cube edge in a
-# valley cannot lie on it.
-_PATIENT_ROUNDS = 2
-_GIVING_WAY = 0.25  # of the weights there, each round
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +62,16 @@ def optimize(
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with _one_thread_an_operation():
         energy = SplineEnergy(config, knots, surface, device=control.device)
-        return _rounds(control, knots, energy, history, progress, checkpoints)
+        energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
+        first = Optimized(control, _certify(control, knots, config))
+        rounds = _Rounds(energy, knots, control, first, near=energy.anchors.near(control))
+        if (saved := checkpoints.load(_CHECKPOINT)) is not None:
+            rounds.restore(*saved, history)
+        while not rounds.finished:
+            rounds.begin()
+            rounds.conclude(_descend(rounds.control, energy, rounds.number, history, progress))
+            rounds.save(checkpoints, history)
+    return rounds.best
 
 
 @contextmanager
@@ -83,79 +85,86 @@ def _one_thread_an_operation() -> Iterator[None]:
         torch.set_num_threads(threads)
 
 
-def _rounds(
-    control: Tensor,
-    knots: Knots,
-    energy: SplineEnergy,
-    history: History,
-    progress: ProgressCallback,
-    checkpoints: Checkpoints,
-) -> Optimized:
-    """Descend, certify, watch the spans not proved, until certified or at the end of the penalties."""
-    config = energy.config
-    energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
-    best = Optimized(control, certify(_as_volume(control, knots, config.degree)))
-    near = energy.anchors.near(control)
-    first, polished = 0, 0
-    if (saved := checkpoints.load(_CHECKPOINT)) is not None:
-        first, control, best = _restore(*saved, energy, best, knots)
-        history.rows[:] = [tuple(row) for row in saved[1]["history"]]
-        polished = int(saved[1]["polished"])
-    for number in range(first, config.rounds):
-        if best.certificate.verdict == "certified" and number > 0:
-            if polished == config.polish:
-                break
-            polished += 1
-            energy.take_back(_GIVING_WAY)
-        if polished or (near and number < _PATIENT_ROUNDS):
-            energy.anchors.aim(control, hold=not polished)
+@dataclass
+class _Rounds:
+    """Where the optimisation stands between two rounds; number and polished count those done."""
+
+    energy: SplineEnergy
+    knots: Knots
+    control: Tensor
+    best: Optimized
+    near: bool  # whether F was close to the surface all along the cube's edges to begin with
+    number: int = 0
+    polished: int = 0  # rounds after the map was certified for the first time
+
+    @property
+    def certified(self) -> bool:
+        """Whether a round has ended with a certified map."""
+        return self.number > 0 and self.best.certificate.verdict == "certified"
+
+    @property
+    def finished(self) -> bool:
+        """Whether no round is left."""
+        config = self.energy.config
+        return self.number >= config.rounds or (self.certified and self.polished == config.polish)
+
+    def begin(self) -> None:
+        """Weigh penalties, surface data and anchors for the next round."""
+        config, energy = self.energy.config, self.energy
+        if self.certified:
+            self.polished += 1
+            energy.take_back(config.giving_way)
+        if self.polished or (self.near and self.number < config.patient_rounds):
+            energy.anchors.aim(self.control, hold=not self.polished)
         else:
             energy.anchors.release()
-        energy.start_round(control, config.penalties[min(number, len(config.penalties) - 1)])
-        control = _descend(control, energy, number, history, progress)
-        certificate = certify(_as_volume(control, knots, config.degree))
-        _log.info("round %d: %s, %d spans unproved", number, certificate.verdict, len(certificate.unproved))
-        if number == 0 or len(certificate.unproved) <= len(best.certificate.unproved):
-            best = Optimized(control, certificate)
-        energy.barrier.activate(certificate.unproved)
-        if number >= _PATIENT_ROUNDS and not polished and len(certificate.unproved):
-            energy.give_way(certificate.unproved, _GIVING_WAY)
-        _save(checkpoints, {"number": number + 1, "polished": polished}, control, best, energy, history)
-    return best
+        energy.start_round(self.control, config.penalties[min(self.number, len(config.penalties) - 1)])
+
+    def conclude(self, control: Tensor) -> None:
+        """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
+        self.control = control
+        certificate = _certify(control, self.knots, self.energy.config)
+        unproved = certificate.unproved
+        _log.info("round %d: %s, %d spans unproved", self.number, certificate.verdict, len(unproved))
+        if self.number == 0 or len(unproved) <= len(self.best.certificate.unproved):
+            self.best = Optimized(control, certificate)
+        self.energy.barrier.activate(unproved)
+        if self.number >= self.energy.config.patient_rounds and not self.polished and len(unproved):
+            self.energy.give_way(unproved, self.energy.config.giving_way)
+        self.number += 1
+
+    def save(self, checkpoints: Checkpoints, history: History) -> None:
+        """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
+        surface, anchors = self.energy.surface, self.energy.anchors.fit
+        tensors = {
+            "control": self.control,
+            "best": self.best.control,
+            "parameters": torch.as_tensor(surface.places.parameters),
+            "cube_faces": torch.as_tensor(surface.places.cube_faces),
+            "yielding": torch.as_tensor(surface.yielding),
+            "anchors": torch.as_tensor(anchors.points),
+            "anchors_yielding": torch.as_tensor(anchors.yielding),
+            "active": torch.as_tensor(self.energy.barrier.active),
+        }
+        state = {"number": self.number, "polished": self.polished, "history": history.rows}
+        checkpoints.save(_CHECKPOINT, tensors, state)
+
+    def restore(self, tensors: dict[str, Tensor], state: dict[str, Any], history: History) -> None:
+        """Continue from a checkpoint that `save` has kept."""
+        device, energy = self.control.device, self.energy
+        energy.surface.places.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
+        energy.surface.give_way(tensors["yielding"].numpy())
+        energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
+        energy.barrier.activate(tensors["active"].numpy())
+        self.control, best = tensors["control"].to(device), tensors["best"].to(device)
+        self.best = Optimized(best, _certify(best, self.knots, energy.config))
+        self.number, self.polished = int(state["number"]), int(state["polished"])
+        history.rows[:] = [tuple(row) for row in state["history"]]
 
 
-def _save(
-    checkpoints: Checkpoints,
-    state: dict[str, Any],
-    control: Tensor,
-    best: Optimized,
-    energy: SplineEnergy,
-    history: History,
-) -> None:
-    tensors = {
-        "control": control,
-        "best": best.control,
-        "parameters": torch.as_tensor(energy.surface.parameters),
-        "cube_faces": torch.as_tensor(energy.surface.cube_faces),
-        "yielding": torch.as_tensor(energy.surface.yielding),
-        "anchors": torch.as_tensor(energy.anchors.fit.points),
-        "anchors_yielding": torch.as_tensor(energy.anchors.fit.yielding),
-        "active": torch.as_tensor(energy.barrier.active),
-    }
-    checkpoints.save(_CHECKPOINT, tensors, state | {"history": history.rows})
-
-
-def _restore(
-    tensors: dict[str, Tensor], state: dict[str, Any], energy: SplineEnergy, best: Optimized, knots: Knots
-) -> tuple[int, Tensor, Optimized]:
-    """Next round, control points and best result of a checkpoint; parameters and active spans go back in place."""
-    device = best.control.device
-    energy.surface.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
-    energy.surface.give_way(tensors["yielding"].numpy())
-    energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
-    energy.barrier.activate(tensors["active"].numpy())
-    control, kept = tensors["control"].to(device), tensors["best"].to(device)
-    return int(state["number"]), control, Optimized(kept, certify(_as_volume(kept, knots, energy.config.degree)))
+def _certify(control: Tensor, knots: Knots, config: SplineConfig) -> Certificate:
+    points = control.permute(1, 2, 3, 0).cpu().numpy()
+    return certify(BSplineVolume((config.degree,) * 3, knots, points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,11 +215,11 @@ def _descend(
     history: History,
     progress: ProgressCallback,
 ) -> Tensor:
-    """One round of Newton steps with sliding boundary parameters."""
-    steps = energy.config.steps
-    usual = steps * (len(energy.config.penalties) + energy.config.polish)  # hard shapes take more
+    """Return the control points after one round of Newton steps with sliding boundary parameters."""
+    config, steps = energy.config, energy.config.steps
+    usual = steps * (len(config.penalties) + config.polish)  # hard shapes take more
     started = time.perf_counter()
-    energy.surface.watch_facing(control, energy.config.min_facing)
+    energy.watch_facing(control)
     point = _evaluate(control, energy)
     lowest, waited = point.total, 0
     for step in range(steps):
@@ -219,24 +228,16 @@ def _descend(
             _log.info("round %d: no descent after step %d", number, step)
             break
         gain = point.total - found.total
-        for _ in range(_SLIDES):
-            energy.surface.slide(found.control, 0.5 / control.shape[1])
-        energy.surface.relax(_RELAXATIONS)
-        energy.surface.watch_facing(found.control, energy.config.min_facing)
+        energy.slide(found.control)
         point = replace(found, outer=energy.surface_part(found.control))
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
         total = max(usual, (number + 1) * steps)
         left = (time.perf_counter() - started) / (step + 1) * (total - done)
         progress(Progress("spline", done, total, point.total, point.folded, left))
-        enough = energy.config.gain if number else energy.config.first_gain
+        enough = config.gain if number else config.first_gain
         waited = 0 if point.total < (1.0 - enough) * lowest else waited + 1
         lowest = min(lowest, point.total)
-        if step + 1 >= _LEAST_STEPS and (gain < enough * point.total or waited >= _LEAST_STEPS):
+        if step + 1 >= config.least_steps and (gain < enough * point.total or waited >= config.least_steps):
             break
     return point.control
-
-
-def _as_volume(control: Tensor, knots: Knots, degree: int) -> BSplineVolume:
-    points = control.permute(1, 2, 3, 0).cpu().numpy()
-    return BSplineVolume((degree,) * 3, knots, points)

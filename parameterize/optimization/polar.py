@@ -23,6 +23,12 @@ def cofactor(j: Tensor) -> Tensor:
     return cross(cyclic[1:4], cyclic[2:5])
 
 
+def cofactor_and_determinant(j: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the matrices of cofactors (3, 3, m) and the determinants (m,), expanded along the first row."""
+    cofactors = cofactor(j)
+    return cofactors, (j[0] * cofactors[0]).sum(0)
+
+
 def cross(a: Tensor, b: Tensor) -> Tensor:
     """Cross products of rows (k, 3, m), row by row; slices along the samples are fast."""
     a, b = torch.cat([a, a[:, :2]], dim=1), torch.cat([b, b[:, :2]], dim=1)  # (k, 5, m)
@@ -52,8 +58,8 @@ def closest_rotation(j: Tensor, iterations: int = 7) -> Tensor:
     identity = torch.eye(3, dtype=j.dtype, device=j.device)[:, :, None]
     r = torch.where(regular, j / size, identity).float()
     for _ in range(iterations - 2):
-        inverse_t = cofactor(r)
-        inverse_t /= (r[0] * inverse_t[0]).sum(0)
+        cofactors, det = cofactor_and_determinant(r)
+        inverse_t = cofactors.div_(det)
         g = (inverse_t.square().sum(dim=(0, 1)) / r.square().sum(dim=(0, 1))).sqrt().sqrt()
         r = r.mul_(g).add_(inverse_t.div_(g)).mul_(0.5)
     for kind in (torch.float32, j.dtype):  # close to the rotation g is 1

@@ -21,13 +21,11 @@ _END_SPANS = 1
 
 
 def along(matrix: Tensor, field: Tensor, axis: int) -> Tensor:
-    """Apply a matrix (m, n) along axis 0, 1 or 2 of a field (3, n_0, n_1, n_2)."""
-    if axis == 2:
+    """Apply a matrix (m, n) along one axis of a field, in as few and as large products as the layout allows."""
+    before, after = field.shape[:axis], field.shape[axis + 1 :]
+    if not after:
         return field @ matrix.T
-    if axis == 1:
-        return matrix @ field
-    a, b, c = field.shape[1:]
-    return (matrix @ field.reshape(3, a, b * c)).reshape(3, -1, b, c)
+    return (matrix @ field.reshape(-1, field.shape[axis], after.numel())).view(*before, len(matrix), *after)
 
 
 def to_torch(matrix: csr_array, device: torch.device) -> Tensor:
@@ -42,31 +40,69 @@ def to_torch(matrix: csr_array, device: torch.device) -> Tensor:
 
 
 @dataclass(frozen=True, eq=False)
+class ControlRows:
+    """A sparse matrix (N, n_u n_v n_w) that applies to control points (3, n_u, n_v, n_w), and its transpose."""
+
+    matrix: Tensor
+    transposed: Tensor
+
+    @classmethod
+    def of(cls, rows: csr_array, device: torch.device) -> ControlRows:
+        """Take the rows of a scipy matrix."""
+        return cls(to_torch(rows, device), to_torch(csr_array(rows.T), device))
+
+    def to(self, dtype: torch.dtype) -> ControlRows:
+        """Return the same rows in another precision."""
+        return ControlRows(self.matrix.to(dtype), self.transposed.to(dtype))
+
+    def __call__(self, control: Tensor) -> Tensor:
+        """Return the values (N, 3) at control points."""
+        return self.matrix @ control.reshape(3, -1).T
+
+    def adjoint(self, dual: Tensor, like: Tensor) -> Tensor:
+        """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
+        return (self.transposed @ dual).T.reshape(like.shape)
+
+
+@dataclass(frozen=True, eq=False)
 class TensorGrid:
-    """Basis values and derivatives (m, n) at the grid's points, one pair of matrices a direction."""
+    """Basis values and derivatives (m, n) at the grid's points, one pair of matrices a direction.
+
+    order: the directions in the order of their contraction. Fields may have further axes behind the three of the grid;
+    there the contractions are fastest from the last direction to the first.
+    """
 
     values: tuple[Tensor, Tensor, Tensor]
     slopes: tuple[Tensor, Tensor, Tensor]
+    order: tuple[int, int, int] = (0, 1, 2)
 
     def to(self, dtype: torch.dtype) -> TensorGrid:
-        """The same grid in another precision."""
+        """Return the same grid in another precision."""
         values, slopes = (tuple(m.to(dtype) for m in part) for part in (self.values, self.slopes))
-        return TensorGrid(values, slopes)  # type: ignore[arg-type]
+        return TensorGrid(values, slopes, self.order)  # type: ignore[arg-type]
 
     def jacobian(self, control: Tensor) -> Tensor:
-        """(3, n_u, n_v, n_w) -> (3, 3, m_u, m_v, m_w): component, direction, grid."""
-        (b0, b1, b2), (d0, d1, d2) = self.values, self.slopes
-        plain, slope = along(b0, control, 0), along(d0, control, 0)
-        by_v = along(d1, plain, 1)
-        plain = along(b1, plain, 1)
-        return torch.stack([along(b2, along(b1, slope, 1), 2), along(b2, by_v, 2), along(d2, plain, 2)], dim=1)
+        """Return J (component, direction, grid): (3, n_u, n_v, n_w, ...) -> (3, 3, m_u, m_v, m_w, ...)."""
+        i, j, k = self.order
+        values, slopes = self.values, self.slopes
+        plain, by_i = along(values[i], control, i + 1), along(slopes[i], control, i + 1)
+        by_i = along(values[j], by_i, j + 1)
+        plain, by_j = along(values[j], plain, j + 1), along(slopes[j], plain, j + 1)
+        columns = {
+            i: along(values[k], by_i, k + 1),
+            j: along(values[k], by_j, k + 1),
+            k: along(slopes[k], plain, k + 1),
+        }
+        return torch.stack([columns[direction] for direction in range(3)], dim=1)
 
     def adjoint(self, dual: Tensor) -> Tensor:
-        """The transpose of `jacobian`: (3, 3, m_u, m_v, m_w) -> (3, n_u, n_v, n_w)."""
-        (b0, b1, b2), (d0, d1, d2) = ([m.T for m in part] for part in (self.values, self.slopes))
-        slope = along(b1, along(b2, dual[:, 0], 2), 1)
-        plain = along(d1, along(b2, dual[:, 1], 2), 1) + along(b1, along(d2, dual[:, 2], 2), 1)
-        return along(d0, slope, 0) + along(b0, plain, 0)
+        """Apply the transpose of `jacobian`: (3, 3, m_u, m_v, m_w, ...) -> (3, n_u, n_v, n_w, ...)."""
+        i, j, k = self.order
+        values, slopes = ([m.T for m in part] for part in (self.values, self.slopes))
+        by_i = along(values[j], along(values[k], dual[:, i], k + 1), j + 1)
+        by_j = along(slopes[j], along(values[k], dual[:, j], k + 1), j + 1)
+        plain = by_j + along(values[j], along(slopes[k], dual[:, k], k + 1), j + 1)
+        return along(slopes[i], by_i, i + 1) + along(values[i], plain, i + 1)
 
 
 def gauss_grid(
@@ -137,12 +173,12 @@ class BendingOperator:
     def __call__(self, x: Tensor) -> Tensor:
         """(3, n_u, n_v, n_w) -> the same shape."""
         (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = self.mass, self.slope, self.curve
-        xm, xk, xh = along(m2, x, 2), along(k2, x, 2), along(h2, x, 2)
-        mm = along(m1, xm, 1)
-        first = along(k1, xm, 1) + along(m1, xk, 1)
-        second = along(h1, xm, 1) + along(m1, xh, 1) + 2.0 * along(k1, xk, 1)
-        result = along(self.weight * h0, mm, 0) + along(m0, self.weight * second, 0)
-        return result + along(2.0 * self.weight * k0, first, 0)
+        xm, xk, xh = along(m2, x, 3), along(k2, x, 3), along(h2, x, 3)
+        mm = along(m1, xm, 2)
+        first = along(k1, xm, 2) + along(m1, xk, 2)
+        second = along(h1, xm, 2) + along(m1, xh, 2) + 2.0 * along(k1, xk, 2)
+        result = along(self.weight * h0, mm, 1) + along(m0, self.weight * second, 1)
+        return result + along(2.0 * self.weight * k0, first, 1)
 
 
 class FastDiagonalization:
@@ -171,9 +207,9 @@ class FastDiagonalization:
 
     def __call__(self, residual: Tensor) -> Tensor:
         """(3, n_u, n_v, n_w) -> the same shape."""
-        for axis, vectors in enumerate(self._vectors):
+        for axis, vectors in enumerate(self._vectors, start=1):
             residual = along(vectors.T, residual, axis)
         residual = residual * self._inverse
-        for axis, vectors in enumerate(self._vectors):
+        for axis, vectors in enumerate(self._vectors, start=1):
             residual = along(vectors, residual, axis)
         return residual

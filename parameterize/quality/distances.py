@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
+from ..cube.closest_point import damped_fit
+from ..cube.cube import axis_and_side, tangent_axes
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import doubled_areas
 
 SAMPLES = 160  # a direction and cube face
 
 _NEWTON_STEPS = 5
+_DAMPING = 1e-12  # tangents may be parallel at an edge of the cube
 _CONVERGED = 1e-3  # a step that gains less than this share of the distance is the last
 
 
@@ -56,11 +59,10 @@ class SampledBoundary:
         a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
         face = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
         parameters, points = [], []
-        for axis in range(3):
-            for side in (0.0, 1.0):
-                u, v, w = (np.array([side]) if k == axis else row for k in range(3))
-                parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
-                points.append(volume.grid(u, v, w).reshape(-1, 3))
+        for axis, side in map(axis_and_side, range(6)):
+            u, v, w = (np.array([float(side)]) if k == axis else row for k in range(3))
+            parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
+            points.append(volume.grid(u, v, w).reshape(-1, 3))
         triangles = np.concatenate([face + k * samples**2 for k in range(6)])
         return cls(np.concatenate(parameters), np.concatenate(points), triangles.astype(np.int64))
 
@@ -97,7 +99,7 @@ def foot_points(
     corners = boundary.triangles[triangle]  # (m, 3)
     where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
     cube_face = 6 * triangle // len(boundary.triangles)
-    axis = cube_face // 2  # the direction that is constant on the face
+    axis, _ = axis_and_side(cube_face)
     where[np.arange(len(where)), axis] = boundary.parameters[corners[:, 0]][np.arange(len(where)), axis]
     best: Array = np.linalg.norm(volume(where) - points, axis=1)
     active = np.arange(len(points))
@@ -115,17 +117,14 @@ def foot_points(
 
 
 def _foot_step(volume: BSplineVolume, where: Array, points: Array, axis: NDArray[np.int64]) -> Array:
-    """Gauss-Newton step towards the nearest point on each point's cube face: (m, 3), zero along `axis`."""
-    rows = np.arange(len(where))
-    tangents = volume.jacobian(where)  # (m, 3, 3)
-    tangents[rows, :, axis] = 0.0
-    normal = np.swapaxes(tangents, 1, 2) @ tangents
-    size = np.trace(normal, axis1=1, axis2=2)
-    normal[rows, axis, axis] = 1.0
-    damping = np.maximum(1e-12 * size, np.finfo(np.float64).tiny)  # tangents may be parallel at an edge of the cube
-    normal += damping[:, None, None] * np.eye(3)
-    slope = np.einsum("mab,ma->mb", tangents, points - volume(where))
-    return np.asarray(np.linalg.solve(normal, slope[..., None])[..., 0])
+    """Return the Gauss-Newton step towards the nearest point on each point's cube face: (m, 3), zero along `axis`."""
+    rows, (a, b) = np.arange(len(where)), tangent_axes(axis)
+    jacobian = volume.jacobian(where)  # (m, 3, 3)
+    step = np.zeros_like(where)
+    step[rows, a], step[rows, b] = damped_fit(
+        jacobian[rows, :, a], jacobian[rows, :, b], points - volume(where), _DAMPING
+    )
+    return step
 
 
 def _closest(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64], Array]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, in_brackets
-from ..certificate.boundary import BoundaryCheck, check_boundary
+from ..certificate.boundary import BoundaryCheck
 from ..certificate.jacobian import Certificate
 from ..cube.boundary_map import BoundaryMap
 from ..spline.bspline import gauss_points
@@ -121,12 +121,14 @@ def measure(
     scale: float,
     boundary: BoundaryMap,
     certificate: Certificate,
+    boundary_check: BoundaryCheck,
 ) -> QualityReport:
-    """Measure a volume against the mesh it came from.
+    """Measure a volume against the mesh it came from, and return that with what is proved of the volume.
 
     volume, surface_vertices (n, 3), surface_faces (m, 3) and boundary: all in the user's units. The boundary map starts
     with the surface's vertices, in their order.
     scale: the factor that brings the model to volume 1 (Surface.scale).
+    certificate, boundary_check: from `certify` and `check_boundary`.
     Raises ValueError for a scale that is not positive or a boundary map of fewer vertices.
     """
     if not (isfinite(scale) and scale > 0.0):
@@ -148,7 +150,7 @@ def measure(
         mesh_to_spline=_both(to_boundary(vertices, volume, sampled), scale),
         mesh_vertices=len(vertices),
         spline_to_mesh=_both(to_mesh(sampled.points, vertices, faces), scale),
-        boundary_check=check_boundary(volume),
+        boundary_check=boundary_check,
     )
 
 

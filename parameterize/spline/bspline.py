@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array, identity
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 
 
 def open_uniform_knots(n_control_points: int, degree: int) -> Array:
@@ -123,10 +123,21 @@ def _differentiate(knots: Array, q: int, spans: NDArray[np.int64], lower: Array)
 def collocation(knots: Array, degree: int, x: ArrayLike, derivative: int = 0) -> csr_array:
     """Sparse matrix (m, n) with the given derivative of every basis function at every point."""
     first, values = basis_derivatives(knots, degree, x, derivative)
-    m, width = values.shape[1:]
-    columns = first[:, None] + np.arange(width)
-    starts = np.arange(0, m * width + 1, width)
-    return csr_array((values[derivative].ravel(), columns.ravel(), starts), shape=(m, len(knots) - degree - 1))
+    width = values.shape[2]
+    return sparse_rows(values[derivative], first[:, None] + np.arange(width), len(knots) - degree - 1)
+
+
+def sparse_rows(values: Array, columns: IntArray, count: int) -> csr_array:
+    """Return the sparse matrix (m, count) with the entries `values` (m, k) in `columns` (m, k) of each row."""
+    starts = np.arange(0, values.size + 1, values.shape[1])
+    return csr_array((values.ravel(), columns.ravel(), starts), shape=(len(values), count))
+
+
+def window_numbers(windows: Sequence[IntArray], sizes: Sequence[int]) -> IntArray:
+    """Return the flat numbers (m, k^3) of the coefficients in three windows (m, k), one a direction, of a grid."""
+    u, v, w = windows
+    flat = (u[:, :, None, None] * sizes[1] + v[:, None, :, None]) * sizes[2] + w[:, None, None, :]
+    return flat.reshape(len(u), -1)
 
 
 def gauss_points(knots: Array, n_points: int) -> tuple[Array, Array]:

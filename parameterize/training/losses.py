@@ -1,4 +1,7 @@
-"""The terms of the training loss, one function a term (paper, section 4.4)."""
+"""The terms of the training loss L = L_inner + L_bound (paper, eq. (2) and (3)), one function a term.
+
+The paper gives the terms' own formulas without numbers: those of L_bound in section 4.4.1, those of L_inner in 4.4.2.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ _UNITS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
 def _neighbour(mapped: Tensor, *steps: tuple[int, int, int]) -> Tensor:
-    """Mapped stencil point at the sum of the given lattice steps: (r, 3)."""
+    """Return the mapped stencil point at the sum of the given lattice steps: (r, 3)."""
     x, y, z = (sum(s) for s in zip(*steps, strict=True))
     return mapped[:, _POSITION[(x, y, z)]]
 
@@ -23,18 +26,21 @@ def _minus(step: tuple[int, int, int]) -> tuple[int, int, int]:
 
 
 def stencil_jacobian(mapped: Tensor, cell: float) -> Tensor:
-    """Central differences of G at the stencil centres (r, 19, 3) -> (3, 3, r), second index the space direction."""
+    """Return J by central differences of G: stencils (r, 19, 3) -> (3, 3, r), the second index is the direction."""
     columns = [(_neighbour(mapped, e) - _neighbour(mapped, _minus(e))).T for e in _UNITS]
     return torch.stack(columns, dim=1) / (2.0 * cell)
 
 
 def bijectivity(det: Tensor, alpha: float) -> Tensor:
-    """L_bij: mean of (alpha - det)_+^2. The square keeps the gradient continuous where a fold opens."""
+    """Return L_bij of eq. (3) as the mean of (alpha - det)_+^2, alpha = 0.1 in section 4.4.2.
+
+    The paper has no square; it keeps the gradient continuous where a fold opens.
+    """
     return (alpha - det).clamp_min(0.0).square().mean()
 
 
 def distortion(jacobian: Tensor, det: Tensor, det_floor: float) -> Tensor:
-    """L_arap: mean of det * sum (1 / sigma - 1)^2, the ARAP energy of the inverse of G (section 4.4.2).
+    """Return L_arap of eq. (3): the mean of det * sum (1 / sigma - 1)^2, the ARAP energy of the inverse of G.
 
     With A = J^-1 and R its closest rotation this is det * |A - R|^2. Below `det_floor` the determinant in A is
     held there: the bijectivity term rules over such points, and 1 / det must not blow up.
@@ -45,7 +51,7 @@ def distortion(jacobian: Tensor, det: Tensor, det_floor: float) -> Tensor:
 
 
 def fairness(mapped: Tensor, cell: float) -> Tensor:
-    """L_fair: mean over the stencils of the squared Frobenius norms of the three Hessians of G."""
+    """Return L_fair of eq. (3): the mean of the squared Frobenius norms of the three Hessians of G."""
     total = mapped.new_zeros(())
     centre = mapped[:, 0]
     for a in range(3):
@@ -65,31 +71,37 @@ def fairness(mapped: Tensor, cell: float) -> Tensor:
 
 
 def distance(mapped: Tensor, target: Tensor) -> Tensor:
-    """L_dist and L_cor: mean squared distance of points (m, 3)."""
+    """Return the mean squared distance of points (m, 3): L_dist and L_cor of eq. (3)."""
     return (mapped - target).square().sum(dim=1).mean()
 
 
 def triangle_normals(corners: Tensor) -> Tensor:
-    """Unit normals of triangles (m, 3, 3), last index the coordinate; zero for a triangle without area."""
+    """Return the unit normals of triangles (m, 3, 3), last index the coordinate; zero for a triangle without area."""
     cross = torch.linalg.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return cross / cross.norm(dim=1, keepdim=True).clamp_min(1e-12)
 
 
 def normal_difference(normals: Tensor, target: Tensor, wrong_side: float) -> Tensor:
-    """L_norm: mean squared difference of unit normals, plus `wrong_side` times the mean of (-<n, n_target>)_+."""
+    """Return L_norm of eq. (3), the mean squared difference of unit normals, plus a term that the paper does not have.
+
+    That is `wrong_side` times the mean of (-<n, n_target>)_+: opposite normals are a stationary point of the first.
+    """
     opposed = (-(normals * target).sum(dim=1)).clamp_min(0.0).mean()
     return (normals - target).square().sum(dim=1).mean() + wrong_side * opposed
 
 
 def star_shape(corners: Tensor, normals: Tensor) -> Tensor:
-    """L_star: mean of (-<A v, n> / |A v|)_+^2 with A the cube's centre and v a corner of the triangle (Lemma 1)."""
+    """Return L_star of eq. (3): the mean of (-<A v, n> / |A v|)_+^2, A the cube's centre, v a corner of the triangle.
+
+    By the paper's Lemma 1 it is 0 only where the mapped surface is star-shaped. The paper writes it without (.)_+^2.
+    """
     arm = corners[:, 0] - 0.5
     facing = (arm * normals).sum(dim=1) / arm.norm(dim=1).clamp_min(1e-12)
     return (-facing).clamp_min(0.0).square().mean()
 
 
 def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float = 1e-3) -> Tensor:
-    """L_edge: positions of path points (k, 3) on the cube's edges and, weakly, directions to the next point.
+    """Return L_edge of eq. (3): how far path points (k, 3) and, weakly, their directions are from the cube's edges.
 
     following: (s, 2) pairs of consecutive path points.
     """
@@ -101,7 +113,7 @@ def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float =
 
 
 def folded(det: Tensor) -> int:
-    """Number of stencils whose Jacobian determinant is not positive."""
+    """Return the number of stencils whose Jacobian determinant is not positive."""
     return int((det <= 0.0).sum())
 
 

@@ -7,6 +7,8 @@ from math import pi
 import torch
 from torch import Tensor
 
+from ..cube.cube import axis_and_side
+
 
 def cuboid_scale(d: float) -> float:
     """v^(-1/3) with v the volume of all points within d of the unit cube: S(d) has volume 1."""
@@ -24,9 +26,8 @@ def nearest_on_cube(points: Tensor) -> Tensor:
 
 def nearest_on_cube_face(points: Tensor, face: Tensor) -> Tensor:
     """Nearest points on given faces of the cube; face (m,) in 0..5 = u0, u1, v0, v1, w0, w1."""
-    axis = (face // 2)[:, None]
-    side = (face % 2)[:, None].to(points.dtype)
-    return points.clamp(0.0, 1.0).scatter(1, axis, side)
+    axis, side = axis_and_side(face[:, None])
+    return points.clamp(0.0, 1.0).scatter(1, axis, side.to(points.dtype))
 
 
 def nearest_on_cuboid(points: Tensor, d: float) -> Tensor:

@@ -16,7 +16,8 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
-from ..cube.edge_paths import CORNERS, CubeSurface, PathError, choose_corners, cut_surface, edge_targets
+from ..cube.cube import CORNERS
+from ..cube.edge_paths import CubeSurface, PathError, choose_corners, cut_surface, edge_targets
 from ..history import History
 from ..progress import Progress, ProgressCallback, ignore
 from . import losses
@@ -27,7 +28,6 @@ from .target_shapes import nearest, nearest_on_cube_face
 _log = logging.getLogger(__name__)
 State = dict[str, Tensor]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
-TERMS = ("bij", "arap", "fair", "dist", "norm", "star", "cor", "edge")
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,37 +239,55 @@ class Trainer:
         return last + 0.5 * (first - last) * (1.0 + math.cos(math.pi * step / steps))
 
     def _loss(self, stage: StageConfig, boundary: BoundarySamples) -> tuple[Tensor, int, dict[str, float]]:
-        """Weighted sum (eq. 2 and 3), folded stencils, and the unweighted terms in use."""
-        train, weights = self.config.train, stage.weights
+        """Return the weighted sum of the terms (eq. (2) and (3)), the folded stencils, and the unweighted terms."""
         picks = boundary.sampler.draw(self.generator)
         used, place = torch.unique(boundary.faces[picks].flatten(), return_inverse=True)
-        parts = [self.stencils.shifted(self.generator), boundary.vertices[used]]
-        parts += [boundary.vertices[index] for index in (boundary.corners, boundary.path) if index is not None]
-        mapped = list(self.network(torch.cat(parts)).split([len(p) for p in parts]))
-        nodes, surface = gather(mapped[0], self.stencils.index), gather(mapped[1], place)  # (r, 19, 3), (3 t, 3)
+        points = [self.stencils.shifted(self.generator), boundary.vertices[used]]
+        points += [boundary.vertices[index] for index in (boundary.corners, boundary.path) if index is not None]
+        nodes, surface, *held = self.network(torch.cat(points)).split([len(p) for p in points])
+        terms, folded = self._interior_terms(gather(nodes, self.stencils.index))
+        terms |= self._surface_terms(stage, boundary, gather(surface, place), picks)
+        terms |= self._held_terms(boundary, held)
+        weights = {name: getattr(stage.weights, name) for name in terms}
+        if "cor" in terms:
+            weights["cor"] = stage.weights.cor or stage.given_corner_weight
+        total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
+        return total, folded, {name: float(term.detach()) for name, term in terms.items()}
 
-        jacobian = losses.stencil_jacobian(nodes, self.stencils.cell)
+    def _interior_terms(self, nodes: Tensor) -> tuple[dict[str, Tensor], int]:
+        """Return the terms of L_inner (section 4.4.2) on mapped stencils (r, 19, 3), and the number folded."""
+        cell, alpha = self.stencils.cell, self.config.train.min_det
+        jacobian = losses.stencil_jacobian(nodes, cell)
         det = losses.determinant(jacobian)
+        terms = {
+            "bij": losses.bijectivity(det, alpha),
+            "arap": losses.distortion(jacobian, det, alpha / 2.0),
+            "fair": losses.fairness(nodes, cell),
+        }
+        return terms, losses.folded(det)
+
+    def _surface_terms(
+        self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor
+    ) -> dict[str, Tensor]:
+        """Return the terms of L_bound (section 4.4.1) on the corners (3 t, 3) of the mapped triangles `picks` (t,)."""
         goal = self._goal(stage, boundary, surface, picks)
         normals = losses.triangle_normals(surface.view(-1, 3, 3))
         goal_normals = losses.triangle_normals(goal.view(-1, 3, 3))
-        wrong_side = train.wrong_side if stage.target == "cube" else 0.0
-        terms = {
-            "bij": losses.bijectivity(det, train.min_det),
-            "arap": losses.distortion(jacobian, det, train.min_det / 2.0),
-            "fair": losses.fairness(nodes, self.stencils.cell),
+        wrong_side = self.config.train.wrong_side if stage.target == "cube" else 0.0
+        return {
             "dist": losses.distance(surface, goal),
             "norm": losses.normal_difference(normals, goal_normals, wrong_side),
             "star": losses.star_shape(surface.view(-1, 3, 3), normals),
         }
-        weight = {name: getattr(weights, name) for name in TERMS}
+
+    def _held_terms(self, boundary: BoundarySamples, held: list[Tensor]) -> dict[str, Tensor]:
+        """Return the terms of L_bound for what is held: the mapped corners (8, 3), then the path points (k, 3)."""
+        terms = {}
         if boundary.corners is not None:
-            terms["cor"] = losses.distance(mapped[2], self._corner_targets)
-            weight["cor"] = weights.cor or stage.given_corner_weight
+            terms["cor"] = losses.distance(held[0], self._corner_targets)
         if boundary.path is not None and boundary.path_target is not None and boundary.path_following is not None:
-            terms["edge"] = losses.edge_path(mapped[3], boundary.path_target, boundary.path_following)
-        total = torch.stack([weight[name] * term for name, term in terms.items()]).sum()
-        return total, losses.folded(det), {name: float(term.detach()) for name, term in terms.items()}
+            terms["edge"] = losses.edge_path(held[1], boundary.path_target, boundary.path_following)
+        return terms
 
     @torch.no_grad()
     def _goal(self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor) -> Tensor:

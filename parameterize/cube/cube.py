@@ -1,0 +1,52 @@
+"""The unit cube: its corners, edges and faces, and how points are laid on its boundary.
+
+A face has the number 2 * axis + side: `axis` is the parameter that is constant on it, and `side` its value there. In
+the order of their numbers the faces are called u0, u1, v0, v1, w0, w1.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+
+CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=np.float64)  # (8, 3), (0,0,0), (0,0,1), ..., (1,1,1)
+EDGES = [(i, j) for i in range(8) for j in range(i + 1, 8) if np.abs(CORNERS[i] - CORNERS[j]).sum() == 1.0]
+VARYING_AXES = np.array([[1, 2], [0, 2], [0, 1]])  # the axes that vary where the given one is constant, ascending
+NEAR_EDGE = 1e-5  # places closer than this to an edge of the cube are put on it, so that later cuts leave no slivers
+
+
+def face_number(axis: Any, side: Any) -> Any:
+    """Return the numbers of the faces where the parameter `axis` is constant, 0 (side 0) or 1 (side 1)."""
+    return 2 * axis + side
+
+
+def axis_and_side(faces: Any) -> tuple[Any, Any]:
+    """Return the constant axis and the side, 0 or 1, of face numbers: integers, arrays or tensors of them."""
+    return faces // 2, faces % 2
+
+
+def tangent_axes(axis: Any) -> tuple[Any, Any]:
+    """Return the axes a and b within faces of constant `axis`, such that (a, b, axis) is right-handed."""
+    return (axis + 1) % 3, (axis + 2) % 3
+
+
+def nearest_faces(places: Array) -> IntArray:
+    """Return the number of the face that each place (n, 3) lies on, or one of several on an edge: (n,)."""
+    centred = places - 0.5
+    axis = np.abs(centred).argmax(axis=1)
+    return np.asarray(face_number(axis, centred[np.arange(len(axis)), axis] > 0.0))
+
+
+def project_radially(centred: Array) -> Array:
+    """Project points (n, 3) onto the cube's boundary along rays from its centre; both are counted from the centre."""
+    return np.asarray(centred / (2.0 * np.abs(centred).max(axis=1, keepdims=True)))
+
+
+def snap(parameters: Array) -> Array:
+    """Project parameters (n, 3) radially onto the cube, and onto its edges and corners within NEAR_EDGE of them."""
+    projected = project_radially(parameters - 0.5)
+    at_side = np.abs(projected) >= 0.5 - NEAR_EDGE
+    return np.where(at_side, 0.5 + 0.5 * np.sign(projected), 0.5 + projected)

@@ -1,0 +1,169 @@
+"""Where points lie on the boundary of the cube, and how they slide there.
+
+Between optimisation steps every parameter moves to the closest point of F's boundary, over the cube's edges where it
+must: the paper keeps them fixed (section 4.3.2), which freezes the network's correspondence; letting them slide lowers
+boundary error and distortion together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+from torch import Tensor
+
+from ..arrays import Array, IntArray
+from ..cube.closest_point import damped_fit
+from ..cube.cube import axis_and_side, face_number, nearest_faces, tangent_axes
+from ..cube.flips import new_flips, untangle
+from ..spline.bspline import basis_derivatives, breakpoints, sparse_rows
+from .tensor_product import ControlRows
+
+_DAMPING = 1e-6  # against parallel tangents
+_HALVINGS = 3
+
+
+class SlidingParameters:
+    """Parameters (N, 3) on cube faces (N,), and the rows that yield F there.
+
+    triangles (m, 3) between the points: `relax` and `slide` keep the layout on the cube one-to-one.
+    """
+
+    def __init__(
+        self,
+        knots: tuple[Array, Array, Array],
+        degree: int,
+        parameters: Array,
+        triangles: IntArray,
+        *,
+        device: torch.device,
+    ) -> None:
+        self.knots, self.degree, self.device = knots, degree, device
+        self.triangles = triangles
+        self.place(parameters, nearest_faces(parameters))
+
+    def place(self, parameters: Array, cube_faces: IntArray) -> None:
+        """Take these parameters (N, 3) on these cube faces (N,)."""
+        self.parameters, self.cube_faces = parameters, cube_faces
+        window = self.window()
+        count = int(np.prod([len(k) - self.degree - 1 for k in self.knots]))
+        self.rows = ControlRows.of(sparse_rows(window.weights(0, 0), window.indices, count), self.device)
+
+    def values(self, control: Tensor) -> Array:
+        """Return F at the parameters: (N, 3)."""
+        return np.asarray(self.rows(control).cpu())
+
+    def near_spans(self, spans: IntArray) -> NDArray[np.bool_]:
+        """Return which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
+        breaks = [breakpoints(k) for k in self.knots]
+        shape = [len(b) - 1 for b in breaks]
+        marked = np.zeros(shape, dtype=bool)
+        marked[tuple(spans.T)] = True
+        marked = binary_dilation(marked, np.ones((3, 3, 3), dtype=bool))
+        where = [
+            np.clip(np.searchsorted(b, x, "right") - 1, 0, n - 1)
+            for b, x, n in zip(breaks, self.parameters.T, shape, strict=True)
+        ]
+        return marked[tuple(where)]
+
+    def slide(self, control: Tensor, points: Array, max_step: float, *, keep_layout: bool = False) -> None:
+        """Take one Gauss-Newton step of every parameter towards where F's boundary is closest to its point (N, 3).
+
+        A step over an edge of the cube continues on the next face; `max_step` limits a step in the parameters. Points
+        that would end up farther away stay where they are; with `keep_layout` steps that would flip a triangle are
+        shortened.
+        """
+        values, ta, tb = self.window().derivatives(control)
+        residual = values - points
+        step = -np.stack(damped_fit(ta, tb, residual, _DAMPING), axis=1)
+        step *= np.minimum(1.0, max_step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
+        a, b = tangent_axes(axis_and_side(self.cube_faces)[0])
+        moved = self.parameters.copy()
+        rows = np.arange(len(moved))
+        moved[rows, a] += step[:, 0]
+        moved[rows, b] += step[:, 1]
+        before = self.parameters, self.cube_faces
+        self.place(*fold_over_edges(moved, self.cube_faces))
+        stay = ((self.values(control) - points) ** 2).sum(axis=1) > (residual**2).sum(axis=1)
+        self._keep(*before, stay)
+        if keep_layout:
+            self._hold_back(*before, moved)
+
+    def _hold_back(self, parameters: Array, cube_faces: IntArray, goal: Array) -> None:
+        """Shorten steps from `parameters` towards `goal` until no further triangle flips."""
+        share = np.where((self.parameters == parameters).all(axis=1), 0.0, 1.0)
+        for _ in range(_HALVINGS):
+            blocked = new_flips(parameters, self.parameters, self.triangles)
+            if not blocked.any():
+                break
+            share[blocked] *= 0.5
+            self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
+        self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
+
+    def relax(self, sweeps: int) -> None:
+        """Untangle flipped triangles in a few sweeps, so that what sliding tangles does not pile up."""
+        places = untangle(self.parameters, self.triangles, sweeps)
+        moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
+        self._keep(places, nearest_faces(places), moved)
+
+    def _keep(self, parameters: Array, cube_faces: IntArray, chosen: NDArray[np.bool_]) -> None:
+        """Take these parameters for the chosen points."""
+        self.place(
+            np.where(chosen[:, None], parameters, self.parameters), np.where(chosen, cube_faces, self.cube_faces)
+        )
+
+    def window(self) -> FaceWindow:
+        """Return the basis functions that are not zero at the points."""
+        tables = [basis_derivatives(k, self.degree, self.parameters[:, d], 1) for d, k in enumerate(self.knots)]
+        first = np.stack([t[0] for t in tables])  # (3, N)
+        values = np.stack([t[1] for t in tables])  # (3, 2, N, p + 1)
+        sizes = [len(k) - self.degree - 1 for k in self.knots]
+        stride = np.array([sizes[1] * sizes[2], sizes[2], 1])
+        axis, side = axis_and_side(self.cube_faces)
+        a, b = tangent_axes(axis)
+        rows = np.arange(len(axis))
+        window = np.arange(self.degree + 1)
+        base = side * (np.array(sizes)[axis] - 1) * stride[axis]
+        along_a = (first[a, rows][:, None] + window) * stride[a][:, None]
+        along_b = (first[b, rows][:, None] + window) * stride[b][:, None]
+        indices = base[:, None, None] + along_a[:, :, None] + along_b[:, None, :]
+        return FaceWindow(indices.reshape(len(rows), -1), values[a, :, rows], values[b, :, rows])
+
+
+@dataclass(frozen=True, eq=False)
+class FaceWindow:
+    """indices (N, k) of control points; in_a, in_b (N, 2, p + 1): values and derivatives in the face's directions."""
+
+    indices: IntArray
+    in_a: Array
+    in_b: Array
+
+    def weights(self, a: int, b: int) -> Array:
+        """Return the control points' weights in the derivative of order a and b: (N, k)."""
+        return (self.in_a[:, a, :, None] * self.in_b[:, b, None, :]).reshape(len(self.indices), -1)
+
+    def derivatives(self, control: Tensor) -> tuple[Array, Array, Array]:
+        """Return F and its tangents t_a and t_b at the points: (N, 3) each."""
+        local = np.asarray(control.cpu()).reshape(3, -1).T[self.indices]  # (N, k, 3)
+        weights = (self.weights(0, 0), self.weights(1, 0), self.weights(0, 1))
+        value, along_a, along_b = (np.einsum("nk,nkc->nc", w, local) for w in weights)
+        return value, along_a, along_b
+
+
+def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:
+    """Continue steps that left their face on the neighbouring one: what overshot goes inwards there."""
+    parameters, cube_faces = parameters.copy(), cube_faces.copy()
+    rows = np.arange(len(parameters))
+    outside = np.maximum(-parameters, parameters - 1.0)  # (N, 3), positive beyond a side
+    constant, side = axis_and_side(cube_faces)
+    outside[rows, constant] = -1.0
+    axis = outside.argmax(axis=1)
+    overshoot = outside[rows, axis]
+    crossed = rows[overshoot > 0.0]
+    inwards = np.where(side[crossed] == 1, 1.0 - overshoot[crossed], overshoot[crossed])
+    parameters[crossed, constant[crossed]] = inwards
+    cube_faces[crossed] = face_number(axis[crossed], parameters[crossed, axis[crossed]] > 0.5)
+    return np.clip(parameters, 0.0, 1.0), cube_faces
