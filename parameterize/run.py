@@ -107,20 +107,18 @@ def parameterize(
     vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
     task = _Task(vertices, len(surface.vertices), faces, config, knots, seed, place, dtype, given)
 
-    def attempt(start: int) -> tuple[tuple[int, bool], Optimized, SurfaceFit]:
-        found, fit = _attempt(task, start, seconds, history, progress or ignore, checkpoints.of_start(start))
-        with _timed(seconds, "certify"):
-            return _faults(found, task), found, fit
+    def attempt(start: int) -> tuple[Optimized, SurfaceFit]:
+        return _attempt(task, start, seconds, history, progress or ignore, checkpoints.of_start(start))
 
-    faults, found, fit = attempt(0)
+    found, fit = attempt(0)
     for start in range(1, config.starts if given is None else 1):
-        if not any(faults):
+        if not any(found.faults):
             break
-        reason = "the boundary meets itself" if found.certificate.verdict == "certified" else "not certified"
-        _log.warning("%s; trying again with the cube turned", reason)
-        again = attempt(start)
-        if again[0] < faults:
-            faults, found, fit = again
+        reason = "the boundary meets itself" if found.meets_itself else "not certified"
+        _log.warning("%s; trying again with the cube rotated", reason)
+        other = attempt(start)
+        if other[0].faults < found.faults:
+            found, fit = other
     with _timed(seconds, "optimize"):
         volume, boundary = _in_users_units(found, surface, task, fit)
     with _timed(seconds, "certify"):
@@ -222,17 +220,6 @@ def _attempt(
         return optimize(control, task.knots, fit, task.config.spline, **shared), fit
 
 
-def _faults(found: Optimized, task: _Task) -> tuple[int, bool]:
-    """What keeps a map from being one-to-one: unproved spans and, where there is none, a boundary that meets itself."""
-    unproved = len(found.certificate.unproved)
-    return unproved, unproved == 0 and check_boundary(_as_volume(found, task)).injective is False
-
-
-def _as_volume(found: Optimized, task: _Task) -> BSplineVolume:
-    """The spline at volume 1."""
-    return BSplineVolume((task.config.spline.degree,) * 3, task.knots, found.control.permute(1, 2, 3, 0).cpu().numpy())
-
-
 def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> SurfaceFit:
     """Where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
     spline = task.config.spline
@@ -295,8 +282,8 @@ def _in_users_units(
     places.relax(spline.last_sweeps)
     for _ in range(spline.last_slides):
         places.slide(found.control, fit.points, longest, keep_layout=True)
-    placed = _as_volume(found, task)
-    volume = BSplineVolume(placed.degrees, placed.knots, surface.from_unit(placed.control_points))
+    points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
+    volume = BSplineVolume((spline.degree,) * 3, task.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
     return volume, boundary_map(volume, own, places.triangles, places.parameters)
 

@@ -16,6 +16,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from ..certificate.boundary import check_boundary
 from ..certificate.jacobian import Certificate, certify
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
@@ -34,10 +35,27 @@ _SHORTEST_STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Optimized:
-    """Control points (3, n_u, n_v, n_w) at volume 1 and what the certificate says of them."""
+    """Control points (3, n_u, n_v, n_w) at volume 1, and what is proved of them.
+
+    meets_itself: whether the boundary of a certified map was found to meet itself; False where there is no certificate.
+    """
 
     control: Tensor
     certificate: Certificate
+    meets_itself: bool
+
+    @classmethod
+    def of(cls, control: Tensor, knots: Knots, config: SplineConfig) -> Optimized:
+        """Certify control points and, where that succeeds, check their boundary."""
+        volume = BSplineVolume((config.degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy())
+        certificate = certify(volume)
+        certified = certificate.verdict == "certified"
+        return cls(control, certificate, certified and check_boundary(volume).injective is False)
+
+    @property
+    def faults(self) -> tuple[int, bool]:
+        """What keeps the map from being one-to-one; fewer unproved spans count first."""
+        return len(self.certificate.unproved), self.meets_itself
 
 
 def optimize(
@@ -54,16 +72,17 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the surface data near them loses weight. Once the map is certified,
-    a few more rounds take that back as far as they can. Anchors along the cube's edges draw F to the surface in those
-    last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
-    result is the last certified map, else the one with the fewest unproved spans.
+    a few more rounds take that back as far as they can, and all the rounds that are left while its boundary meets
+    itself. Anchors along the cube's edges draw F to the surface in those last rounds and, where it is close to begin
+    with, in the first ones: not while what is folded comes apart. The result is the last certified map whose boundary
+    does not meet itself, else the last certified one, else the one with the fewest unproved spans.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with _one_thread_an_operation():
         energy = SplineEnergy(config, knots, surface, device=control.device)
         energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
-        first = Optimized(control, _certify(control, knots, config))
+        first = Optimized.of(control, knots, config)
         rounds = _Rounds(energy, knots, control, first, near=energy.anchors.near(control))
         if (saved := checkpoints.load(_CHECKPOINT)) is not None:
             rounds.restore(*saved, history)
@@ -106,7 +125,8 @@ class _Rounds:
     def finished(self) -> bool:
         """Whether no round is left."""
         config = self.energy.config
-        return self.number >= config.rounds or (self.certified and self.polished == config.polish)
+        is_polished = self.certified and not self.best.meets_itself and self.polished >= config.polish
+        return self.number >= config.rounds or is_polished
 
     def begin(self) -> None:
         """Weigh penalties, surface data and anchors for the next round."""
@@ -123,11 +143,12 @@ class _Rounds:
     def conclude(self, control: Tensor) -> None:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
         self.control = control
-        certificate = _certify(control, self.knots, self.energy.config)
-        unproved = certificate.unproved
-        _log.info("round %d: %s, %d spans unproved", self.number, certificate.verdict, len(unproved))
-        if self.number == 0 or len(unproved) <= len(self.best.certificate.unproved):
-            self.best = Optimized(control, certificate)
+        found = Optimized.of(control, self.knots, self.energy.config)
+        unproved = found.certificate.unproved
+        meets = ", the boundary meets itself" if found.meets_itself else ""
+        _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
+        if self.number == 0 or found.faults <= self.best.faults:
+            self.best = found
         self.energy.barrier.activate(unproved)
         if self.number >= self.energy.config.patient_rounds and not self.polished and len(unproved):
             self.energy.give_way(unproved, self.energy.config.giving_way)
@@ -157,14 +178,9 @@ class _Rounds:
         energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
         energy.barrier.activate(tensors["active"].numpy())
         self.control, best = tensors["control"].to(device), tensors["best"].to(device)
-        self.best = Optimized(best, _certify(best, self.knots, energy.config))
+        self.best = Optimized.of(best, self.knots, energy.config)
         self.number, self.polished = int(state["number"]), int(state["polished"])
         history.rows[:] = [tuple(row) for row in state["history"]]
-
-
-def _certify(control: Tensor, knots: Knots, config: SplineConfig) -> Certificate:
-    points = control.permute(1, 2, 3, 0).cpu().numpy()
-    return certify(BSplineVolume((config.degree,) * 3, knots, points))
 
 
 @dataclass(frozen=True, eq=False)
