@@ -37,9 +37,10 @@ import numpy as np
 import torch
 from test_surface import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
 
+from iga_nn.errors import InputError, input_errors, one_line
 from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume
-from iga_nn.options import InputError, input_errors, one_line, read_corners
+from iga_nn.options import read_corners
 from iga_nn.samples import sample
 from iga_nn.workflow import pipeline
 from parameterize.checkpoint import Checkpoints

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from iga_nn.cli.commands import main
+from iga_nn.errors import InputError
 from iga_nn.io.formats import export, is_volume, load_volume
-from iga_nn.options import InputError
 from parameterize.spline.bernstein import binomials, elevation
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.volume import BSplineVolume

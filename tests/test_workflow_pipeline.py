@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import iga_nn
+from iga_nn.errors import InputError
 from iga_nn.figures.render import can_draw
-from iga_nn.options import ElasticityOptions, InputError, MapOptions, PoissonOptions
+from iga_nn.options import ElasticityOptions, MapOptions, PoissonOptions
 from iga_nn.workflow import output_folder as folder
 from iga_nn.workflow import pipeline
 from parameterize.spline.volume import BSplineVolume

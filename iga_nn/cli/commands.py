@@ -12,11 +12,11 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from parameterize.surface.surface import MAX_FACES, MeshError
-from solve.forms.formula import ExpressionError
+from parameterize.surface.surface import MAX_FACES
 
+from ..errors import InputError, expected_errors, input_errors, one_line
 from ..io.formats import export, is_volume
-from ..options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
+from ..options import ElasticityOptions, MapOptions, PoissonOptions, StudyOptions
 from ..report import advice
 from ..report import document as reports
 from ..version import __version__
@@ -306,7 +306,7 @@ def main(argv: list[str]) -> int:
     except CycloptsError as error:
         print(f"iga-nn: {one_line(error)}{_minus_hint(argv)}", file=sys.stderr)
         return BAD_INPUT
-    except (InputError, MeshError, ExpressionError, OSError) as error:
+    except expected_errors() as error:
         print(f"iga-nn: {one_line(error)}", file=sys.stderr)
         return BAD_INPUT
     return code if isinstance(code, int) else DONE  # --help and --version return nothing

@@ -17,7 +17,7 @@ from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import BSplineVolume
 
-from ..options import one_line
+from ..errors import one_line
 from ..report.tables import Study
 from .curves import draw_history, draw_study
 from .map import draw_cut, draw_distortion, draw_faces, draw_folds, draw_lines, draw_meeting

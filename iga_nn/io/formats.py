@@ -36,7 +36,7 @@ from parameterize.files import replacing
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS
 
-from ..options import InputError, input_errors
+from ..errors import InputError, input_errors
 from ..report import document as reports
 from . import splinepy as spline_files
 from .splinepy_gate import kind_of

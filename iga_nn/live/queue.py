@@ -18,7 +18,7 @@ from parameterize.arrays import Array
 from parameterize.progress import Progress
 from parameterize.surface.surface import MeshError, Surface
 
-from ..options import one_line
+from ..errors import one_line
 from ..workflow.output_folder import default_folder
 from .worker import Line, Message, Step
 

@@ -20,7 +20,8 @@ from trame.app import get_server
 from parameterize.arrays import Array
 from parameterize.surface.surface import Surface
 
-from ..options import MapOptions, PoissonOptions, one_line
+from ..errors import one_line
+from ..options import MapOptions, PoissonOptions
 from ..samples import SAMPLES, sample, write_obj
 from ..workflow.output_folder import has_checkpoint
 from ..workflow.train import load

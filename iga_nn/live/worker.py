@@ -20,11 +20,10 @@ from typing import Literal
 
 from parameterize.arrays import Array
 from parameterize.progress import Progress
-from parameterize.surface.surface import MeshError
-from solve.forms.formula import ExpressionError
 
 from ..cli.progress import LOGGERS
-from ..options import InputError, MapOptions, PoissonOptions, one_line
+from ..errors import expected_errors, one_line
+from ..options import MapOptions, PoissonOptions
 from ..workflow import pipeline
 
 INTERVAL = 0.4  # seconds between two steps that are told
@@ -114,7 +113,7 @@ def _work(
         pipeline.run("poisson", name, mapping=mapping, poisson=poisson, progress=teller.step)
     except KeyboardInterrupt:
         sender.send(End("stopped"))
-    except (InputError, MeshError, ExpressionError, OSError) as error:
+    except expected_errors() as error:
         sender.send(End("failed", one_line(error)))
     except Exception as error:
         sender.send(End("failed", f"a bug of ours: please report the traceback in the terminal ({one_line(error)})"))

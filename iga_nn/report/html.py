@@ -14,7 +14,7 @@ from typing import Any
 
 from parameterize.files import save_text
 
-from ..options import one_line
+from ..errors import one_line
 from . import document as reports
 from .advice import in_words
 from .document import Report

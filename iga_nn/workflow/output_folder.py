@@ -15,7 +15,7 @@ from typing import Any
 
 from parameterize.files import unfinished
 
-from ..options import InputError, one_line
+from ..errors import InputError, one_line
 from ..report import document as reports
 
 log = logging.getLogger(__name__)

@@ -18,17 +18,9 @@ from parameterize.files import save_text
 from parameterize.spline.volume import BSplineVolume
 from solve.forms.frame import UnitFrame
 
+from ..errors import InputError, input_errors, one_line
 from ..io.formats import load_volume
-from ..options import (
-    InputError,
-    MapOptions,
-    PoissonOptions,
-    ProblemOptions,
-    StudyOptions,
-    check_size,
-    input_errors,
-    one_line,
-)
+from ..options import MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
 from ..report import tables as studies
 from .output_folder import SOLUTION_FILES, STUDY_FILES, Outcome, RunFolder, open_folder
 from .repeat import command_line, gives_the_same

@@ -15,7 +15,8 @@ from parameterize.arrays import Array
 from parameterize.files import save_arrays
 from solve.forms.frame import UnitFrame
 
-from ..options import InputError, MapOptions, input_errors, read_corners
+from ..errors import InputError, input_errors
+from ..options import MapOptions, read_corners
 from ..report import advice
 from ..report import document as reports
 from .cost_estimate import Forecast, forecast
