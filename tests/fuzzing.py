@@ -42,7 +42,7 @@ from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume
 from iga_nn.options import read_corners
 from iga_nn.samples import sample
-from iga_nn.workflow import pipeline
+from iga_nn.workflow.check import check_surface, check_volume
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
@@ -224,9 +224,9 @@ def file_of(reader, seed, number, count):
 def check(path):
     """What `iga-nn check` does."""
     if is_volume(path):
-        pipeline.check_volume(path)
+        check_volume(path)
     else:
-        pipeline.check_surface(str(path), None, MAX_FACES)
+        check_surface(str(path), None, MAX_FACES)
 
 
 def given(read):

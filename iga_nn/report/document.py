@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from parameterize.files import save_text
-from solve.report import NORMS
 
 from ..version import __version__
 
@@ -92,8 +91,21 @@ def solved(report: Report) -> Report:
     return next((report[name] for name in ("poisson", "elasticity", "study") if name in report), {})
 
 
+def one_to_one(report: Report) -> str:
+    """Return whether the map is one-to-one: "yes", "no" or "undecided".
+
+    "yes" takes both proofs, det J > 0 and a boundary that does not meet itself; a fold or a meeting place is a "no".
+    """
+    quality = report["parameterization"]
+    if quality["bijective"] == "folded" or quality.get("boundary_injective") is False:
+        return "no"
+    return "yes" if quality["bijective"] == "certified" and quality.get("boundary_injective") else "undecided"
+
+
 def verdict(report: Report, folder: Path) -> Report:
     """What decides whether a result is used: the `--json` answer of the command line."""
+    from solve.report import NORMS
+
     quality = report["parameterization"]
     short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
     short["boundary_injective"] = quality.get("boundary_injective")

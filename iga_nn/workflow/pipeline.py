@@ -24,8 +24,8 @@ from ..options import MapOptions, PoissonOptions, ProblemOptions, StudyOptions, 
 from ..report import tables as studies
 from .output_folder import SOLUTION_FILES, STUDY_FILES, Outcome, RunFolder, open_folder
 from .repeat import command_line, gives_the_same
-from .train import load, map_surface
-from .verdict import certified_facts, write_certificate
+from .train import map_surface
+from .verdict import write_certificate
 
 if TYPE_CHECKING:
     from parameterize.progress import ProgressCallback
@@ -162,24 +162,6 @@ def study_to(
         )
         state.draw(lambda plotting: plotting.draw_levels(state.folder, "study", study, state.endings))
         return _finish(state, loaded), studies.as_table(study)
-
-
-def check_surface(
-    mesh: str, component: int | None, max_faces: int, decimate: bool = False, strict: bool = False
-) -> dict[str, Any]:
-    """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not.
-
-    decimate: bring a larger surface down to max_faces. strict: refuse a surface that intersects itself, too.
-    """
-    surface = load(mesh, component, max_faces, decimate)
-    if strict:
-        surface.refuse_crossings()
-    return surface.summary()
-
-
-def check_volume(path: str | Path) -> dict[str, Any]:
-    """The certificate of a saved volume. Raises InputError for a file that is none."""
-    return certified_facts(load_volume(path))
 
 
 def _there_already(finished: Outcome, command: str) -> Outcome:

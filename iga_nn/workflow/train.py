@@ -16,6 +16,7 @@ from parameterize.files import save_arrays
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
+from ..models import resolve
 from ..options import MapOptions, read_corners
 from ..report import advice
 from ..report import document as reports
@@ -35,19 +36,6 @@ log = logging.getLogger(__name__)
 _TRIED = 50  # points of the surface
 
 
-def load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool) -> Surface:
-    """A surface by path or name, through the gate. Raises MeshError where it is refused."""
-    from parameterize.surface import decimation as mesh_decimate
-    from parameterize.surface.surface import MAX_FACES
-
-    from ..models import resolve
-
-    if not decimate:
-        return resolve(str(mesh), component=component, max_faces=max_faces)
-    surface = resolve(str(mesh), component=component, max_faces=max(max_faces, MAX_FACES))
-    return mesh_decimate.decimate(surface, max_faces)
-
-
 def map_surface(
     state: RunFolder,
     mesh: str | Path,
@@ -62,7 +50,9 @@ def map_surface(
     command: that repeats it. equation, unknowns: what is solved on it afterwards, and how large that is.
     """
     with state.timed("load"):
-        surface = load(mesh, options.component, options.max_faces, options.decimate)
+        surface = resolve(
+            str(mesh), component=options.component, max_faces=options.max_faces, decimate=options.decimate
+        )
         corners = read_corners(options.corners, _frame(surface)) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
