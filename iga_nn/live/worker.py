@@ -21,10 +21,9 @@ from typing import Literal
 from parameterize.arrays import Array
 from parameterize.progress import Progress
 
-from ..cli.progress import LOGGERS
 from ..errors import expected_errors, one_line
 from ..options import MapOptions, PoissonOptions
-from ..workflow import pipeline
+from ..workflow import LOGGERS, pipeline
 
 INTERVAL = 0.4  # seconds between two steps that are told
 SHARE = 0.05  # of the job's time, at most, goes into telling them

@@ -16,10 +16,9 @@ import numpy as np
 from parameterize.files import save_text
 
 from ..version import __version__
+from .artifacts import REPORT
 
 SCHEMA = 1
-FILE_NAME = "report.json"
-PAGE_NAME = "report.html"
 
 Report = dict[str, Any]
 
@@ -52,13 +51,13 @@ def plain(value: Any) -> Any:
 
 def write(folder: Path, report: Mapping[str, Any]) -> None:
     """Write report.json; atomic."""
-    save_text(folder / FILE_NAME, json.dumps(plain(report), indent=2, allow_nan=False) + "\n")
+    save_text(folder / REPORT, json.dumps(plain(report), indent=2, allow_nan=False) + "\n")
 
 
 def read(folder: Path) -> Report | None:
     """The report in a folder, or None where there is none or it is not one of ours."""
     try:
-        report = json.loads((folder / FILE_NAME).read_text(encoding="utf-8"))
+        report = json.loads((folder / REPORT).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return report if isinstance(report, dict) and report.get("schema") == SCHEMA else None

@@ -17,31 +17,12 @@ from parameterize.files import save_text
 from ..errors import one_line
 from . import document as reports
 from .advice import in_words
+from .artifacts import PAGE, figures_of
 from .document import Report
 from .viewer import Scene
 
 log = logging.getLogger(__name__)
 
-MAP_FIGURES = {
-    "meeting.png": "Where the boundary meets itself",
-    "folds.png": "Where det J > 0 is not proved",
-    "faces.png": "Images of the cube's faces",
-    "lines.png": "Parameter lines",
-    "cut.png": "Cut open",
-    "distortion.png": "Distortion",
-    "history.png": "Loss history",
-}
-SOLUTION_FIGURES = {
-    "named_faces.png": "The faces by their names",
-    "convergence.png": "Errors over the mesh size",
-    "error.png": "Error",
-}
-FIGURES = {  # by the section of the report they belong to
-    "config": MAP_FIGURES,
-    "poisson": SOLUTION_FIGURES,
-    "elasticity": SOLUTION_FIGURES,
-    "study": {"study.png": "Errors over the mesh size"},
-}
 VERDICTS = {
     "certified": (
         "good",
@@ -87,7 +68,7 @@ def write(folder: Path, report: Report, scene: Scene | None) -> None:
     except Exception as error:
         log.warning("report.html is bare, it could not be laid out: %s", one_line(error))
         text = _bare(report, one_line(error))
-    save_text(folder / reports.PAGE_NAME, text)
+    save_text(folder / PAGE, text)
 
 
 def _bare(report: Report, reason: str) -> str:
@@ -236,12 +217,12 @@ def _notices(report: Report) -> str:
 
 def _figures(report: Report, folder: Path) -> Iterable[str]:
     """The figures of the sections this report has."""
-    for section, figures in FIGURES.items():
-        for name, title in figures.items():
-            if section in report and (folder / name).is_file():
-                data = base64.b64encode((folder / name).read_bytes()).decode("ascii")
-                image = f'<img src="data:image/png;base64,{data}" alt="{title}">'
-                yield f"<h2>{title}</h2><figure>{image}</figure>"
+    for figure in figures_of(report):
+        path = folder / figure.file
+        if path.is_file():
+            data = base64.b64encode(path.read_bytes()).decode("ascii")
+            image = f'<img src="data:image/png;base64,{data}" alt="{figure.title}">'
+            yield f"<h2>{figure.title}</h2><figure>{image}</figure>"
 
 
 def _command(report: Report) -> str:

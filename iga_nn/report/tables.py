@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from solve import ConvergenceRow
+    from ..figures.curves import Study
 
-Study = Mapping[int, Sequence["ConvergenceRow"]]  # degree -> its levels
 COLUMNS = (
     "degree", "elements", "dofs", "h", "l2_relative", "l2", "rate_l2", "h1_relative", "h1_seminorm", "rate_h1",
     "iterations", "converged", "meaningful", "setup", "solve",

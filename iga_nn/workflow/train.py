@@ -22,7 +22,7 @@ from ..report import advice
 from ..report import document as reports
 from .cost_estimate import Forecast, forecast
 from .machine import available_memory_mb
-from .output_folder import CHECKPOINT, DEFECT_FILES, MAP_FILES, SOLUTION_FILES, RunFolder, has_checkpoint
+from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
 from .verdict import tell
 
 if TYPE_CHECKING:
@@ -66,17 +66,19 @@ def map_surface(
         _check_data(equation, surface)
     if options.resume and not has_checkpoint(state.folder):
         log.info("no checkpoint, starting anew")
-    state.begin(*MAP_FILES, *DEFECT_FILES, *SOLUTION_FILES)
+    state.begin("map", "solution")
     with state.timed("load"):
         expected = forecast(surface, options.config(), device=device, unknowns=unknowns)
     _announce(expected)
     result = _train(surface, options, corners, progress, state.folder / CHECKPOINT)
     state.seconds.update(result.seconds)
     _write(state, surface, result, command, expected, options)
-    state.draw(lambda plotting: plotting.draw_map(state.folder, result.volume, result.history, state.endings, marks))
-    places = advice.span_places(result.volume, result.certificate.unproved)
-    meeting = result.quality.boundary_check.meeting
-    state.draw(lambda plotting: plotting.draw_defects(state.folder, result.volume, places, meeting))
+    defects: dict[str, Any] = {}
+    if len(unproved := result.certificate.unproved):
+        defects["places"] = advice.span_places(result.volume, unproved)
+    if meeting := result.quality.boundary_check.meeting:
+        defects["meeting"] = meeting
+    state.draw("map", volume=result.volume, history=result.history, marks=marks, **defects)
     return result
 
 
