@@ -429,7 +429,7 @@ def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, 
         (["missing.npz", "--to", "vtk"], "missing.npz: no such file"),
         (
             ["words.txt", "--to", "vtk"],
-            "words.txt: is not a spline volume; create one with `iga-nn run poisson words.txt`",
+            "is not a spline volume; create one with `iga-nn run poisson words.txt`",
         ),
         ([".", "--to", "vtk"], "is a folder: name the volume.npz in it"),
         (["map.npz", "--to", "vtk", "--out", "."], "is a directory"),

@@ -58,4 +58,4 @@ def test_results_are_offered_with_what_they_hold(tmp_path):
 
 
 def test_a_waiting_job_knows_its_place(tmp_path):
-    assert row(Job(1, "a.obj", tmp_path, state="waiting"), before=2)["label"] == "waiting, 2 before it"
+    assert row(Job(1, "a.obj", tmp_path, state="waiting"), before=2)["label"] == "waiting, 2 jobs ahead"

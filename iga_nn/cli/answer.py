@@ -5,17 +5,13 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from ..levels import ESTIMATES, TITLES
 from ..report import advice
 from ..report import document as reports
 from ..workflow.output_folder import Outcome
 from .exit_codes import DONE, NOT_CERTIFIED, NOT_SOLVED
 
-ERRORS = {  # of a level, those a reader needs
-    "l2_relative": "relative L2 error",
-    "l2": "L2 error",
-    "error_estimate_relative": "estimated relative L2 error",
-    "error_estimate": "estimated L2 error",
-}
+SHOWN_ERRORS = ("l2_relative", "l2", *ESTIMATES)  # of a level
 
 
 def exit_code(report: reports.Report) -> int:
@@ -43,7 +39,7 @@ def verdict_in_words(outcome: Outcome) -> str:
         rms = verdict["boundary_rms"][scale]
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
     for level in verdict.get("levels", []):
-        errors = [f"{title} {level[name]:.3e}, " for name, title in ERRORS.items() if name in level]
+        errors = [f"{TITLES[key]} {level[key]:.3e}, " for key in SHOWN_ERRORS if key in level]
         end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANS NOTHING")
         lines.append(f"{level['dofs']:>8} unknowns {''.join(errors)}{level['iterations']} iterations{end}")
     lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")

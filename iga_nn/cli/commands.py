@@ -304,7 +304,7 @@ def serve_page(
 
 
 def main(argv: list[str]) -> int:
-    """Run one command and return its exit code; everything but a bug of ours ends in one line and a code."""
+    """Run one command and return its exit code; only an internal error shows a traceback."""
     try:
         code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
     except KeyboardInterrupt as error:  # with the way on, where there is one

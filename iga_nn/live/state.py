@@ -49,7 +49,7 @@ def row(job: Job, before: int) -> dict[str, Any]:
         "number": job.number,
         "name": job.name,
         "state": job.state,
-        "label": LABELS[job.state] + (f", {before} before it" if before else ""),
+        "label": LABELS[job.state] + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
         "text": job.text,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",

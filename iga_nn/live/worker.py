@@ -75,7 +75,7 @@ def run(folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions, s
 def _follow(
     receiver: Connection, halt: SharedEvent, stop: Event, process: multiprocessing.process.BaseProcess
 ) -> Iterator[Message]:
-    """Messages up to the End, which is made up where the process goes without a word."""
+    """Yield messages up to the End, which is added where the process exits without one."""
     patience = float("inf")
     while True:
         if stop.is_set() and not halt.is_set():
@@ -115,7 +115,9 @@ def _work(
     except expected_errors() as error:
         sender.send(End("failed", one_line(error)))
     except Exception as error:
-        sender.send(End("failed", f"a bug of ours: please report the traceback in the terminal ({one_line(error)})"))
+        sender.send(
+            End("failed", f"internal error, please report it: {one_line(error)}; the terminal shows the traceback")
+        )
         raise
     else:
         sender.send(End("done"))

@@ -15,6 +15,7 @@ import numpy as np
 
 from parameterize.files import save_text
 
+from ..levels import ESTIMATES, EXACT_ERRORS
 from ..version import __version__
 from .artifacts import REPORT
 
@@ -103,8 +104,6 @@ def one_to_one(report: Report) -> str:
 
 def verdict(report: Report, folder: Path) -> Report:
     """What decides whether a result is used: the `--json` answer of the command line."""
-    from solve.report import NORMS
-
     quality = report["parameterization"]
     short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
     short["boundary_injective"] = quality.get("boundary_injective")
@@ -114,7 +113,7 @@ def verdict(report: Report, folder: Path) -> Report:
     defects = {name: quality[name] for name in ("unproved", "boundary_meeting") if quality.get(name)}
     short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
     if section := solved(report):
-        keys = ("dofs", *NORMS, "iterations", "converged", "meaningful")
+        keys = ("dofs", *EXACT_ERRORS, *ESTIMATES, "iterations", "converged", "meaningful")
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]
         short["notices"] = section["notices"]
     short["seconds"] = report["seconds"]["total"]
