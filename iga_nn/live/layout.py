@@ -72,9 +72,7 @@ def _lay_out_job() -> None:
         html.Span("{{ job.text }}")
     with html.Div(v_if="job.state === 'stopped'", classes="verdict unsure"):
         html.Strong("Stopped")
-        html.Span(
-            "{{ job.resumable ? 'Resume continues where it was stopped.' : 'Resume starts it anew.' }}"
-        )
+        html.Span("{{ job.resumable ? 'Resume continues where it was stopped.' : 'Resume starts it anew.' }}")
     _lay_out_actions()
     with html.Div(v_if="job.size && job.state !== 'done'", classes=("{watch: job.mapped}",)):
         _lay_out_drawing()
