@@ -44,8 +44,9 @@ if TYPE_CHECKING:
     from solve import Elasticity, Poisson, convergence
     from solve import solve_problem as solve
 
+    from .errors import InputError
     from .io.formats import export, load_volume
-    from .options import ElasticityOptions, InputError, MapOptions, PoissonOptions
+    from .options import ElasticityOptions, MapOptions, PoissonOptions
     from .samples import sample
     from .workflow.pipeline import run
 
@@ -53,7 +54,7 @@ _HOME = {
     "BSplineVolume": "parameterize.spline.volume",
     "Elasticity": "solve",
     "ElasticityOptions": "iga_nn.options",
-    "InputError": "iga_nn.options",
+    "InputError": "iga_nn.errors",
     "MapOptions": "iga_nn.options",
     "MeshError": "parameterize.surface.surface",
     "Parameterization": "parameterize.run",

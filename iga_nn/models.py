@@ -66,11 +66,17 @@ MODELS = {
 }
 
 
-def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FACES) -> Surface:
-    """The surface meant by MESH: a file, else a sample, else a model in the folder IGA_NN_DATA.
+def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FACES, decimate: bool = False) -> Surface:
+    """Read the surface meant by MESH: a file, else a sample, else a model in the folder IGA_NN_DATA.
 
-    component, max_faces: as in load_surface. Raises MeshError saying where to get what is missing.
+    component, max_faces: as in load_surface. decimate: bring a larger surface down to max_faces instead of refusing it.
+    Raises MeshError saying where to get what is missing.
     """
+    if decimate:
+        from parameterize.surface import decimation
+
+        larger = resolve(name, component=component, max_faces=max(max_faces, MAX_FACES))
+        return decimation.decimate(larger, max_faces)
     if not name:
         raise MeshError("no surface is named: give a file, or one of the samples " + ", ".join(SAMPLES))
     is_file = Path(name).is_file()  # the results' folder has the sample's name, too

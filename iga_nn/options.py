@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
+from .errors import InputError, input_errors
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from parameterize.config import Config
     from parameterize.spline.volume import BSplineVolume
     from solve import Elasticity, Poisson
@@ -24,26 +25,6 @@ MAX_CONTROL_POINTS = 100  # per direction
 MAX_STEPS_FACTOR = 100.0
 MAX_REFINE = 6
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
-
-
-class InputError(ValueError):
-    """An option, an input file or the output folder is at fault; one line that says which, and the remedy."""
-
-
-@contextmanager
-def input_errors() -> Iterator[None]:
-    """Turn a check's ValueError or OSError into an InputError: around calls that only read or check what was given."""
-    try:
-        yield
-    except (OSError, ValueError) as error:
-        raise InputError(one_line(error)) from None
-
-
-def one_line(error: BaseException) -> str:
-    """What an exception says, as one line; "path: reason" where the operating system refused."""
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return " ".join(str(error).split())
 
 
 @dataclass(frozen=True)
@@ -281,6 +262,8 @@ def read_corners(path: Path, frame: UnitFrame | None = None) -> np.ndarray[Any, 
 
     frame: of the surface; where it is known, the file may hold {"XYZ": [...]}, points in scaled coordinates.
     """
+    import numpy as np
+
     try:
         with path.open(encoding="utf-8") as stream:
             given = json.loads(stream.read(_CORNERS_BYTES))

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from parameterize.arrays import Array, IntArray
 from parameterize.files import save_text
@@ -59,6 +58,8 @@ def ball(count: int) -> tuple[Array, IntArray]:
 
 def outward_hull(points: Array) -> IntArray:
     """Triangles (m, 3) of the convex hull of points (n, 3) around the origin, wound outward."""
+    from scipy.spatial import ConvexHull
+
     faces = ConvexHull(points).simplices.astype(np.int64)
     a, b, c = (points[faces[:, i]] for i in range(3))
     inward = np.sum(np.cross(b - a, c - a) * a, axis=1) < 0

@@ -37,11 +37,12 @@ import numpy as np
 import torch
 from test_surface import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
 
+from iga_nn.errors import InputError, input_errors, one_line
 from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume
-from iga_nn.options import InputError, input_errors, one_line, read_corners
+from iga_nn.options import read_corners
 from iga_nn.samples import sample
-from iga_nn.workflow import pipeline
+from iga_nn.workflow.check import check_surface, check_volume
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
@@ -223,9 +224,9 @@ def file_of(reader, seed, number, count):
 def check(path):
     """What `iga-nn check` does."""
     if is_volume(path):
-        pipeline.check_volume(path)
+        check_volume(path)
     else:
-        pipeline.check_surface(str(path), None, MAX_FACES)
+        check_surface(str(path), None, MAX_FACES)
 
 
 def given(read):

@@ -24,6 +24,7 @@ from test_surface import obj
 from iga_nn.cli.commands import main as command
 from iga_nn.options import MapOptions
 from iga_nn.workflow import pipeline
+from iga_nn.workflow.check import check_volume
 from iga_nn.workflow.output_folder import has_checkpoint
 
 FORK = multiprocessing.get_context("fork")
@@ -86,7 +87,7 @@ def main() -> int:
         start = time.perf_counter()
         expected = finished(mesh, Path(place, "undisturbed"))
         seconds = time.perf_counter() - start
-        pipeline.check_volume(Path(place, "undisturbed", "volume.npz"))  # loads what is compiled, for all that follow
+        check_volume(Path(place, "undisturbed", "volume.npz"))  # loads what is compiled, for all that follow
         print(f"undisturbed: {seconds:.1f} s")
         for number in range(options.moments):
             moment = rng.uniform(0.02, 1.0) * seconds

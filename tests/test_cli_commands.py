@@ -185,7 +185,7 @@ def test_study_writes_table_csv_and_plot(in_folder, capsys):
     benchmark_volume(2).save("map.npz")
     assert main(["study", "map.npz", "--degree", "3", "2", "--refine", "0..2"]) == 0
     table = capsys.readouterr().out.splitlines()
-    assert table[0].split()[:3] == ["degree", "elements", "dofs"] and len(table) == 8
+    assert table[0].split()[:3] == ["degree", "elements", "unknowns"] and len(table) == 8
     assert {file.name for file in Path("map-study").iterdir()} == {
         "report.html",
         "report.json",

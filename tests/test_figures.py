@@ -16,6 +16,7 @@ from iga_nn.cli.commands import main
 from iga_nn.figures import cutaway as octant
 from iga_nn.figures import evaluate as sampling
 from iga_nn.figures import render as rendering
+from iga_nn.report.figures import draw_figures
 from solve.study import benchmark_volume
 
 
@@ -162,7 +163,7 @@ def test_without_graphics_library_one_line_names_the_remedy(monkeypatch, caplog,
     rendering.can_draw.cache_clear()
     try:
         result = formula_parameterization()
-        plotting.draw_map(tmp_path, result.volume, result.history)
+        draw_figures(tmp_path, "map", {"volume": result.volume, "history": result.history})
     finally:
         rendering.can_draw.cache_clear()
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]

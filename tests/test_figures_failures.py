@@ -95,7 +95,7 @@ def test_a_page_that_fails_is_written_bare(in_folder, monkeypatch):
 
 
 def test_plotting_that_cannot_be_imported_costs_the_figures(in_folder, monkeypatch):
-    monkeypatch.setattr(plotting, "draw_solution", None)
+    monkeypatch.setattr(plotting, "can_draw", None)
     benchmark_volume(2).save("map.npz")
     report, _ = look(pipeline.solve_to("map.npz", "out").folder)
     assert set(report["not_drawn"]) == {"figures"}

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from iga_nn.options import InputError, read_corners
+from iga_nn.errors import InputError
+from iga_nn.options import read_corners
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.files import save_arrays
 from parameterize.spline.volume import BSplineVolume

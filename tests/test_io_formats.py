@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from iga_nn.cli.commands import main
+from iga_nn.errors import InputError
 from iga_nn.io.formats import export, is_volume, load_volume
-from iga_nn.options import InputError
 from parameterize.spline.bernstein import binomials, elevation
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
@@ -427,7 +427,10 @@ def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, 
     [
         (["map.npz", "--to", "step"], "'step': choose one of gismo, mfem, vtk, view, json; IGES and STEP"),
         (["missing.npz", "--to", "vtk"], "missing.npz: no such file"),
-        (["words.txt", "--to", "vtk"], "words.txt: is no volume; of a surface `iga-nn run poisson words.txt`"),
+        (
+            ["words.txt", "--to", "vtk"],
+            "is not a spline volume; create one with `iga-nn run poisson words.txt`",
+        ),
         ([".", "--to", "vtk"], "is a folder: name the volume.npz in it"),
         (["map.npz", "--to", "vtk", "--out", "."], "is a directory"),
         (["map.npz", "--to", "vtk", "--out", "map.vtk"], "vtk files end in .vtu"),

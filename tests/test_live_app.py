@@ -104,7 +104,7 @@ async def walk(chromium, port, folder, capsys):
         await finished(first, folder)
         await stopped(second)
         await first.click("cube.obj\nstopped")  # away from the report
-        await first.sees("It can go on")
+        await first.sees("Resume continues")
         for tab in (first, second):
             await asyncio.sleep(0.5)
             await tab.text()  # whatever it has to say by now
@@ -143,8 +143,8 @@ async def seen_by_another_tab(tab):
     await tab.click("cube")
     await tab.sees("cube.obj\naccepted", PATIENCE)
     await tab.click("Start")
-    await tab.sees("waiting, 1 before it; one job runs at a time", PATIENCE)
-    await tab.click("Take out of the queue")
+    await tab.sees("waiting, 1 job ahead; one job runs at a time", PATIENCE)
+    await tab.click("Remove")
     await tab.sees("cube.obj\naccepted")
 
 
@@ -179,7 +179,7 @@ async def stopped(tab):
     await tab.click("Start")
     await tab.sees("Time left", PATIENCE)
     await tab.click("Stop")
-    await tab.sees("It can go on from where it was stopped", PATIENCE)
+    await tab.sees("Resume continues where it was stopped", PATIENCE)
 
 
 def test_other_sites_and_other_computers_are_not_answered(page):

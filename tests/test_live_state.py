@@ -7,10 +7,8 @@ import numpy as np
 
 from iga_nn.figures.evaluate import FACE_COLORS
 from iga_nn.live.queue import Job
-from iga_nn.live.state import CONTENT, colors, places, row, triangles
-from iga_nn.report.document import FILE_NAME, PAGE_NAME
+from iga_nn.live.state import colors, places, row, triangles
 from iga_nn.samples import sample
-from iga_nn.workflow.output_folder import DEFECT_FILES, MAP_FILES, SOLUTION_FILES
 from parameterize.progress import Progress
 
 
@@ -52,9 +50,6 @@ def test_a_row_says_stage_loss_and_time_left(tmp_path):
 
 
 def test_results_are_offered_with_what_they_hold(tmp_path):
-    files = {*MAP_FILES, *DEFECT_FILES, *SOLUTION_FILES, FILE_NAME, PAGE_NAME}
-    elsewhere = {"named_faces.png"}  # of `solve`; the page shows the faces in faces.png
-    assert set(CONTENT) == {name for name in files - elsewhere if not name.endswith(".pdf")}  # it has no --vector
     job = Job(1, "bean.obj", tmp_path, state="done")
     job.results.mkdir()
     (job.results / "volume.npz").write_bytes(b"x" * 3_000_000)
@@ -63,4 +58,4 @@ def test_results_are_offered_with_what_they_hold(tmp_path):
 
 
 def test_a_waiting_job_knows_its_place(tmp_path):
-    assert row(Job(1, "a.obj", tmp_path, state="waiting"), before=2)["label"] == "waiting, 2 before it"
+    assert row(Job(1, "a.obj", tmp_path, state="waiting"), before=2)["label"] == "waiting, 2 jobs ahead"

@@ -10,6 +10,7 @@ import pytest
 
 import iga_nn
 
+NUMERICS = ("numpy", "scipy", "numba", "igl", "torch", "matplotlib", "vtk", "pyvista", "trimesh", "meshio")
 HEAVY = ("torch", "vtk", "vtkmodules", "pyvista", "trame", "aiohttp")
 ROOT = Path(iga_nn.__file__).resolve().parents[1]
 
@@ -18,6 +19,16 @@ def python(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     """A fresh interpreter in another folder, as a user has it."""
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.run([sys.executable, *arguments], cwd=cwd, env=environment, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("option", ["--version", "--help"])
+def test_version_and_help_load_no_numerics(option, tmp_path):
+    code = (
+        "import sys\nfrom iga_nn.cli.commands import main\n"
+        f"assert main([{option!r}]) == 0\nprint([m for m in {NUMERICS} if m in sys.modules])"
+    )
+    done = python("-c", code, cwd=tmp_path)
+    assert done.stdout.splitlines()[-1] == "[]", done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(

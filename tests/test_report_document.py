@@ -6,7 +6,9 @@ from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 
+from iga_nn.levels import ESTIMATES, EXACT_ERRORS
 from iga_nn.report import document as reports
+from solve.report import NORMS
 
 
 def test_plain_writes_null_for_what_is_no_number_and_lists_for_arrays():
@@ -57,3 +59,7 @@ def test_verdict_keeps_the_numbers():
     assert verdict["boundary_rms"] == {"as_given": 0.1}
     assert verdict["levels"] == [{"dofs": 8, "l2": 0.5, "iterations": 3, "converged": False}]
     assert reports.is_certified(report) and not reports.is_converged(report)
+
+
+def test_the_errors_of_a_level_are_those_of_a_solve():
+    assert (*EXACT_ERRORS, *ESTIMATES) == NORMS

@@ -27,7 +27,7 @@ def test_it_is_said_in_plain_words():
     assert str(Forecast((125.0, 347.0), 1240.0)) == "about 2 to 6 minutes, 1.2 GB of memory"
     assert str(Forecast((12.0, 89.0), 640.0)) == "about 12 to 89 seconds, 0.6 GB of memory"
     assert str(Forecast((110.0, 120.0), 640.0)) == "about 2 minutes, 0.6 GB of memory"
-    assert str(Forecast((0.1, 0.2), 640.0)) == "about 1 seconds, 0.6 GB of memory"
+    assert str(Forecast((0.1, 0.2), 640.0)) == "about 1 second, 0.6 GB of memory"
 
 
 def test_more_work_takes_longer_and_more_memory():

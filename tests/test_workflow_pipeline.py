@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import iga_nn
+from iga_nn.errors import InputError
 from iga_nn.figures.render import can_draw
-from iga_nn.options import ElasticityOptions, InputError, MapOptions, PoissonOptions
+from iga_nn.options import ElasticityOptions, MapOptions, PoissonOptions
 from iga_nn.workflow import output_folder as folder
 from iga_nn.workflow import pipeline
 from parameterize.spline.volume import BSplineVolume
@@ -81,7 +82,8 @@ def test_a_hidden_file_has_a_folder_of_its_own():
 def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, monkeypatch):
     formula_training()
     seen = []
-    monkeypatch.setattr("iga_nn.figures.draw_map", lambda *given: seen.append(given[-1]) or {})
+    draw_figures = "iga_nn.report.figures.draw_figures"
+    monkeypatch.setattr(draw_figures, lambda folder, part, known, endings: seen.append(known["marks"]) or {})
     Path("corners.json").write_text("[7, 6, 5, 4, 3, 2, 1, 0]")
     pipeline.parameterize_to("cube", "out", mapping=MapOptions(corners=Path("corners.json")))
     pipeline.parameterize_to("cube", "out", force=True)

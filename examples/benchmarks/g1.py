@@ -25,8 +25,9 @@ from typing import Any, Literal
 import processes
 
 import iga_nn
+from iga_nn.errors import InputError, one_line
 from iga_nn.models import DATA_FOLDER
-from iga_nn.options import InputError, MapOptions, one_line
+from iga_nn.options import MapOptions
 from iga_nn.report import document as reports
 from iga_nn.workflow.machine import calibrate, processor
 from parameterize.files import save_text

@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any, NoReturn, TypeVar
 
-from iga_nn.options import one_line
+from iga_nn.errors import one_line
 from iga_nn.report.document import plain
 
 BAD_INPUT, INTERRUPTED = 2, 130

@@ -25,8 +25,9 @@ import processes
 from hard_shapes import KINDS, hard_shape, kind_of
 
 import iga_nn
+from iga_nn.errors import InputError, one_line
 from iga_nn.figures.render import can_draw, widest_view
-from iga_nn.options import InputError, MapOptions, one_line
+from iga_nn.options import MapOptions
 from iga_nn.report import document as reports
 from iga_nn.report.advice import span_places
 from iga_nn.samples import write_obj

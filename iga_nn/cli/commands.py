@@ -1,38 +1,28 @@
-"""The command line `iga-nn`: arguments, exit codes, progress; nothing is computed here."""
+"""The command line `iga-nn`: commands and their arguments; nothing is computed here.
+
+A command imports what it runs when it runs: `--help` and `--version` load neither numpy nor the packages below.
+"""
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from parameterize.surface.surface import MAX_FACES, MeshError
-from solve.forms.formula import ExpressionError
-
-from ..io.formats import export, is_volume
-from ..options import ElasticityOptions, InputError, MapOptions, PoissonOptions, StudyOptions, input_errors, one_line
-from ..report import advice
-from ..report import document as reports
+from ..errors import InputError, expected_errors, input_errors, one_line
+from ..options import ElasticityOptions, MapOptions, PoissonOptions, StudyOptions
 from ..version import __version__
-from ..workflow import pipeline
-from ..workflow.output_folder import Outcome
-from . import progress as console
+from .exit_codes import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
+
+if TYPE_CHECKING:
+    from ..workflow.output_folder import Outcome
 
 FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--body-force", "--displacement")
-ONE_TO_ONE = {True: "proved", False: "no: the boundary meets itself", None: "not decided"}
-ERRORS = {  # of a level, those a reader needs
-    "l2_relative": "relative L2 error",
-    "l2": "L2 error",
-    "error_estimate_relative": "estimated relative L2 error",
-    "error_estimate": "estimated L2 error",
-}
-DONE, BAD_INPUT, NOT_CERTIFIED, NOT_SOLVED, INTERRUPTED = 0, 2, 3, 4, 130
 
 app = App(
     name="iga-nn",
@@ -88,7 +78,10 @@ def run_poisson(
     Args:
         mesh: path of a closed surface, or the name of a sample or a model.
     """
-    with console.progress_line(output.quiet) as progress:
+    from ..workflow import pipeline
+    from .progress import progress_line
+
+    with progress_line(output.quiet) as progress:
         outcome = pipeline.run(
             "poisson",
             mesh,
@@ -109,7 +102,10 @@ def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapp
     Args:
         mesh: path of a closed surface, or the name of a sample or a model.
     """
-    with console.progress_line(output.quiet) as progress:
+    from ..workflow import pipeline
+    from .progress import progress_line
+
+    with progress_line(output.quiet) as progress:
         outcome = pipeline.parameterize_to(
             mesh, output.out, mapping=mapping, force=output.force, vector=output.vector, progress=progress
         )
@@ -134,7 +130,10 @@ def solve_poisson(
         volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
         device: where the linear system is solved.
     """
-    with console.progress_line(output.quiet):
+    from ..workflow import pipeline
+    from .progress import progress_line
+
+    with progress_line(output.quiet):
         outcome = pipeline.solve_to(
             volume, output.out, problem=poisson, force=output.force, vector=output.vector, device=device
         )
@@ -152,7 +151,10 @@ def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body 
     Args:
         volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
-    with console.progress_line(output.quiet):
+    from ..workflow import pipeline
+    from .progress import progress_line
+
+    with progress_line(output.quiet):
         outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force, vector=output.vector)
     return _tell(outcome, output)
 
@@ -166,13 +168,17 @@ def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = 
     Args:
         volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
-    with console.progress_line(output.quiet):
+    from ..workflow import pipeline
+    from . import answer
+    from .progress import progress_line
+
+    with progress_line(output.quiet):
         outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force, vector=output.vector)
     if output.as_json:
-        _say(json.dumps(outcome.report["study"], indent=2))
+        _say(answer.as_json(outcome.report["study"]))
     else:
         _say(f"{table}\nresults in {outcome.folder}")
-    return _exit_code(outcome.report)
+    return answer.exit_code(outcome.report)
 
 
 @app.command(name="check")
@@ -181,7 +187,7 @@ def check(
     /,
     *,
     component: int | None = None,
-    max_faces: int = MAX_FACES,
+    max_faces: int = MapOptions.max_faces,
     decimate: bool = False,
     strict: bool = False,
     as_json: Json = False,
@@ -196,21 +202,20 @@ def check(
         strict: refuse a surface that intersects itself; without this it is a notice.
         as_json: the verdict as JSON on stdout.
     """
+    from ..io.formats import is_volume
+    from ..report import document as reports
+    from ..workflow.check import check_surface, check_volume
+    from . import answer
+
     as_volume = is_volume(path)
-    if as_volume:
-        if component is not None or max_faces != MAX_FACES or decimate or strict:
-            raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")
-        verdict = pipeline.check_volume(path)
-    else:
-        verdict = pipeline.check_surface(path, component, max_faces, decimate, strict)
+    if as_volume and (component is not None or max_faces != MapOptions.max_faces or decimate or strict):
+        raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")
+    facts = check_volume(path) if as_volume else check_surface(path, component, max_faces, decimate, strict)
     if as_json:
-        _say(json.dumps(reports.plain(verdict), indent=2))
+        _say(answer.as_json(facts))
     else:
-        if not as_volume:
-            _say("accepted")
-        _say("\n".join(f"{key + ':':16s} {_text(value)}" for key, value in verdict.items()))
-    accepted = not as_volume or reports.is_certified({"parameterization": verdict})
-    return DONE if accepted else NOT_CERTIFIED
+        _say(("" if as_volume else "accepted\n") + answer.facts_in_words(facts))
+    return DONE if not as_volume or reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
 
 
 @app.command(name="sample")
@@ -270,6 +275,8 @@ def export_volume(
             NAME_u.json).
         force: replace that file where it exists.
     """
+    from ..io.formats import export
+
     _say(str(export(volume, to, out, solution=solution, force=force)))
     return DONE
 
@@ -297,7 +304,7 @@ def serve_page(
 
 
 def main(argv: list[str]) -> int:
-    """Run one command and return its exit code; everything but a bug of ours ends in one line and a code."""
+    """Run one command and return its exit code; only an internal error shows a traceback."""
     try:
         code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
     except KeyboardInterrupt as error:  # with the way on, where there is one
@@ -306,7 +313,7 @@ def main(argv: list[str]) -> int:
     except CycloptsError as error:
         print(f"iga-nn: {one_line(error)}{_minus_hint(argv)}", file=sys.stderr)
         return BAD_INPUT
-    except (InputError, MeshError, ExpressionError, OSError) as error:
+    except expected_errors() as error:
         print(f"iga-nn: {one_line(error)}", file=sys.stderr)
         return BAD_INPUT
     return code if isinstance(code, int) else DONE  # --help and --version return nothing
@@ -330,41 +337,7 @@ def _say(text: str) -> None:
 
 def _tell(outcome: Outcome, output: OutputOptions) -> int:
     """Say the verdict and return the exit code."""
-    verdict = reports.verdict(outcome.report, outcome.folder)
-    if output.as_json:
-        _say(json.dumps(reports.plain(verdict), indent=2))
-    else:
-        _say("\n".join([*_lines(verdict), *advice.in_words(outcome.report)]))
-    return _exit_code(outcome.report)
+    from . import answer
 
-
-def _exit_code(report: reports.Report) -> int:
-    """3 wins over 4."""
-    if not reports.is_certified(report):
-        return NOT_CERTIFIED
-    return DONE if reports.is_converged(report) and reports.is_meaningful(report) else NOT_SOLVED
-
-
-def _lines(verdict: dict[str, Any]) -> list[str]:
-    """The verdict for a reader, one fact a line."""
-    one_to_one = ONE_TO_ONE[verdict["boundary_injective"]] if verdict["bijective"] == "certified" else "no proof"
-    lines = [f"det J > 0        {verdict['bijective']}", f"one-to-one       {one_to_one}"]
-    for scale, arap in verdict.get("arap", {}).items():
-        rms = verdict["boundary_rms"][scale]
-        lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
-    for level in verdict.get("levels", []):
-        errors = [f"{title} {level[name]:.3e}, " for name, title in ERRORS.items() if name in level]
-        end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANS NOTHING")
-        lines.append(f"{level['dofs']:>8} unknowns {''.join(errors)}{level['iterations']} iterations{end}")
-    lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")
-    return lines
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, dict):
-        return "; ".join(f"{key} {_text(item)}" for key, item in value.items())
-    if isinstance(value, list | tuple):
-        return ", ".join(_text(item) for item in value) or "none"
-    return str(value)
+    _say(answer.verdict_as_json(outcome) if output.as_json else answer.verdict_in_words(outcome))
+    return answer.exit_code(outcome.report)

@@ -13,10 +13,11 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from ..workflow import LOGGERS
+
 if TYPE_CHECKING:
     from parameterize.progress import Progress
 
-LOGGERS = ("iga_nn", "parameterize", "solve")
 PLAIN_INTERVAL = 10.0  # seconds between lines where the output is not a terminal
 
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..report.tables import Study
 from .evaluate import FACE_COLORS
 from .style import blank, positive, save
+
+if TYPE_CHECKING:
+    from solve import ConvergenceRow
+
+Study = Mapping[int, Sequence["ConvergenceRow"]]  # degree -> its levels, coarsest first
 
 TERMS = {  # of the loss, as parameterize names them
     "arap": "ARAP distortion",

@@ -10,6 +10,7 @@ import numpy as np
 
 from parameterize.spline.volume import BSplineVolume
 
+from ..levels import EXACT_ERRORS, TITLES
 from .color_range import error_range, even_range
 from .evaluate import SECTIONS, all_grids, points_on, sampled_error, solution_on
 from .render import Patch, draw, widest_view
@@ -84,10 +85,9 @@ def draw_errors(path: Path, volume: BSplineVolume, solutions: Sequence[Solution]
 
 def _write_numbers(panel: Any, solution: Solution) -> None:
     report = solution.report
-    titles = ("relative L2 error", "L2 error", "relative H1 error", "H1 error")
-    norms = (report.l2_relative, report.l2, report.h1_relative, report.h1_seminorm)
+    errors = [(TITLES[key], getattr(report, key)) for key in EXACT_ERRORS]
     lines = [f"{report.dofs:,} unknowns"]
-    lines += [f"{title} {value:.3e}" for title, value in zip(titles, norms, strict=True) if value is not None]
+    lines += [f"{title} {value:.3e}" for title, value in errors if value is not None]
     if not report.converged:
         lines.append("NOT CONVERGED")
     panel.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", fontsize=14, linespacing=1.8)

@@ -27,6 +27,9 @@ IGES and STEP know no trivariate splines, so they are not among them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,9 +37,8 @@ import numpy as np
 
 from parameterize.files import replacing
 from parameterize.spline.volume import BSplineVolume
-from parameterize.surface.readers.file import FORMATS
 
-from ..options import InputError, input_errors
+from ..errors import InputError, input_errors
 from ..report import document as reports
 from . import splinepy as spline_files
 from .splinepy_gate import kind_of
@@ -46,17 +48,78 @@ if TYPE_CHECKING:
 
     from ..figures.evaluate import Problem
 
-ENDINGS = {
-    "gismo": ".xml",
-    "mfem": ".mesh",
-    "vtk": "_bezier.vtu",
-    "view": "_view.vtu",
-    "json": ".json",
-}
-_READ = ("", ".npz", ".xml", ".mesh", ".json", ".zip", *FORMATS)  # a .zip, or a surface's name, may hold a volume
-BESIDE = {"gismo": "_u.xml", "mfem": ".gf", "json": "_u.json"}  # the file of a solution, after the volume's stem
-_PROBLEMS = ("poisson", "elasticity")  # sections of report.json with a solution.npz
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
+_PROBLEMS = ("poisson", "elasticity")  # sections of report.json with a solution.npz
+
+
+@dataclass(frozen=True)
+class Content:
+    """What is exported: a volume, a solution on it, and the problem whose exact solution is known."""
+
+    volume: BSplineVolume
+    field: SplineField | None = None
+    problem: Problem | None = None
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of another program. ending: of its files, after the volume's stem. read: None where it is written only.
+
+    field_ending, write_field: for a solution that goes into a file of its own, beside the volume's.
+    """
+
+    ending: str
+    write: Callable[[Path, Content], None]
+    read: Callable[[Path], BSplineVolume] | None = None
+    field_ending: str = ""
+    write_field: Callable[[Path, SplineField], None] | None = None
+
+
+def _write_mfem(path: Path, content: Content) -> None:
+    volume = content.volume
+    if content.field is not None:
+        with input_errors():
+            volume = spline_files.on_knots_of(content.field, volume)
+    spline_files.write_mfem(path, volume)
+
+
+def _write_bezier(path: Path, content: Content) -> None:
+    from .vtk import write_bezier
+
+    write_bezier(path, content.volume, content.field)
+
+
+def _write_view(path: Path, content: Content) -> None:
+    from .vtk import write_view
+
+    write_view(path, content.volume, content.field, content.problem)
+
+
+FORMATS = {
+    "gismo": Format(
+        ending=".xml",
+        write=lambda path, content: spline_files.write_gismo(path, content.volume),
+        read=partial(spline_files.read, kind="gismo"),
+        field_ending="_u.xml",
+        write_field=spline_files.write_gismo,
+    ),
+    "mfem": Format(
+        ending=".mesh",
+        write=_write_mfem,
+        read=partial(spline_files.read, kind="mfem"),
+        field_ending=".gf",
+        write_field=spline_files.write_mfem_field,
+    ),
+    "vtk": Format(ending="_bezier.vtu", write=_write_bezier),
+    "view": Format(ending="_view.vtu", write=_write_view),
+    "json": Format(
+        ending=".json",
+        write=lambda path, content: spline_files.write_json(path, content.volume),
+        read=partial(spline_files.read, kind="json"),
+        field_ending="_u.json",
+        write_field=spline_files.write_json,
+    ),
+}
 
 
 def is_volume(path: str | Path) -> bool:
@@ -65,8 +128,16 @@ def is_volume(path: str | Path) -> bool:
     Other programs' files begin alike (glTF as JSON, 3MF as a ZIP archive): with an ending not read here, it is none.
     """
     source = Path(path)
-    is_read = source.suffix.lower() in _READ and source.is_file()
-    return source.suffix == ".npz" or (is_read and kind_of(source) is not None)
+    return source.suffix == ".npz" or (
+        _may_hold_a_volume(source.suffix.lower()) and source.is_file() and kind_of(source) is not None
+    )
+
+
+def _may_hold_a_volume(ending: str) -> bool:
+    """Whether a file of that ending is read here: a .zip, or a surface's name, may hold a volume, too."""
+    from parameterize.surface.readers.file import FORMATS as SURFACES
+
+    return ending in ("", ".zip", *(one.ending for one in FORMATS.values() if one.read), *SURFACES)
 
 
 def load_volume(path: str | Path) -> BSplineVolume:
@@ -81,8 +152,9 @@ def load_volume(path: str | Path) -> BSplineVolume:
     with input_errors():
         kind = kind_of(source) if source.is_file() else "npz"
         if kind is None and source.suffix != ".npz":
-            raise InputError(f"{source}: is no volume; of a surface `iga-nn run poisson {source}` makes one")
-        volume = BSplineVolume.load(source) if kind in ("npz", None) else spline_files.read(source, kind)
+            raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
+        found = FORMATS.get(kind or "npz")
+        volume = found.read(source) if found and found.read else BSplineVolume.load(source)
     if min(float(np.diff(np.unique(knots)).min()) for knots in volume.knots) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
     return volume
@@ -103,65 +175,46 @@ def export(
     the exact solution; with G+Smo, MFEM and splinepy's JSON it is a file of its own, NAME_u.xml, NAME.gf, NAME_u.json.
     Raises InputError where a file cannot be read or written, exists (unless `force`), or a package is missing.
     """
-    if to not in ENDINGS:
-        raise InputError(f"format {to!r}: choose one of {', '.join(ENDINGS)}; IGES and STEP know no trivariate splines")
-    target = _target(volume, to, out)
-    beside = target.with_name(target.stem + BESIDE[to]) if solution is not None and to in BESIDE else None
-    for file in filter(None, (target, beside)):
+    if to not in FORMATS:
+        raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP know no trivariate splines")
+    chosen = FORMATS[to]
+    target = Path(Path(volume).stem + chosen.ending if out is None else out)
+    _check_target(target, to)
+    beside = target.with_name(target.stem + chosen.field_ending) if solution and chosen.write_field else target
+    for file in (target, beside):
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
-    loaded = load_volume(volume)
-    field = section = None
-    if solution is not None:
-        section = _section_beside(Path(solution))
-        field = _load_solution(Path(solution), loaded, section)
+    content = _content(volume, solution)
     try:
-        if field is not None and beside is not None:
-            if to == "mfem":
-                with input_errors():
-                    loaded = spline_files.on_knots_of(field, loaded)
-            with replacing(beside) as temporary:
-                _FIELD_WRITERS[to](temporary, field)
         with replacing(target) as temporary:
-            _write(temporary, to, loaded, field, None if section is None else _problem(*section))
+            chosen.write(temporary, content)
+            if content.field is not None and chosen.write_field is not None:
+                with replacing(beside) as temporary_beside:
+                    chosen.write_field(temporary_beside, content.field)
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
     return target
 
 
-def _write(path: Path, to: str, volume: BSplineVolume, field: SplineField | None, problem: Problem | None) -> None:
-    from . import vtk as vtk_files
-
-    match to:
-        case "gismo":
-            spline_files.write_gismo(path, volume)
-        case "mfem":
-            spline_files.write_mfem(path, volume)
-        case "json":
-            spline_files.write_json(path, volume)
-        case "vtk":
-            vtk_files.write_bezier(path, volume, field)
-        case "view":
-            vtk_files.write_view(path, volume, field, problem)
-
-
-_FIELD_WRITERS = {
-    "gismo": spline_files.write_gismo,
-    "mfem": spline_files.write_mfem_field,
-    "json": spline_files.write_json,
-}
-
-
-def _target(volume: str | Path, to: str, out: str | Path | None) -> Path:
-    target = Path(Path(volume).stem + ENDINGS[to] if out is None else out)
-    ending = "." + ENDINGS[to].rpartition(".")[2]
+def _check_target(target: Path, to: str) -> None:
+    """Raise InputError where a file of format `to` cannot be written under that name."""
+    ending = "." + FORMATS[to].ending.rpartition(".")[2]
     if target.is_dir() or not target.name:
         raise InputError(f"{target}: is a directory: name a file with --out")
     if target.suffix != ending:
         raise InputError(f"{target}: {to} files end in {ending}: choose such a name with --out")
     if not target.parent.is_dir():
         raise InputError(f"{target}: there is no folder {target.parent}: make it, or choose another with --out")
-    return target
+
+
+def _content(volume: str | Path, solution: str | Path | None) -> Content:
+    """Read a volume, and a solution with what the report beside it says. Raises InputError."""
+    loaded = load_volume(volume)
+    if solution is None:
+        return Content(loaded)
+    section = _section_beside(Path(solution))
+    field = _load_solution(Path(solution), loaded, section)
+    return Content(loaded, field, _problem(*section) if section else None)
 
 
 def _section_beside(solution: Path) -> tuple[str, dict[str, Any]] | None:

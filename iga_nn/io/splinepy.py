@@ -28,7 +28,7 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, insertion_into
 from parameterize.spline.volume import BSplineVolume
 
-from ..options import InputError, one_line
+from ..errors import InputError, one_line
 from .splinepy_gate import checked_text
 
 if TYPE_CHECKING:

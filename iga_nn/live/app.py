@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ..options import InputError, MapOptions, PoissonOptions, input_errors
+from ..errors import InputError, input_errors
+from ..options import MapOptions, PoissonOptions
 
 INSTALL = "pip install 'iga-nn[app]'"
 

@@ -72,7 +72,7 @@ def _lay_out_job() -> None:
         html.Span("{{ job.text }}")
     with html.Div(v_if="job.state === 'stopped'", classes="verdict unsure"):
         html.Strong("Stopped")
-        html.Span("{{ job.resumable ? 'It can go on from where it was stopped.' : 'It can be started anew.' }}")
+        html.Span("{{ job.resumable ? 'Resume continues where it was stopped.' : 'Resume starts it anew.' }}")
     _lay_out_actions()
     with html.Div(v_if="job.size && job.state !== 'done'", classes=("{watch: job.mapped}",)):
         _lay_out_drawing()
@@ -100,11 +100,11 @@ def _lay_out_actions() -> None:
         )
         html.Span("takes some minutes", v_if="job.state === 'ready'", classes="soft")
         html.Button(
-            "Go on", v_if="job.state === 'stopped'", classes="button first", click="trigger('start', [job.number])"
+            "Resume", v_if="job.state === 'stopped'", classes="button first", click="trigger('start', [job.number])"
         )
         html.Span("{{ job.label }}; one job runs at a time", v_if="job.state === 'waiting'")
         html.Button(
-            "{{ job.state === 'waiting' ? 'Take out of the queue' : 'Stop' }}",
+            "{{ job.state === 'waiting' ? 'Remove' : 'Stop' }}",
             v_if="['waiting', 'running'].includes(job.state)",
             disabled=("job.stopping",),
             classes="button",

@@ -18,7 +18,7 @@ from parameterize.arrays import Array
 from parameterize.progress import Progress
 from parameterize.surface.surface import MeshError, Surface
 
-from ..options import one_line
+from ..errors import one_line
 from ..workflow.output_folder import default_folder
 from .worker import Line, Message, Step
 
@@ -85,7 +85,7 @@ class Jobs:
         return next((job for job in self if job.number == number), None)
 
     def before(self, job: Job) -> int:
-        """How many jobs come before it in the queue, the running one among them."""
+        """Return how many jobs are ahead of it in the queue, the running one among them."""
         with self._lock:
             return self._queue.index(job) if job in self._queue else 0
 
@@ -144,7 +144,7 @@ class Jobs:
             self.refuse(job, one_line(error).replace(f"{job.folder}/", ""))  # as the user knows the file
         except Exception:
             log.exception("%s", job.path)
-            self.refuse(job, f"{job.name}: a bug of ours: please report the traceback in the terminal")
+            self.refuse(job, f"{job.name}: internal error, please report it; the terminal shows the traceback")
         else:
             job.state = "ready"
             self._changed(job)
@@ -152,7 +152,7 @@ class Jobs:
     def _work(self, job: Job) -> None:
         job.state = "running"
         self._changed(job)
-        state, text = "failed", "the job ended without a word"
+        state, text = "failed", "the job exited without a result"
         try:
             for message in self._run(job):
                 if isinstance(message, Step):

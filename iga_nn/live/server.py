@@ -20,10 +20,11 @@ from trame.app import get_server
 from parameterize.arrays import Array
 from parameterize.surface.surface import Surface
 
-from ..options import MapOptions, PoissonOptions, one_line
+from ..errors import one_line
+from ..models import resolve
+from ..options import MapOptions, PoissonOptions
 from ..samples import SAMPLES, sample, write_obj
 from ..workflow.output_folder import has_checkpoint
-from ..workflow.train import load
 from . import worker as job_process
 from .layout import lay_out
 from .queue import Job, Jobs
@@ -78,7 +79,7 @@ class Page:
 
     def _check(self, path: Path) -> Surface:
         given = self._mapping
-        return load(path, given.component, given.max_faces, given.decimate)
+        return resolve(str(path), component=given.component, max_faces=given.max_faces, decimate=given.decimate)
 
     def _run(self, job: Job) -> Iterator[Message]:
         mapping = replace(self._mapping, resume=has_checkpoint(job.results))

@@ -14,6 +14,7 @@ from parameterize.arrays import Array
 from parameterize.surface.surface import Surface
 
 from ..figures.evaluate import FACE_COLORS
+from ..report.artifacts import ARTIFACTS
 from ..workflow.output_folder import has_checkpoint
 from .queue import Job
 
@@ -36,23 +37,7 @@ LABELS = {
     "failed": "failed",
     "stopped": "stopped",
 }
-CONTENT = {  # of the files, those a user wants first in front
-    "volume.npz": "the spline volume",
-    "solution.npz": "the solution of Poisson's equation on it",
-    "boundary.npz": "the map from the surface to the cube",
-    "report.html": "this report, to keep",
-    "report.json": "the report for programs",
-    "history.npz": "loss of every training step",
-    "faces.png": "the cube's faces in colours",
-    "lines.png": "the same with parameter lines",
-    "cut.png": "the volume cut open",
-    "distortion.png": "distortion on three sections",
-    "error.png": "error on three sections",
-    "convergence.png": "errors over the mesh size",
-    "history.png": "loss over the steps",
-    "folds.png": "where det J > 0 is not proved",
-    "meeting.png": "where the boundary meets itself",
-}
+CONTENT = {artifact.file: artifact.holds for artifact in ARTIFACTS}
 VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # three sides of the cube are seen
 GREY = 190  # of 255
 EDGES_UP_TO = 3_000  # faces whose edges are drawn, too
@@ -64,7 +49,7 @@ def row(job: Job, before: int) -> dict[str, Any]:
         "number": job.number,
         "name": job.name,
         "state": job.state,
-        "label": LABELS[job.state] + (f", {before} before it" if before else ""),
+        "label": LABELS[job.state] + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
         "text": job.text,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",

@@ -20,12 +20,10 @@ from typing import Literal
 
 from parameterize.arrays import Array
 from parameterize.progress import Progress
-from parameterize.surface.surface import MeshError
-from solve.forms.formula import ExpressionError
 
-from ..cli.progress import LOGGERS
-from ..options import InputError, MapOptions, PoissonOptions, one_line
-from ..workflow import pipeline
+from ..errors import expected_errors, one_line
+from ..options import MapOptions, PoissonOptions
+from ..workflow import LOGGERS, pipeline
 
 INTERVAL = 0.4  # seconds between two steps that are told
 SHARE = 0.05  # of the job's time, at most, goes into telling them
@@ -77,7 +75,7 @@ def run(folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions, s
 def _follow(
     receiver: Connection, halt: SharedEvent, stop: Event, process: multiprocessing.process.BaseProcess
 ) -> Iterator[Message]:
-    """Messages up to the End, which is made up where the process goes without a word."""
+    """Yield messages up to the End, which is added where the process exits without one."""
     patience = float("inf")
     while True:
         if stop.is_set() and not halt.is_set():
@@ -114,10 +112,12 @@ def _work(
         pipeline.run("poisson", name, mapping=mapping, poisson=poisson, progress=teller.step)
     except KeyboardInterrupt:
         sender.send(End("stopped"))
-    except (InputError, MeshError, ExpressionError, OSError) as error:
+    except expected_errors() as error:
         sender.send(End("failed", one_line(error)))
     except Exception as error:
-        sender.send(End("failed", f"a bug of ours: please report the traceback in the terminal ({one_line(error)})"))
+        sender.send(
+            End("failed", f"internal error, please report it: {one_line(error)}; the terminal shows the traceback")
+        )
         raise
     else:
         sender.send(End("done"))

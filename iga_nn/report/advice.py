@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array, in_brackets
-from parameterize.certificate.jacobian import Certificate
 from parameterize.spline.bspline import breakpoints
-from parameterize.spline.volume import BSplineVolume
 
 from ..options import MAX_CONTROL_POINTS
 from .document import Report, is_certified
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from parameterize.certificate.jacobian import Certificate
+    from parameterize.spline.volume import BSplineVolume
 
     from ..options import MapOptions
 

@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from parameterize.files import save_text
-from solve.report import NORMS
 
+from ..levels import ESTIMATES, EXACT_ERRORS
 from ..version import __version__
+from .artifacts import REPORT
 
 SCHEMA = 1
-FILE_NAME = "report.json"
-PAGE_NAME = "report.html"
 
 Report = dict[str, Any]
 
@@ -53,13 +52,13 @@ def plain(value: Any) -> Any:
 
 def write(folder: Path, report: Mapping[str, Any]) -> None:
     """Write report.json; atomic."""
-    save_text(folder / FILE_NAME, json.dumps(plain(report), indent=2, allow_nan=False) + "\n")
+    save_text(folder / REPORT, json.dumps(plain(report), indent=2, allow_nan=False) + "\n")
 
 
 def read(folder: Path) -> Report | None:
     """The report in a folder, or None where there is none or it is not one of ours."""
     try:
-        report = json.loads((folder / FILE_NAME).read_text(encoding="utf-8"))
+        report = json.loads((folder / REPORT).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return report if isinstance(report, dict) and report.get("schema") == SCHEMA else None
@@ -92,6 +91,17 @@ def solved(report: Report) -> Report:
     return next((report[name] for name in ("poisson", "elasticity", "study") if name in report), {})
 
 
+def one_to_one(report: Report) -> str:
+    """Return whether the map is one-to-one: "yes", "no" or "undecided".
+
+    "yes" takes both proofs, det J > 0 and a boundary that does not meet itself; a fold or a meeting place is a "no".
+    """
+    quality = report["parameterization"]
+    if quality["bijective"] == "folded" or quality.get("boundary_injective") is False:
+        return "no"
+    return "yes" if quality["bijective"] == "certified" and quality.get("boundary_injective") else "undecided"
+
+
 def verdict(report: Report, folder: Path) -> Report:
     """What decides whether a result is used: the `--json` answer of the command line."""
     quality = report["parameterization"]
@@ -103,7 +113,7 @@ def verdict(report: Report, folder: Path) -> Report:
     defects = {name: quality[name] for name in ("unproved", "boundary_meeting") if quality.get(name)}
     short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
     if section := solved(report):
-        keys = ("dofs", *NORMS, "iterations", "converged", "meaningful")
+        keys = ("dofs", *EXACT_ERRORS, *ESTIMATES, "iterations", "converged", "meaningful")
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]
         short["notices"] = section["notices"]
     short["seconds"] = report["seconds"]["total"]

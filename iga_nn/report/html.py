@@ -14,34 +14,16 @@ from typing import Any
 
 from parameterize.files import save_text
 
-from ..options import one_line
+from ..errors import one_line
+from ..levels import TITLES
 from . import document as reports
 from .advice import in_words
+from .artifacts import PAGE, figures_of
 from .document import Report
 from .viewer import Scene
 
 log = logging.getLogger(__name__)
 
-MAP_FIGURES = {
-    "meeting.png": "Where the boundary meets itself",
-    "folds.png": "Where det J > 0 is not proved",
-    "faces.png": "Images of the cube's faces",
-    "lines.png": "Parameter lines",
-    "cut.png": "Cut open",
-    "distortion.png": "Distortion",
-    "history.png": "Loss history",
-}
-SOLUTION_FIGURES = {
-    "named_faces.png": "The faces by their names",
-    "convergence.png": "Errors over the mesh size",
-    "error.png": "Error",
-}
-FIGURES = {  # by the section of the report they belong to
-    "config": MAP_FIGURES,
-    "poisson": SOLUTION_FIGURES,
-    "elasticity": SOLUTION_FIGURES,
-    "study": {"study.png": "Errors over the mesh size"},
-}
 VERDICTS = {
     "certified": (
         "good",
@@ -60,21 +42,6 @@ VERDICTS = {
         "det J > 0 is proved, but two parts of the boundary meet",
     ),
 }
-COLUMNS = {
-    "degree": "degree",
-    "elements": "elements",
-    "dofs": "unknowns",
-    "h": "h",
-    "l2_relative": "relative L2 error",
-    "l2": "L2 error",
-    "rate_l2": "rate",
-    "h1_relative": "relative H1 error",
-    "h1_seminorm": "H1 error",
-    "rate_h1": "rate",
-    "error_estimate_relative": "estimated relative L2 error",
-    "error_estimate": "estimated L2 error",
-    "iterations": "iterations",
-}
 
 
 def write(folder: Path, report: Report, scene: Scene | None) -> None:
@@ -87,7 +54,7 @@ def write(folder: Path, report: Report, scene: Scene | None) -> None:
     except Exception as error:
         log.warning("report.html is bare, it could not be laid out: %s", one_line(error))
         text = _bare(report, one_line(error))
-    save_text(folder / reports.PAGE_NAME, text)
+    save_text(folder / PAGE, text)
 
 
 def _bare(report: Report, reason: str) -> str:
@@ -137,7 +104,7 @@ def _verdict(report: Report) -> str:
     if overlapping:
         meaning += " at x, y, z = " + ", ".join(f"{value:.4g}" for value in quality["boundary_meeting"]["point"]) + "."
     elif quality["bijective"] == "certified" and quality.get("boundary_injective"):
-        meaning += " Nor do its faces meet themselves: the map is one-to-one."
+        meaning += " Nor do its faces meet themselves."
     if quality.get("witness"):
         meaning += " The worst place: u, v, w = " + ", ".join(f"{value:.4g}" for value in quality["witness"]) + "."
     found = f'<div class="verdict {kind}"><strong>{heading}</strong>{escape(meaning)}</div>'
@@ -151,7 +118,7 @@ def _verdict(report: Report) -> str:
 def _facts(report: Report) -> str:
     """The numbers that matter, each with what it is and a remark."""
     quality = report["parameterization"]
-    facts = []
+    facts = [("det J > 0", quality["bijective"], f"one-to-one: {reports.one_to_one(report)}")]
     if "arap" in quality:
         arap, boundary = quality["arap"]["unit_volume"], quality["boundary"]
         facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; at volume 1"))
@@ -160,8 +127,7 @@ def _facts(report: Report) -> str:
     levels = reports.solved(report).get("levels", [])
     if levels:
         finest = levels[-1]
-        names = {"l2": "L2 error", "error_estimate": "estimated L2 error"}
-        facts += [_error_fact(finest, key, name) for key, name in names.items() if finest.get(key) is not None]
+        facts += [_error_fact(finest, key) for key in ("l2", "error_estimate") if finest.get(key) is not None]
         facts.append(("Unknowns", f"{finest['dofs']:,}", f"{finest['iterations']} iterations"))
     points = " × ".join(map(str, quality["control_points"]))
     facts.append(("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"]))))
@@ -172,12 +138,16 @@ def _facts(report: Report) -> str:
     return f'<dl class="facts">{"".join(rows)}</dl>'
 
 
-def _error_fact(level: Report, key: str, name: str) -> tuple[str, str, str]:
+def _error_fact(level: Report, key: str) -> tuple[str, str, str]:
     """The relative error, and the absolute one as the remark; that alone where the solution is zero."""
     relative = level.get(f"{key}_relative")
     if relative is None:
-        return name.capitalize(), f"{level[key]:.3e}", "on the finest mesh"
-    return f"Relative {name}", f"{relative:.3e}", f"absolute {level[key]:.3e}"
+        return _capitalized(TITLES[key]), f"{level[key]:.3e}", "on the finest mesh"
+    return _capitalized(TITLES[f"{key}_relative"]), f"{relative:.3e}", f"absolute {level[key]:.3e}"
+
+
+def _capitalized(title: str) -> str:
+    return title[0].upper() + title[1:]
 
 
 def _fields(scene: Scene | None) -> list[str]:
@@ -194,10 +164,10 @@ def _convergence(report: Report) -> str:
     if not section:
         return ""
     levels = _with_rates(section)
-    keys = [key for key in COLUMNS if any(level.get(key) is not None for level in levels)]
+    keys = [key for key in TITLES if any(level.get(key) is not None for level in levels)]
     body = [[_number(key, level.get(key)) for key in keys] for level in levels]
     formula = f'<p class="soft">exact solution {escape(str(section["exact"]))}</p>' if section.get("exact") else ""
-    return f"<h2>Convergence</h2>{formula}{_table([COLUMNS[key] for key in keys], body)}"
+    return f"<h2>Convergence</h2>{formula}{_table([TITLES[key] for key in keys], body)}"
 
 
 def _with_rates(section: Report) -> list[dict[str, Any]]:
@@ -236,12 +206,12 @@ def _notices(report: Report) -> str:
 
 def _figures(report: Report, folder: Path) -> Iterable[str]:
     """The figures of the sections this report has."""
-    for section, figures in FIGURES.items():
-        for name, title in figures.items():
-            if section in report and (folder / name).is_file():
-                data = base64.b64encode((folder / name).read_bytes()).decode("ascii")
-                image = f'<img src="data:image/png;base64,{data}" alt="{title}">'
-                yield f"<h2>{title}</h2><figure>{image}</figure>"
+    for figure in figures_of(report):
+        path = folder / figure.file
+        if path.is_file():
+            data = base64.b64encode(path.read_bytes()).decode("ascii")
+            image = f'<img src="data:image/png;base64,{data}" alt="{figure.title}">'
+            yield f"<h2>{figure.title}</h2><figure>{image}</figure>"
 
 
 def _command(report: Report) -> str:

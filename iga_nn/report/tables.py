@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from solve import ConvergenceRow
+from ..levels import ESTIMATES, TITLES
 
-Study = Mapping[int, Sequence["ConvergenceRow"]]  # degree -> its levels
-COLUMNS = (
-    "degree", "elements", "dofs", "h", "l2_relative", "l2", "rate_l2", "h1_relative", "h1_seminorm", "rate_h1",
-    "iterations", "converged", "meaningful", "setup", "solve",
-)  # fmt: skip
+if TYPE_CHECKING:
+    from ..figures.curves import Study
+
+COLUMNS = (*(key for key in TITLES if key not in ESTIMATES), "converged", "meaningful", "setup", "solve")
 
 
 def rows_of(study: Study) -> list[dict[str, Any]]:
@@ -39,19 +36,17 @@ def as_csv(study: Study) -> str:
 
 def as_table(study: Study) -> str:
     """Columns for a reader."""
-    head = ("degree", "elements", "dofs", "relative L2", "L2 error", "rate", "relative H1", "H1 error", "rate",
-            "iterations", "seconds")  # fmt: skip
-    errors = ("l2_relative", "l2", "rate_l2", "h1_relative", "h1_seminorm", "rate_h1")
-    lines: list[tuple[str, ...]] = [head]
+    keys = [key for key in COLUMNS if key in TITLES and key != "h"]
+    lines = [[*(TITLES[key] for key in keys), "seconds"]]
     for row in rows_of(study):
-        counts = [str(row[name]) for name in ("degree", "elements", "dofs")]
-        numbers = [_number(name, row[name]) for name in errors]
-        lines.append((*counts, *numbers, str(row["iterations"]), f"{row['setup'] + row['solve']:.2f}"))
-    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+        lines.append([*(_number(key, row[key]) for key in keys), f"{row['setup'] + row['solve']:.2f}"])
+    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
     return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in lines)
 
 
-def _number(name: str, value: float | None) -> str:
+def _number(key: str, value: float | None) -> str:
     if value is None:
         return "-"
-    return f"{value:.2f}" if name.startswith("rate") else f"{value:.3e}"
+    if isinstance(value, int):
+        return str(value)
+    return f"{value:.2f}" if key.startswith("rate") else f"{value:.3e}"

@@ -48,10 +48,10 @@ class Forecast:
 
     def __str__(self) -> str:
         low, high = self.seconds
-        unit, size = ("minutes", 60.0) if high >= 90.0 else ("seconds", 1.0)
+        unit, size = ("minute", 60.0) if high >= 90.0 else ("second", 1.0)
         first, last = max(1, round(low / size)), max(1, round(high / size))
-        span = f"{first} to {last}" if first < last else f"{last}"
-        return f"about {span} {unit}, {self.memory_mb / 1000.0:.1f} GB of memory"
+        span = f"{first} to {last} {unit}s" if first < last else f"{last} {unit}{'s' * (last > 1)}"
+        return f"about {span}, {self.memory_mb / 1000.0:.1f} GB of memory"
 
     def as_dict(self) -> dict[str, Any]:
         """The section `estimate` of report.json."""

@@ -6,7 +6,7 @@ import logging
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,17 +15,13 @@ from typing import Any
 
 from parameterize.files import unfinished
 
-from ..options import InputError, one_line
+from ..errors import InputError, one_line
 from ..report import document as reports
+from ..report.artifacts import Part, files_of
 
 log = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
-MAP_DATA, MAP_PICTURES = ("volume.npz", "boundary.npz", "history.npz"), ("faces", "lines", "cut", "distortion")
-MAP_FILES = (*MAP_DATA, "history.png", "history.pdf", *(f"{name}.png" for name in MAP_PICTURES))
-DEFECT_FILES = ("folds.png", "meeting.png")
-SOLUTION_FILES = ("solution.npz", "convergence.png", "convergence.pdf", "error.png", "named_faces.png")
-STUDY_FILES = ("study.csv", "study.png", "study.pdf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +57,17 @@ class RunFolder:
         yield
         self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
 
-    def draw(self, draw: Callable[[Any], dict[str, str]]) -> None:
-        """Figures by functions of iga_nn.figures, timed; importing matplotlib and VTK takes part of it.
+    def draw(self, part: Part, **known: Any) -> None:
+        """Draw the figures of one part, timed; importing matplotlib and VTK takes part of it.
 
-        Those that fail are listed in the report as `not_drawn`, with the reason.
+        known: what the figures show, by the names that the table of artifacts uses. Figures that fail are listed in the
+        report as `not_drawn`, with the reason.
         """
         with self.timed("report"):
             try:
-                from .. import figures as plotting
+                from ..report.figures import draw_figures
 
-                self.note_failures(draw(plotting))
+                self.note_failures(draw_figures(self.folder, part, known, self.endings))
             except Exception as error:  # matplotlib itself is missing, say: whatever it is, it ends no run
                 self.note_failures({"figures": one_line(error) or type(error).__name__})
                 log.warning("figures could not be drawn: %s", one_line(error))
@@ -80,9 +77,9 @@ class RunFolder:
         if failures:
             self.report["not_drawn"] = self.report.get("not_drawn", {}) | failures
 
-    def begin(self, *replaced: str) -> None:
-        """The input is good: from here on nothing in the folder counts as finished; files of an older run go."""
-        for name in (reports.FILE_NAME, reports.PAGE_NAME, *replaced):
+    def begin(self, *parts: Part) -> None:
+        """Remove what an older run left of these parts, and its report: the input is good, a new result begins."""
+        for name in files_of("report", *parts):
             target = self.folder / name
             for old in (target, *unfinished(target)):
                 old.unlink(missing_ok=True)

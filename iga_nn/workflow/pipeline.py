@@ -6,7 +6,7 @@ Every file is written as soon as its content is known, so that a late failure co
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
@@ -18,22 +18,14 @@ from parameterize.files import save_text
 from parameterize.spline.volume import BSplineVolume
 from solve.forms.frame import UnitFrame
 
+from ..errors import InputError, input_errors, one_line
 from ..io.formats import load_volume
-from ..options import (
-    InputError,
-    MapOptions,
-    PoissonOptions,
-    ProblemOptions,
-    StudyOptions,
-    check_size,
-    input_errors,
-    one_line,
-)
+from ..options import MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
 from ..report import tables as studies
-from .output_folder import SOLUTION_FILES, STUDY_FILES, Outcome, RunFolder, open_folder
+from .output_folder import Outcome, RunFolder, open_folder
 from .repeat import command_line, gives_the_same
-from .train import load, map_surface
-from .verdict import certified_facts, write_certificate
+from .train import map_surface
+from .verdict import write_certificate
 
 if TYPE_CHECKING:
     from parameterize.progress import ProgressCallback
@@ -122,13 +114,13 @@ def solve_to(
         check_problem(loaded, equation)
         check_device(device, equation)
     with open_folder(path, out, force, vector=vector) as (state, _):
-        state.begin(*SOLUTION_FILES)
+        state.begin("solution")
         elsewhere = {"device": device} if device != "cpu" else {}
         command = command_line(f"solve {options.section}", path, options, **elsewhere, out=out)
         write_certificate(state, path, loaded, command)
         solution = _solve(state, loaded, equation, options, **elsewhere)
         if len(equation.dirichlet) < 6:  # the user names faces: show which is which
-            state.draw(lambda plotting: plotting.draw_face_names(state.folder, loaded))
+            state.draw("solution", named_volume=loaded)
         return _finish(state, loaded, solution, equation)
 
 
@@ -155,7 +147,7 @@ def study_to(
     with input_errors():
         check_problem(loaded, equation)
     with open_folder(path, out or f"{path.name.split('.')[0]}-study", force, vector=vector) as (state, _):
-        state.begin(*STUDY_FILES)
+        state.begin("study")
         write_certificate(state, path, loaded, command_line("study", path, options, out=out))
         verdict = state.report["parameterization"]["bijective"]
         study: dict[int, list[ConvergenceRow]] = {}
@@ -168,26 +160,8 @@ def study_to(
             study=_given(equation, loaded)
             | {"levels": studies.rows_of(study), "notices": _notices([row.report for row in chain(*study.values())])}
         )
-        state.draw(lambda plotting: plotting.draw_levels(state.folder, "study", study, state.endings))
+        state.draw("study", study=study)
         return _finish(state, loaded), studies.as_table(study)
-
-
-def check_surface(
-    mesh: str, component: int | None, max_faces: int, decimate: bool = False, strict: bool = False
-) -> dict[str, Any]:
-    """The section `input` of report.json for a surface that is accepted; raises MeshError where it is not.
-
-    decimate: bring a larger surface down to max_faces. strict: refuse a surface that intersects itself, too.
-    """
-    surface = load(mesh, component, max_faces, decimate)
-    if strict:
-        surface.refuse_crossings()
-    return surface.summary()
-
-
-def check_volume(path: str | Path) -> dict[str, Any]:
-    """The certificate of a saved volume. Raises InputError for a file that is none."""
-    return certified_facts(load_volume(path))
 
 
 def _there_already(finished: Outcome, command: str) -> Outcome:
@@ -237,9 +211,24 @@ def _solve(
     }
     section = {name: given for name, given in section.items() if given is not None and given != ()}
     state.write(**{options.section: section})
-    if equation.exact is not None:
-        state.draw(lambda plotting: plotting.draw_solution(state.folder, volume, solutions, equation, state.endings))
+    _draw_errors(state, volume, solutions, equation)
     return solutions[-1]
+
+
+def _draw_errors(
+    state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Poisson | Elasticity
+) -> None:
+    """Draw the errors where they are known, and their convergence where there are several levels, coarsest first."""
+    from solve import ConvergenceRow
+
+    is_finite = all(np.all(np.isfinite(solution.coefficients)) for solution in solutions)
+    if equation.exact is None or not is_finite:  # without an exact solution, or where the solver broke down
+        return
+    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1], "problem": equation}
+    if len(solutions) > 1:
+        rows = [ConvergenceRow(solution.report, None, None) for solution in solutions]
+        known["levels"] = {max(solutions[-1].degrees): rows}
+    state.draw("solution", **known)
 
 
 def _given(equation: Poisson | Elasticity, volume: BSplineVolume) -> dict[str, Any]:

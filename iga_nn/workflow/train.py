@@ -15,12 +15,14 @@ from parameterize.arrays import Array
 from parameterize.files import save_arrays
 from solve.forms.frame import UnitFrame
 
-from ..options import InputError, MapOptions, input_errors, read_corners
+from ..errors import InputError, input_errors
+from ..models import resolve
+from ..options import MapOptions, read_corners
 from ..report import advice
 from ..report import document as reports
 from .cost_estimate import Forecast, forecast
 from .machine import available_memory_mb
-from .output_folder import CHECKPOINT, DEFECT_FILES, MAP_FILES, SOLUTION_FILES, RunFolder, has_checkpoint
+from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
 from .verdict import tell
 
 if TYPE_CHECKING:
@@ -32,19 +34,6 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _TRIED = 50  # points of the surface
-
-
-def load(mesh: str | Path, component: int | None, max_faces: int, decimate: bool) -> Surface:
-    """A surface by path or name, through the gate. Raises MeshError where it is refused."""
-    from parameterize.surface import decimation as mesh_decimate
-    from parameterize.surface.surface import MAX_FACES
-
-    from ..models import resolve
-
-    if not decimate:
-        return resolve(str(mesh), component=component, max_faces=max_faces)
-    surface = resolve(str(mesh), component=component, max_faces=max(max_faces, MAX_FACES))
-    return mesh_decimate.decimate(surface, max_faces)
 
 
 def map_surface(
@@ -61,7 +50,9 @@ def map_surface(
     command: that repeats it. equation, unknowns: what is solved on it afterwards, and how large that is.
     """
     with state.timed("load"):
-        surface = load(mesh, options.component, options.max_faces, options.decimate)
+        surface = resolve(
+            str(mesh), component=options.component, max_faces=options.max_faces, decimate=options.decimate
+        )
         corners = read_corners(options.corners, _frame(surface)) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
@@ -75,17 +66,19 @@ def map_surface(
         _check_data(equation, surface)
     if options.resume and not has_checkpoint(state.folder):
         log.info("no checkpoint, starting anew")
-    state.begin(*MAP_FILES, *DEFECT_FILES, *SOLUTION_FILES)
+    state.begin("map", "solution")
     with state.timed("load"):
         expected = forecast(surface, options.config(), device=device, unknowns=unknowns)
     _announce(expected)
     result = _train(surface, options, corners, progress, state.folder / CHECKPOINT)
     state.seconds.update(result.seconds)
     _write(state, surface, result, command, expected, options)
-    state.draw(lambda plotting: plotting.draw_map(state.folder, result.volume, result.history, state.endings, marks))
-    places = advice.span_places(result.volume, result.certificate.unproved)
-    meeting = result.quality.boundary_check.meeting
-    state.draw(lambda plotting: plotting.draw_defects(state.folder, result.volume, places, meeting))
+    defects: dict[str, Any] = {}
+    if len(unproved := result.certificate.unproved):
+        defects["places"] = advice.span_places(result.volume, unproved)
+    if meeting := result.quality.boundary_check.meeting:
+        defects["meeting"] = meeting
+    state.draw("map", volume=result.volume, history=result.history, marks=marks, **defects)
     return result
 
 

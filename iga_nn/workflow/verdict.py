@@ -5,15 +5,18 @@ from __future__ import annotations
 import hashlib
 import logging
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from parameterize.arrays import in_brackets
-from parameterize.spline.volume import BSplineVolume
 
-from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
-from .output_folder import RunFolder
+
+if TYPE_CHECKING:
+    from parameterize.spline.volume import BSplineVolume
+
+    from ..options import MapOptions
+    from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 

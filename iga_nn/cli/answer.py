@@ -1,0 +1,61 @@
+"""What a command says on stdout when it is done, and the exit code that goes with it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from ..levels import ESTIMATES, TITLES
+from ..report import advice
+from ..report import document as reports
+from ..workflow.output_folder import Outcome
+from .exit_codes import DONE, NOT_CERTIFIED, NOT_SOLVED
+
+SHOWN_ERRORS = ("l2_relative", "l2", *ESTIMATES)  # of a level
+
+
+def exit_code(report: reports.Report) -> int:
+    """Return the exit code of a finished report."""
+    if not reports.is_certified(report):
+        return NOT_CERTIFIED
+    return DONE if reports.is_converged(report) and reports.is_meaningful(report) else NOT_SOLVED
+
+
+def as_json(value: Any) -> str:
+    """Return the JSON text of a report or a part of it."""
+    return json.dumps(reports.plain(value), indent=2)
+
+
+def verdict_as_json(outcome: Outcome) -> str:
+    """Return the verdict of a finished run as JSON, for scripts."""
+    return as_json(reports.verdict(outcome.report, outcome.folder))
+
+
+def verdict_in_words(outcome: Outcome) -> str:
+    """Return the verdict of a finished run for a reader, one fact a line, followed by what to try."""
+    verdict = reports.verdict(outcome.report, outcome.folder)
+    lines = [f"det J > 0        {verdict['bijective']}", f"one-to-one       {reports.one_to_one(outcome.report)}"]
+    for scale, arap in verdict.get("arap", {}).items():
+        rms = verdict["boundary_rms"][scale]
+        lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
+    for level in verdict.get("levels", []):
+        errors = [f"{TITLES[key]} {level[key]:.3e}, " for key in SHOWN_ERRORS if key in level]
+        end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANS NOTHING")
+        lines.append(f"{level['dofs']:>8} unknowns {''.join(errors)}{level['iterations']} iterations{end}")
+    lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")
+    return "\n".join([*lines, *advice.in_words(outcome.report)])
+
+
+def facts_in_words(facts: dict[str, Any]) -> str:
+    """Return the facts that `check` found, one a line."""
+    return "\n".join(f"{key + ':':16s} {_text(value)}" for key, value in facts.items())
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, dict):
+        return "; ".join(f"{key} {_text(item)}" for key, item in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(item) for item in value) or "none"
+    return str(value)

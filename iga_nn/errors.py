@@ -1,0 +1,34 @@
+"""What goes wrong through the user's input, and how it is said: in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class InputError(ValueError):
+    """An option, an input file or the output folder is at fault; the message is one line with the remedy."""
+
+
+@contextmanager
+def input_errors() -> Iterator[None]:
+    """Turn ValueError and OSError into InputError: around calls that only read or check what the user gave."""
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise InputError(one_line(error)) from None
+
+
+def expected_errors() -> tuple[type[Exception], ...]:
+    """Return the exceptions that end a command with one line instead of a traceback."""
+    from parameterize.surface.errors import MeshError
+    from solve.forms.formula import ExpressionError
+
+    return InputError, MeshError, ExpressionError, OSError
+
+
+def one_line(error: BaseException) -> str:
+    """Return an exception's message as one line; "path: reason" where the operating system refused."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return " ".join(str(error).split())

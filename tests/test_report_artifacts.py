@@ -1,0 +1,25 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from iga_nn import figures
+from iga_nn.report.artifacts import ARTIFACTS, as_markdown, figures_of, files_of
+
+ROOT = Path(figures.__file__).resolve().parents[2]
+
+
+def test_readme_shows_the_table_of_files():
+    assert as_markdown() in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_every_file_stands_once_and_every_figure_can_be_drawn():
+    names = files_of("report", "map", "solution", "study")
+    assert len(names) == len(set(names))
+    for artifact in ARTIFACTS:
+        assert bool(artifact.title) == bool(artifact.draw) == bool(artifact.takes) == artifact.file.endswith(".png")
+        assert not artifact.draw or artifact.draw in figures.__all__
+
+
+def test_a_report_shows_the_figures_of_its_own_sections():
+    assert {figure.part for figure in figures_of({"config": {}, "poisson": {}})} == {"map", "solution"}
+    assert [figure.file for figure in figures_of({"study": {}})] == ["study.png"]
