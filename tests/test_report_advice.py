@@ -80,6 +80,7 @@ def test_a_surface_that_crosses_itself_is_the_first_suspect():
     assert "as 7 pairs of its faces do" in advice.what_to_try(crossing)[0]
 
 
+@pytest.mark.pictures
 def test_a_folded_run_ends_with_places_advice_and_a_picture(formula_training, in_folder, capsys):
     formula_training(amplitude=0.4)
     assert main(["parameterize", "cube", "--out", "out"]) == 3

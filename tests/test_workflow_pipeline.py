@@ -88,6 +88,7 @@ def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, mo
     assert np.array_equal(seen[0], iga_nn.sample("cube").vertices[7::-1]) and seen[1] is None
 
 
+@pytest.mark.pictures
 def test_the_faces_that_a_solve_names_are_shown_until_the_next_solve(in_folder):
     benchmark_volume(3).save("map.npz")
     mixed = PoissonOptions(neumann=("u1",), refine=(0,))
