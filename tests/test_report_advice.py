@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import formula_parameterization
-from test_certificate_boundary import bent, mapped
-from test_examples import shown
+from example_files import shown
+from volumes import bent, mapped
 
 from iga_nn import figures as plotting
 from iga_nn.cli.commands import main
