@@ -283,7 +283,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["solve", "poisson", "good.npz", "--kappa", "0-1"], "kappa must be positive"),
         (
             ["solve", "poisson", "good.npz", "--source", "1", "--neumann", *(f"{f}=0" for f in FACE_NAMES)],
-            "not balance",
+            "incompatible Neumann data",
         ),
         (["check", "bean", "--component", "3"], "component 3"),
         (["check", "bean", "--max-faces", "10"], "--max-faces"),
