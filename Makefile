@@ -1,47 +1,57 @@
 # Every target sets up the virtual environment it needs: a fresh clone runs `make demo` or `make test` at once.
 PYTHON ?= python3
 BIN := .venv/bin
-STAMP := .venv/.stamp
+RUN := .venv/.run
+DEV := .venv/.dev
+INSTALL := $(BIN)/python -m pip install -c constraints.txt
 
-.PHONY: setup demo test lint validate stress fuzz audit
+.PHONY: setup setup-dev demo test lint validate stress fuzz audit
 
-setup: $(STAMP)
+setup: $(RUN)
 
-# torch first: it decides which numpy and which shared libraries the rest meets.
-$(STAMP): pyproject.toml constraints.txt
+setup-dev: $(DEV)
+
+# What running needs. An environment that is there is kept. torch first: it decides which numpy and which shared
+# libraries the rest meets.
+$(RUN): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version) if sys.version_info < (3, 11) else None'
-	$(PYTHON) -m venv .venv
-	$(BIN)/pip install -c constraints.txt torch==2.13.0
-	$(BIN)/pip install -c constraints.txt -e '.[dev]'
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(INSTALL) torch==2.13.0
+	$(INSTALL) -e .
 	touch $@
 
-demo: $(STAMP)
+# The development tools and the extras on top of it: pip leaves alone what is there.
+$(DEV): $(RUN)
+	$(INSTALL) -e '.[dev]'
+	touch $@
+
+demo: $(RUN)
 	$(BIN)/iga-nn run poisson seashell --out out/demo --force
 	@echo "Open out/demo/report.html; the numbers are in out/demo/report.json."
 
 test: lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile
 
-lint: $(STAMP)
+lint: $(DEV)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-validate: $(STAMP)
+validate: $(DEV)
 	$(BIN)/python examples/validation.py
 	$(BIN)/python -m pytest -m slow
 
 # Takes some two to ten minutes a surface, where nothing certifies up to 40; goes on where it was interrupted.
-stress: $(STAMP)
+stress: $(DEV)
 	$(BIN)/python examples/benchmarks/stress.py
 
-fuzz: $(STAMP)
+fuzz: $(DEV)
 	OMP_NUM_THREADS=1 $(BIN)/python tests/fuzzing.py --files 100000
 
 # In an environment of its own. --strict: a package that the service does not answer for is a failure, not a success.
-audit: $(STAMP)
+audit: $(DEV)
 	$(PYTHON) -m venv .venv/audit
-	.venv/audit/bin/pip install pip-audit==2.10.1
+	.venv/audit/bin/python -m pip install pip-audit==2.10.1
 	.venv/audit/bin/pip-audit --strict --no-deps --disable-pip -r constraints.txt || \
 		{ echo "NOT AUDITED: a package has a known vulnerability, or the service could not be asked; the lines above say which"; exit 1; }

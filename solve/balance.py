@@ -16,21 +16,23 @@ LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data i
 
 
 def balanced(load: Array) -> Array:
-    """The load (n_u, n_v, n_w) less its mean: the functions sum to one, so now it is orthogonal to constants.
+    """Return the load (n_u, n_v, n_w) less its mean.
+
+    The basis functions sum to one, so the load is then orthogonal to constants.
 
     Raises ValueError where the load's sum, the integral of source and fluxes, is not nearly zero.
     """
     total, size = float(load.sum()), float(np.abs(load).sum())
     if abs(total) > LARGEST_IMBALANCE * size:
         raise ValueError(
-            f"source and Neumann data do not balance: their integrals sum to {total:.4g} and must sum to 0 "
-            "(no face and no reaction holds the solution)"
+            f"incompatible Neumann data: source plus flux integrate to {total:.4g}, must be 0 where no Dirichlet face, "
+            "no Robin face and no reaction fixes the solution"
         )
     return load - load.mean()
 
 
 def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Poisson) -> float:
-    """What is to be added to the solution for the mean of `exact`, or for mean zero without one."""
+    """Return the constant that gives the solution the mean of `exact`, or mean zero without one."""
     rule = gauss_rule(space)
     spline = PlaneField(coefficients, rule.tabulate(space.degrees, space.knots))
     plane = np.empty((4, *rule.plane_shape))

@@ -19,13 +19,14 @@ from .discretization.operator import free_window
 from .discretization.planes import map_planes
 from .discretization.quadrature import gauss_rule
 from .discretization.space import TrialSpace, trial_space
-from .failure import announce, check_solver, check_unknowns, solve_notices
+from .failure import announce, check_unknowns, solve_notices
 from .forms.elastic_problem import Elasticity
 from .linear.cg import conjugate_gradients
 from .linear.preconditioner import fast_diagonalization
 from .meaning import doubts
+from .options import SolverOptions
 from .solution import Solution, solution_of, with_estimate
-from .threads import checked_threads, one_blas_thread
+from .threads import one_blas_thread
 
 
 def solve_elasticity(
@@ -41,17 +42,17 @@ def solve_elasticity(
     estimate: bool | None = None,
     threads: int | None = None,
 ) -> Solution:
-    """Displacements of an elastic body; arguments and errors raised as in `solve_poisson`.
+    """Solve for the displacements of an elastic body; arguments and errors raised are those of `solve_poisson`.
 
     The solution's coefficients are (m_u, m_v, m_w, 3).
     """
-    check_solver(tolerance, max_iterations)
+    options = SolverOptions(tolerance=tolerance, max_iterations=max_iterations, certified=certified, threads=threads)
     problem = problem.on(volume)
     space = trial_space(volume, refine, degree)
     check_unknowns(space, problem.dirichlet)
     _warm_up()
     with one_blas_thread():
-        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, checked_threads(threads))
+        solution = _solve(volume, problem, space, options)
         if estimate or (estimate is None and problem.exact is None):
             solution = with_estimate(solution, space, problem)
     announce(solution, strict)
@@ -74,18 +75,11 @@ def _warm_up() -> None:
     """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
-    _solve(cube, Elasticity(exact=("x*x", "y", "z")), trial_space(cube, 1), 1e-10, 10, None, 1)
+    _solve(cube, Elasticity(exact=("x*x", "y", "z")), trial_space(cube, 1), SolverOptions(max_iterations=10, threads=1))
 
 
-def _solve(
-    volume: BSplineVolume,
-    problem: Elasticity,
-    space: TrialSpace,
-    tolerance: float,
-    max_iterations: int,
-    certified: str | None,
-    threads: int,
-) -> Solution:
+def _solve(volume: BSplineVolume, problem: Elasticity, space: TrialSpace, options: SolverOptions) -> Solution:
+    threads = options.thread_count
     clock = [time.process_time()]
     rule = gauss_rule(space)
     window = free_window(space, problem.dirichlet)
@@ -99,13 +93,15 @@ def _solve(
         return np.stack([block(part) for block, part in zip(blocks, residual, strict=True)])
 
     clock.append(time.process_time())
-    result = conjugate_gradients(system.operator.apply_free, right, preconditioner, tolerance, max_iterations)
+    result = conjugate_gradients(
+        system.operator.apply_free, right, preconditioner, options.tolerance, options.max_iterations
+    )
     coefficients[:, *window] = result.x
     clock.append(time.process_time())
     errors = _errors(volume, space, coefficients, problem, threads) if problem.exact is not None else None
     clock.append(time.process_time())
     doubtful = doubts(volume, problem, errors, coefficients.size)
-    notices = (*doubtful, *solve_notices(volume, space, system, certified, result))
+    notices = (*doubtful, *solve_notices(volume, space, system, options.certified, result))
     spline = np.moveaxis(coefficients, 0, -1)
     return solution_of(volume, space, spline, result, clock, errors, notices, meaningful=not doubtful)
 

@@ -38,14 +38,6 @@ def announce(solution: Solution, strict: bool) -> None:
         raise ConvergenceError(solution)
 
 
-def check_solver(tolerance: float, max_iterations: int) -> None:
-    """Raise ValueError for settings of the linear solver that are out of range."""
-    if not 0.0 < tolerance < 1.0:
-        raise ValueError(f"tolerance must lie between 0 and 1, got {tolerance}")
-    if max_iterations < 1:
-        raise ValueError(f"max_iterations must be at least 1, got {max_iterations}")
-
-
 def check_unknowns(space: TrialSpace, dirichlet: Collection[str]) -> None:
     """Raise ValueError where data on the named faces leave nothing to solve for."""
     if any(part.stop <= part.start for part in free_window(space, dirichlet)):

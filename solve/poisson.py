@@ -17,19 +17,20 @@ from .contradiction import contradictions
 from .discretization.dirichlet import boundary_coefficients
 from .discretization.natural import FaceMass, RobinOperator, face_rule
 from .discretization.norms import error_norms
-from .discretization.operator import Operator, System, assemble, free_window, prepare
+from .discretization.operator import Operator, System, Window, assemble, free_window, prepare
 from .discretization.planes import map_planes
 from .discretization.quadrature import GaussRule, gauss_rule
 from .discretization.space import TrialSpace, embedded, trial_space
-from .failure import announce, check_solver, check_unknowns, solve_notices
+from .failure import announce, check_unknowns, solve_notices
 from .field import SplineField
 from .forms.elastic_problem import Elasticity
 from .forms.problem import Poisson
 from .linear.cg import LinearResult, conjugate_gradients
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
 from .meaning import doubts
+from .options import SolverOptions
 from .solution import Solution, solution_of, with_estimate
-from .threads import checked_threads, one_blas_thread
+from .threads import one_blas_thread
 
 DEVICES = ("cpu", "cuda")
 
@@ -66,7 +67,14 @@ def solve_poisson(
     Raises ValueError for arguments out of range and for Neumann data that do not balance the source, ExpressionError
     where the data are not finite or have the wrong sign.
     """
-    check_solver(tolerance, max_iterations)
+    options = SolverOptions(
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        certified=certified,
+        threads=threads,
+        device=device,
+        start=start,
+    )
     check_device(device, problem)
     problem = problem.on(volume)
     space = trial_space(volume, refine, degree)
@@ -74,8 +82,7 @@ def solve_poisson(
     _warm_up()
     prepare(space, problem.reaction is not None)
     with one_blas_thread():
-        threads = checked_threads(threads)
-        solution = _solve(volume, problem, space, tolerance, max_iterations, certified, threads, device, start)
+        solution = _solve(volume, problem, space, options)
         if estimate or (estimate is None and problem.exact is None):
             solution = with_estimate(solution, space, problem)
     announce(solution, strict)
@@ -117,9 +124,9 @@ def check_device(device: str, problem: Poisson | Elasticity) -> None:
         raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
     if device != "cpu":
         if isinstance(problem, Elasticity):
-            raise ValueError(f"device {device!r} does not know elasticity; use device='cpu'")
+            raise ValueError(f"elasticity runs on device='cpu' only, got device={device!r}")
         if problem.robin:
-            raise ValueError(f"device {device!r} does not know Robin faces; use device='cpu'")
+            raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
         from .linear.cuda import check_available  # torch comes in here only
 
         check_available(device)
@@ -132,23 +139,13 @@ def _warm_up() -> None:
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
     for problem in (Poisson(exact="x*x"), Poisson(exact="x*x", kappa=["1", "0", "0", "1", "0", "1"])):
-        _solve(cube, problem, trial_space(cube, 1), 1e-10, 10, None, 1, "cpu")
+        _solve(cube, problem, trial_space(cube, 1), SolverOptions(max_iterations=10, threads=1))
 
 
-def _solve(
-    volume: BSplineVolume,
-    problem: Poisson,
-    space: TrialSpace,
-    tolerance: float,
-    max_iterations: int,
-    certified: str | None,
-    threads: int,
-    device: str,
-    start: SplineField | None = None,
-) -> Solution:
+def _solve(volume: BSplineVolume, problem: Poisson, space: TrialSpace, options: SolverOptions) -> Solution:
     clock = [time.process_time()]
     rule = gauss_rule(space)
-    system = _assemble(volume, space, problem, rule, threads)
+    system = _assemble(volume, space, problem, rule, options.thread_count)
     robin = _add_faces(volume, space, problem, system.load)
     operator = RobinOperator(system.operator, tuple(robin.values())) if robin else system.operator
     coefficients = boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet)
@@ -158,19 +155,18 @@ def _solve(
     if preconditioner.singular:
         right = balanced(right)
     clock.append(time.process_time())
-    guess = None if start is None else embedded(start.coefficients, start.degrees, start.knots, space)[window]
-    result = _iterate(operator, right, preconditioner, tolerance, max_iterations, device, guess)
+    result = _iterate(operator, right, preconditioner, options, _first_guess(options.start, space, window))
     coefficients[window] = result.x
     if preconditioner.singular:
         coefficients += missing_mean(volume, space, coefficients, problem)
     clock.append(time.process_time())
     errors = None
     if problem.exact is not None:
-        errors = error_norms(volume, space, coefficients, problem.exact_at, threads)
+        errors = error_norms(volume, space, coefficients, problem.exact_at, options.thread_count)
     clock.append(time.process_time())
     contradictory = contradictions(volume, problem)
     doubtful = doubts(volume, problem, None if contradictory else errors, coefficients.size)
-    notices = (*contradictory, *doubtful, *solve_notices(volume, space, system, certified, result))
+    notices = (*contradictory, *doubtful, *solve_notices(volume, space, system, options.certified, result))
     return solution_of(volume, space, coefficients, result, clock, errors, notices, meaningful=not doubtful)
 
 
@@ -178,17 +174,20 @@ def _iterate(
     operator: Operator | RobinOperator,
     right: Array,
     preconditioner: FastDiagonalization,
-    tolerance: float,
-    max_iterations: int,
-    device: str,
-    start: Array | None,
+    options: SolverOptions,
+    guess: Array | None,
 ) -> LinearResult:
-    if device == "cpu":
-        return conjugate_gradients(operator.apply_free, right, preconditioner, tolerance, max_iterations, start)
+    tolerance, most = options.tolerance, options.max_iterations
+    if options.device == "cpu":
+        return conjugate_gradients(operator.apply_free, right, preconditioner, tolerance, most, guess)
     from .linear.cuda import solve_on_device
 
     assert isinstance(operator, Operator)
-    return solve_on_device(operator, preconditioner, right, tolerance, max_iterations, device, start)
+    return solve_on_device(operator, preconditioner, right, tolerance, most, options.device, guess)
+
+
+def _first_guess(start: SplineField | None, space: TrialSpace, window: Window) -> Array | None:
+    return None if start is None else embedded(start.coefficients, start.degrees, start.knots, space)[window]
 
 
 def _add_faces(volume: BSplineVolume, space: TrialSpace, problem: Poisson, load: Array) -> dict[str, FaceMass]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 STAGES = ("S(2)", "S(1)", "cube", "corners", "edges")
 
 
+@functools.cache
 def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
     """A result as training leaves it, from the benchmark map; amplitude 0.4 folds it."""
     from iga_nn.samples import sample
@@ -77,8 +79,10 @@ def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 
 @pytest.fixture
-def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty current folder."""
+def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Path:
+    """Make an empty current folder; what VTK draws, at seconds a figure, is drawn for tests marked `pictures` only."""
+    if request.node.get_closest_marker("pictures") is None:
+        monkeypatch.setattr("iga_nn.figures.can_draw", lambda: False)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

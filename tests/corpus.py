@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from mesh_files import CUBE, QUADS, TRIANGLES, ball, binary_stl, joined, obj, ply
 from shapes import ball as round_surface
-from test_surface import ACCEPTED, CUBE, QUADS, REFUSED, TRIANGLES, ball, binary_stl, joined, obj, ply
+from test_surface import ACCEPTED, REFUSED
 
 
 @dataclass(frozen=True)

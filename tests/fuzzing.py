@@ -35,7 +35,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import torch
-from test_surface import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
+from mesh_files import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
 
 from iga_nn.errors import InputError, input_errors, one_line
 from iga_nn.io import splinepy as spline_files

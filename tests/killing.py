@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 import torch
 import torch._dynamo  # Adam would load it in every process
-from test_run import small_surface, tiny_config
-from test_surface import obj
+from mesh_files import obj
+from small_run import small_surface, tiny_config
 
 from iga_nn.cli.commands import main as command
 from iga_nn.options import MapOptions

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from conftest import formula_parameterization
+from example_files import cells, load
 from shapes import rounded_cube
-from test_examples import load
 
 import iga_nn
 from iga_nn.options import MapOptions
@@ -44,12 +44,6 @@ CONCH = replace(
 def options(folder, **given):
     values = {"names": tuple(g1.PAPER), "mapping": MapOptions(device="cpu"), "jobs": 1, "out": Path(folder)}
     return g1.Options(models=Path(folder), **(values | given))
-
-
-def cells(text, model):
-    """The model's rows in the tables of a Markdown text."""
-    rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in text.splitlines() if line[:1] == "|"]
-    return [row for row in rows if row[0] == model]
 
 
 def table(folder):

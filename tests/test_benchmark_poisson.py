@@ -1,7 +1,7 @@
 import csv
 
 import pytest
-from test_examples import load
+from example_files import load
 
 benchmark = load("benchmarks/poisson")
 

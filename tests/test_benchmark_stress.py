@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_benchmark_g1 import cells
-from test_examples import load, shown
+from example_files import cells, load, shown
 
 from iga_nn import sample
 from iga_nn.options import MapOptions

@@ -4,30 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from volumes import bent, mapped
 
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.box_overlap import overlapping_boxes
 from parameterize.certificate.jacobian import certify
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
-
-
-def mapped(function, shape=(6, 6, 6), degrees=(3, 3, 3)):
-    """The volume whose control points are `function` at the Greville points."""
-    knots = tuple(open_uniform_knots(n, p) for n, p in zip(shape, degrees, strict=True))
-    rows = [greville(k, p) for k, p in zip(knots, degrees, strict=True)]
-    u, v, w = np.meshgrid(*rows, indexing="ij")
-    return BSplineVolume(degrees, knots, np.stack(function(u, v, w), axis=-1))
-
-
-def bent(turns, rise=0.0, shape=(24, 4, 4)):
-    """A bar of 0.6 x 0.6 around a circle of radius 1; `rise`: the climb over its whole length."""
-
-    def place(u, v, w):
-        angle, radius = 2.0 * np.pi * turns * u, 1.0 + 0.6 * (v - 0.5)
-        return radius * np.sin(angle), radius * np.cos(angle), 0.6 * (w - 0.5) + rise * u
-
-    return mapped(place, shape)
 
 
 @pytest.mark.parametrize("degrees", [(1, 1, 1), (2, 2, 2), (3, 3, 3), (1, 2, 3), (3, 1, 2)])

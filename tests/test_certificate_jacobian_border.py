@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_certificate_jacobian import exact_coefficients, exact_verdict, random_volume
+from exact_arithmetic import exact_coefficients, exact_verdict, random_volume
 
 from parameterize.certificate.jacobian import certify
 from parameterize.spline.volume import BSplineVolume

@@ -48,6 +48,7 @@ def python(*arguments: str, path: str = "", stdout: int = subprocess.PIPE) -> su
     )
 
 
+@pytest.mark.pictures
 def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys):
     formula_training()
     assert main(["run", "poisson", "cube", "--out", "deep/result", "--exact", "x*y", "--refine", "0", "1"]) == 0
@@ -129,6 +130,7 @@ def test_solve_poisson_on_a_saved_volume(in_folder, capsys):
         assert data["coefficients"].shape == (10, 10, 10)  # 8 spans of degree 2
 
 
+@pytest.mark.pictures
 def test_source_without_exact_reports_estimates(in_folder, capsys):
     benchmark_volume(4).save("map.npz")
     assert main(["solve", "poisson", "map.npz", "--source", "1", "--boundary", "0", "--refine", "0", "--quiet"]) == 0
@@ -281,7 +283,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["solve", "poisson", "good.npz", "--kappa", "0-1"], "kappa must be positive"),
         (
             ["solve", "poisson", "good.npz", "--source", "1", "--neumann", *(f"{f}=0" for f in FACE_NAMES)],
-            "not balance",
+            "incompatible Neumann data",
         ),
         (["check", "bean", "--component", "3"], "component 3"),
         (["check", "bean", "--max-faces", "10"], "--max-faces"),
@@ -333,6 +335,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, says, in_folder, capsy
     assert set(Path().iterdir()) == before
 
 
+@pytest.mark.pictures
 def test_bad_data_leave_an_earlier_solution_alone(in_folder, capsys):
     benchmark_volume(3).save("map.npz")
     assert main(["solve", "poisson", "map.npz", "--refine", "0"]) == 0

@@ -1,3 +1,5 @@
+import threading
+
 import numpy as np
 import pytest
 
@@ -87,6 +89,36 @@ def test_bar_in_tension_by_hand():
     solution = solve_elasticity(bar, problem, tolerance=1e-13)
     assert np.allclose(solution([[1.0, 1.0, 1.0], [0.5, 0.0, 1.0]]), [[0.5, -0.125, -0.125], [0.25, 0.0, -0.125]])
     assert "l2" not in solution.report.as_dict()
+
+
+def test_a_flat_map_is_refused_with_the_place():
+    volume = box()
+    flat = BSplineVolume(volume.degrees, volume.knots, 0.0 * volume.control_points)
+    with pytest.raises(ValueError, match=r"det J is zero at the parameters \(0\.0\d+, 0\.0\d+, 0\.0\d+\)"):
+        operator(flat)
+
+
+def test_assembly_runs_on_the_threads_and_gives_the_same_bits_for_any_number():
+    """9 spans a direction with 2 Gauss points each: two pieces of work, which both threads must take up together."""
+    volume, seen = benchmark_volume(9, degree=2), set()
+    together = threading.Barrier(2, timeout=60)
+
+    def systems(threads, wait=None):
+        space, rule = trial_space(volume), gauss_rule(trial_space(volume))
+
+        def force(x, y, z):
+            if wait is not None and threading.get_ident() not in seen:
+                seen.add(threading.get_ident())
+                wait()
+            return np.stack([x * y, z, np.sin(x)])
+
+        return assemble_elasticity(volume, space, force, (1.0, 2.0), rule, free_window(space), threads)
+
+    one, two = systems(1), systems(2, together.wait)
+    assert len(seen) == 2
+    assert np.array_equal(one.load, two.load)
+    assert np.array_equal(one.operator.factors, two.operator.factors)
+    assert np.array_equal(one.operator.block(1).factors, two.operator.block(1).factors)
 
 
 def test_lame_constants_by_hand():

@@ -23,7 +23,7 @@ MAP |= {"draw_distortion": "distortion.png", "draw_study": "convergence.png", "d
 
 
 @pytest.fixture
-def all_drawn(monkeypatch):
+def all_drawn(in_folder, monkeypatch):
     """Every figure but those that a test breaks is drawn at once, as an empty file; needs no graphics library."""
     monkeypatch.setattr(plotting, "can_draw", lambda: True)
     for name in (*MAP, "draw_folds", "draw_meeting"):

@@ -95,7 +95,7 @@ def test_the_mean_is_that_of_the_exact_solution_or_zero():
 
 def test_data_out_of_balance_are_refused():
     problem = Poisson(source="1", neumann=dict.fromkeys(FACE_NAMES, "0"))
-    with pytest.raises(ValueError, match="do not balance: their integrals sum to 0.97"):  # its volume
+    with pytest.raises(ValueError, match="source plus flux integrate to 0.97"):  # its volume
         solve_poisson(benchmark_volume(2), problem)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from volumes import spans_at
 
 from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
@@ -51,18 +52,6 @@ def volume(request, in_folder):
     """One of them, saved as volume.npz in the current folder."""
     VOLUMES[request.param].save("volume.npz")
     return VOLUMES[request.param]
-
-
-def spans_at(volume, points):
-    """Element of each point, counted with u fastest, and the coordinates in it."""
-    numbers, local, step = np.zeros(len(points), dtype=int), np.empty_like(points), 1
-    for axis, knots in enumerate(volume.knots):
-        breaks = np.unique(knots)
-        i = np.searchsorted(breaks, points[:, axis], side="right") - 1
-        local[:, axis] = (points[:, axis] - breaks[i]) / (breaks[i + 1] - breaks[i])
-        numbers += step * i
-        step *= len(breaks) - 1
-    return numbers, local
 
 
 def largest(difference):

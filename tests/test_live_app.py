@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from browser import running
 from matplotlib.colors import rgb_to_hsv, to_rgb
+from mesh_files import CUBE, TRIANGLES, obj
 from shapes import ball
-from test_surface import CUBE, TRIANGLES, obj
 
 import iga_nn
 from iga_nn.cli.commands import main

@@ -6,7 +6,7 @@ from threading import Event
 
 import numpy as np
 import pytest
-from test_surface import CUBE, TRIANGLES, obj
+from mesh_files import CUBE, TRIANGLES, obj
 
 from iga_nn.live import worker as job_process
 from iga_nn.live.queue import Jobs, safe_name

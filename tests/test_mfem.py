@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_io_formats import spans_at
+from volumes import spans_at
 
 from iga_nn.io.splinepy import write_mfem
 from parameterize.spline.volume import FACE_NAMES

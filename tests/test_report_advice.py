@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import formula_parameterization
-from test_certificate_boundary import bent, mapped
-from test_examples import shown
+from example_files import shown
+from volumes import bent, mapped
 
 from iga_nn.cli.commands import main
 from iga_nn.options import MapOptions
@@ -80,6 +80,7 @@ def test_a_surface_that_crosses_itself_is_the_first_suspect():
     assert "as 7 pairs of its faces do" in advice.what_to_try(crossing)[0]
 
 
+@pytest.mark.pictures
 def test_a_folded_run_ends_with_places_advice_and_a_picture(formula_training, in_folder, capsys):
     formula_training(amplitude=0.4)
     assert main(["parameterize", "cube", "--out", "out"]) == 3

@@ -19,10 +19,11 @@ from parameterize.spline.volume import BSplineVolume
 from ..threads import colours, in_parallel
 from . import elastic_kernels, kernels
 from .operator import PAIRS, Operator, Window, to_blocks
-from .planes import PlaneField, map_planes
+from .planes import PlaneField, count_folded, map_planes
 from .quadrature import GaussRule, Table, span_tables
 from .space import TrialSpace
 
+PIECE = 12  # planes of Gauss points in a piece of the assembly
 VectorFunction = Callable[[Array, Array, Array], Array]
 
 
@@ -70,16 +71,19 @@ class ElasticOperator:
         return self.apply(full)[:, *self.window]
 
     def block(self, component: int) -> Operator:
-        """The diagonal block of one component: the scalar operator with kappa = mu I + (lambda + mu) e e^T."""
+        """Return the diagonal block of one component: the scalar operator with kappa = mu I + (lambda + mu) e e^T."""
         lam, mu = self.constants
-        planes = []
-        for rows in self.factors:  # (3, 3, q_w, q_v), row of the parametric direction
-            terms = [
-                mu * (rows[a] * rows[b]).sum(axis=0) + (lam + mu) * rows[a, component] * rows[b, component]
-                for a, b in PAIRS
-            ]
-            planes.append(np.stack([to_blocks(term) for term in terms], axis=2))
-        return Operator(self.space, self.tables, np.stack(planes), self.window, self.threads)
+        q_u, _, _, q_w, q_v = self.factors.shape
+        factors = np.empty((q_u, -(-q_v // kernels.LANES), q_w, len(PAIRS), kernels.LANES))
+
+        def fill(q: int) -> None:
+            rows = self.factors[q]  # (3, 3, q_w, q_v), row of the parametric direction
+            for index, (a, b) in enumerate(PAIRS):
+                term = mu * (rows[a] * rows[b]).sum(axis=0) + (lam + mu) * rows[a, component] * rows[b, component]
+                factors[q, :, :, index] = to_blocks(term)
+
+        in_parallel(fill, range(q_u), self.threads)
+        return Operator(self.space, self.tables, factors, self.window, self.threads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,29 +105,33 @@ def assemble_elasticity(
     window: Window,
     threads: int = 1,
 ) -> ElasticSystem:
-    """One pass over the Gauss points; `force` returns (3, q_w, q_v). Where the map is folded |det J| replaces det J.
+    """Assemble operator and load in one pass over the Gauss points; `force` returns (3, q_w, q_v).
 
-    Raises ValueError where det J is zero at a Gauss point.
+    threads: of this pass and of the operator; the result is the same for any number, and `force` must be safe to call
+    from several threads. Where the map is folded, |det J| takes the place of det J.
+    Raises ValueError where det J is zero at a Gauss point, naming it.
     """
     tables = rule.tabulate(space.degrees, space.knots)
     u, v, w = tables
     factors = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
-    plane = np.empty(space.shape[1:])
+    loads = np.empty((rule.shape[0], 3, *space.shape[1:]))  # of each plane of Gauss points, before direction u
+    folded = []
+
+    def fill(points: NDArray[np.int64]) -> None:
+        for q, fields in map_planes(volume, rule, points):
+            tangents = np.moveaxis(fields[:, 1:], (0, 1), (3, 2))  # (q_w, q_v, 3, 3): row a is dF / du_a
+            cofactors = np.cross(np.roll(tangents, -1, axis=2), np.roll(tangents, -2, axis=2))
+            det = (tangents[:, :, 0] * cofactors[:, :, 0]).sum(axis=-1)
+            weights = rule.plane_weights(q)
+            folded.append(count_folded(weights * det, rule, q))
+            factors[q] = np.moveaxis(cofactors, (2, 3), (0, 1)) * np.sqrt(weights / np.abs(det))
+            measure = weights * np.abs(det)
+            for density, plane in zip(force(*fields[:, 0]), loads[q], strict=True):
+                kernels.integrate_plane(density * measure, v.first, v.values[0], w.first, w.values[0], plane)
+
+    in_parallel(fill, np.array_split(np.arange(rule.shape[0]), -(-rule.shape[0] // PIECE)), threads)
     load = np.zeros((3, *space.shape))
-    folded = 0
-    for q, fields in map_planes(volume, rule):
-        tangents = np.moveaxis(fields[:, 1:], (0, 1), (3, 2))  # (q_w, q_v, 3, 3): row a is dF / du_a
-        cofactors = np.cross(np.roll(tangents, -1, axis=2), np.roll(tangents, -2, axis=2))
-        det = (tangents[:, :, 0] * cofactors[:, :, 0]).sum(axis=-1)
-        if not det.all():
-            raise ValueError("volume: det J is zero at a Gauss point; such a map has no inverse there")
-        folded += int(np.count_nonzero(det < 0.0))
-        weights = rule.plane_weights(q)
-        factors[q] = np.moveaxis(cofactors, (2, 3), (0, 1)) * np.sqrt(weights / np.abs(det))
-        measure = weights * np.abs(det)
-        window_u = slice(u.first[q], u.first[q] + u.values.shape[2])
-        for component, density in zip(load, force(*fields[:, 0]), strict=True):
-            kernels.integrate_plane(density * measure, v.first, v.values[0], w.first, w.values[0], plane)
-            component[window_u] += np.multiply.outer(u.values[0, q], plane)
+    for q, planes in enumerate(loads):  # in one order, whatever thread came first
+        load[:, u.first[q] : u.first[q] + u.values.shape[2]] += u.values[0, q][:, None, None] * planes[:, None]
     operator = ElasticOperator(space, tables, factors, constants, window, threads)
-    return ElasticSystem(operator, load, folded, int(np.prod(rule.shape)))
+    return ElasticSystem(operator, load, sum(folded), int(np.prod(rule.shape)))

@@ -18,7 +18,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..threads import colours, in_parallel
 from . import kernels, product
-from .planes import map_planes
+from .planes import count_folded, map_planes
 from .quadrature import GaussRule, SpanTable, Table, gauss_rule, span_tables
 from .space import TrialSpace
 
@@ -82,11 +82,10 @@ class Operator:
 
     def _run(self, layers: NDArray[np.int64], packed: Array, total: Array) -> None:
         """Add the part of some layers of elements to a packed total."""
-        u, v, w = self._spans
-        size = self.factors.shape[2] // len(w.first) * self.factors.shape[3] * kernels.LANES
-        factors = self.factors.reshape(*self.factors.shape[:2], len(w.first), size)
-        terms, n_w = (0,) * self.factors.shape[3], self.space.shape[2]
-        product.multiply_layers(packed, layers, *u, *v, *w, *v.sizes, *w.sizes, n_w, factors, terms, total)
+        q_u, v_blocks, q_w, terms, lanes = self.factors.shape
+        spans_w = len(self._spans[2].first)
+        factors = self.factors.reshape(q_u, v_blocks, spans_w, q_w // spans_w * terms * lanes)
+        product.multiply_layers(packed, layers, *self._spans, factors, (0,) * terms, self.space.shape[2], total)
 
     def diagonal(self) -> Array:
         """The diagonal of the matrix, shape `space.shape`: squared basis functions in place of the basis."""
@@ -172,7 +171,7 @@ def assemble(
             coefficient = ones if kappa is None else kappa(*where)
             factorize = kernels.plane_factors if coefficient.ndim == 2 else kernels.plane_tensor_factors
             factorize(fields, weights, np.ascontiguousarray(coefficient), factors[q], measure)
-            turned = _count_folded(measure, rule, q)
+            turned = count_folded(measure, rule, q)
             if turned:  # measured with |det J|, the form stays positive: an answer to show, if not to trust
                 folded.append(turned)
                 factors[q, :, :, :6] *= to_blocks(np.sign(measure))[:, :, None]
@@ -212,15 +211,3 @@ def from_blocks(blocks: Array, q_v: int) -> Array:
     """The plane (q_w, q_v) that `to_blocks` has cut, in memory of its own."""
     plane = blocks.transpose(1, 0, 2).reshape(blocks.shape[1], -1)
     return np.ascontiguousarray(plane[:, :q_v])
-
-
-def _count_folded(measure: Array, rule: GaussRule, q: int) -> int:
-    """Number of points of a plane with det J < 0. Raises ValueError where it is zero."""
-    if measure.min() > 0.0:
-        return 0
-    flat = np.argwhere(measure == 0.0)
-    if flat.size:
-        w, v = flat[0]
-        where = tuple(float(rule.points[a][i]) for a, i in enumerate((q, v, w)))
-        raise ValueError(f"volume: det J is zero at the parameters {where}; such a map has no inverse there")
-    return int(np.count_nonzero(measure < 0.0))

@@ -44,3 +44,18 @@ def map_planes(
         for component, out in zip(components, fields, strict=True):
             component.evaluate(q, out)
         yield q, fields
+
+
+def count_folded(measure: Array, rule: GaussRule, q: int) -> int:
+    """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J.
+
+    Raises ValueError where det J is zero, naming the place.
+    """
+    if measure.min() > 0.0:
+        return 0
+    flat = np.argwhere(measure == 0.0)
+    if flat.size:
+        w, v = flat[0]
+        where = tuple(float(rule.points[a][i]) for a, i in enumerate((q, v, w)))
+        raise ValueError(f"volume: det J is zero at the parameters {where}; such a map has no inverse there")
+    return int(np.count_nonzero(measure < 0.0))

@@ -2,14 +2,15 @@
 
 Points of direction v are cut into blocks of LANES, coefficients of direction w into blocks of ROWS: the innermost
 loops have a fixed length and fixed strides, which is what the compiler needs to use vector instructions. Loops over
-the functions and the Gauss points of a span run over tuples, `order` (degree + 1 entries) and `counts` (Gauss
-points), whose length the compiler knows: every degree gets machine code of its own.
+the Gauss points and the functions of a span run over the tuples `points` and `functions` of a `quadrature.SpanTable`,
+and those over the factors over a tuple `terms`: the compiler knows their lengths, and every degree gets machine code of
+its own.
 
     coefficients    (n_u, n_v, n_w) packed as (n_u, w blocks, n_v, ROWS)
     planes          (2, w blocks, n_v, ROWS): value and u derivative at one point of u
     lines           (v blocks, n_w, 3, LANES): value, u and v derivative (B B, B' B, B B') at points of u and v
     factors         (q_u, v blocks, spans of w, Gauss points x 6 or 7 x LANES): uu, uv, uw, vv, vw, ww, mass
-    tables          (spans, Gauss points, 2, degree + 1): values and slopes of the functions of a span
+    u, v, w         SpanTable of a direction; `values` of one span is a table (Gauss points, 2, degree + 1)
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from parameterize.arrays import Array, IntArray
 
 from .kernels import LANES, compiled
+from .quadrature import SpanTable
 
 ROWS = 16
 Sizes = tuple[int, ...]  # only its length counts
@@ -50,64 +52,44 @@ def unpack(packed: Array, start_u: int, start_v: int, start_w: int, values: Arra
 def multiply_layers(
     packed: Array,
     layers: IntArray,
-    first_u: IntArray,
-    u: Array,
-    first_v: IntArray,
-    v: Array,
-    first_w: IntArray,
-    w: Array,
-    counts_v: Sizes,
-    order_v: Sizes,
-    counts_w: Sizes,
-    order_w: Sizes,
-    n_w: int,
+    u: SpanTable,
+    v: SpanTable,
+    w: SpanTable,
     factors: Array,
     terms: Sizes,
+    n_w: int,
     result: Array,
 ) -> None:
-    """Add the product with the matrix of some layers of elements, spans of u: to result, packed as the coefficients.
+    """Add the product with the matrix of some layers of elements to `result`, which is packed as the coefficients are.
 
-    layers: (m,) the spans of u. first_u, first_v, first_w: (spans,) first function of each span.
+    layers: (m,) the spans of u. At every point of u the coefficients are contracted in u, v and w, multiplied with the
+    factors, and spread in w, v and u.
     """
     w_blocks, n_v = packed.shape[1], packed.shape[2]
-    size = w_blocks * n_v * ROWS
-    planes = np.empty((2, size))
+    planes = np.empty((2, w_blocks * n_v * ROWS))
     lines = np.zeros((factors.shape[1], n_w, 3 * LANES))
     sums = np.empty(lines.shape)
-    rows = np.empty(len(counts_v) * 3 * ROWS)
-    fluxes = np.empty(len(counts_w) * 4 * LANES)
+    rows = np.empty(len(v.points) * 3 * ROWS)
+    fluxes = np.empty(len(w.points) * 4 * LANES)
     for span in layers:
-        for point in range(u.shape[1]):
+        for point in range(u.values.shape[1]):
+            table = u.values[span, point]
             planes[:] = 0.0
-            for i in range(u.shape[3]):
-                _spread_to_two(
-                    packed[first_u[span] + i].reshape(-1), u[span, point, 0, i], u[span, point, 1, i], planes
-                )
-            _contract_v(planes, w_blocks, first_v, v, counts_v, order_v, rows, lines)
+            for i in range(table.shape[1]):
+                _contract_u(packed[u.first[span] + i].reshape(-1), table[0, i], table[1, i], planes)
+            _contract_v(planes, w_blocks, v, rows, lines)
             sums[:] = 0.0
-            here = factors[span * u.shape[1] + point]
+            here = factors[span * u.values.shape[1] + point]
             for block in range(lines.shape[0]):
-                _line_product(
-                    lines[block].reshape(-1),
-                    here[block],
-                    first_w,
-                    w,
-                    counts_w,
-                    order_w,
-                    terms,
-                    fluxes,
-                    sums[block].reshape(-1),
-                )
+                _multiply_w(lines[block].reshape(-1), here[block], w, terms, fluxes, sums[block].reshape(-1))
             planes[:] = 0.0
-            _spread_v(sums, w_blocks, first_v, v, counts_v, order_v, rows, planes)
-            for i in range(u.shape[3]):
-                _gather_from_two(
-                    planes, u[span, point, 0, i], u[span, point, 1, i], result[first_u[span] + i].reshape(-1)
-                )
+            _spread_v(sums, w_blocks, v, rows, planes)
+            for i in range(table.shape[1]):
+                _spread_u(planes, table[0, i], table[1, i], result[u.first[span] + i].reshape(-1))
 
 
 @compiled
-def _spread_to_two(source: Array, value: float, slope: float, planes: Array) -> None:
+def _contract_u(source: Array, value: float, slope: float, planes: Array) -> None:
     plane, plane_u = planes[0], planes[1]
     for m in range(source.size):
         plane[m] += value * source[m]
@@ -115,23 +97,22 @@ def _spread_to_two(source: Array, value: float, slope: float, planes: Array) -> 
 
 
 @compiled
-def _gather_from_two(planes: Array, value: float, slope: float, target: Array) -> None:
+def _spread_u(planes: Array, value: float, slope: float, target: Array) -> None:
     plane, plane_u = planes[0], planes[1]
     for m in range(target.size):
         target[m] += value * plane[m] + slope * plane_u[m]
 
 
 @compiled
-def _contract_v(
-    planes: Array, w_blocks: int, first_v: IntArray, v: Array, counts: Sizes, order: Sizes, rows: Array, lines: Array
-) -> None:
+def _contract_v(planes: Array, w_blocks: int, v: SpanTable, rows: Array, lines: Array) -> None:
+    counts, order = v.points, v.functions
     n_w, size = lines.shape[1], planes.shape[1] // w_blocks
     for block in range(w_blocks):
         plane, plane_u = planes[0, block * size : (block + 1) * size], planes[1, block * size : (block + 1) * size]
         width = min(ROWS, n_w - block * ROWS)
-        for span in range(first_v.size):
-            window = slice(first_v[span] * ROWS, (first_v[span] + len(order)) * ROWS)
-            _contract_span(plane[window], plane_u[window], v[span].reshape(-1), counts, order, rows)
+        for span in range(v.first.size):
+            window = slice(v.first[span] * ROWS, (v.first[span] + len(order)) * ROWS)
+            _contract_span(plane[window], plane_u[window], v.values[span].reshape(-1), counts, order, rows)
             for q in range(len(counts)):
                 point = span * len(counts) + q
                 target = lines[point // LANES, block * ROWS : block * ROWS + width]
@@ -160,14 +141,13 @@ def _contract_span(plane: Array, plane_u: Array, table: Array, counts: Sizes, or
 
 
 @compiled
-def _spread_v(
-    sums: Array, w_blocks: int, first_v: IntArray, v: Array, counts: Sizes, order: Sizes, rows: Array, planes: Array
-) -> None:
+def _spread_v(sums: Array, w_blocks: int, v: SpanTable, rows: Array, planes: Array) -> None:
+    counts, order = v.points, v.functions
     n_w, size = sums.shape[1], planes.shape[1] // w_blocks
     for block in range(w_blocks):
         plane, plane_u = planes[0, block * size : (block + 1) * size], planes[1, block * size : (block + 1) * size]
         width = min(ROWS, n_w - block * ROWS)
-        for span in range(first_v.size):
+        for span in range(v.first.size):
             for q in range(len(counts)):
                 point = span * len(counts) + q
                 source = sums[point // LANES, block * ROWS : block * ROWS + width]
@@ -176,8 +156,8 @@ def _spread_v(
                     rows[3 * q * ROWS + k] = source[k, lane]
                     rows[(3 * q + 1) * ROWS + k] = source[k, LANES + lane]
                     rows[(3 * q + 2) * ROWS + k] = source[k, 2 * LANES + lane]
-            window = slice(first_v[span] * ROWS, (first_v[span] + len(order)) * ROWS)
-            _spread_span(rows, v[span].reshape(-1), counts, order, plane[window], plane_u[window])
+            window = slice(v.first[span] * ROWS, (v.first[span] + len(order)) * ROWS)
+            _spread_span(rows, v.values[span].reshape(-1), counts, order, plane[window], plane_u[window])
 
 
 @compiled
@@ -196,22 +176,13 @@ def _spread_span(rows: Array, table: Array, counts: Sizes, order: Sizes, plane: 
 
 
 @compiled
-def _line_product(
-    lines: Array,
-    factors: Array,
-    first_w: IntArray,
-    w: Array,
-    counts: Sizes,
-    order: Sizes,
-    terms: Sizes,
-    fluxes: Array,
-    sums: Array,
-) -> None:
+def _multiply_w(lines: Array, factors: Array, w: SpanTable, terms: Sizes, fluxes: Array, sums: Array) -> None:
     """Contract w, multiply with the factors, spread back: for one block of points of v, all spans of w."""
+    counts, order = w.points, w.functions
     near = np.empty(len(counts) * len(terms) * LANES)
-    for span in range(first_w.size):
-        window = slice(first_w[span] * 3 * LANES, (first_w[span] + len(order)) * 3 * LANES)
-        table, source = w[span].reshape(-1), factors[span]
+    for span in range(w.first.size):
+        window = slice(w.first[span] * 3 * LANES, (w.first[span] + len(order)) * 3 * LANES)
+        table, source = w.values[span].reshape(-1), factors[span]
         for m in range(source.size):  # in the order of memory, which the loop after next is not: a third faster
             near[m] = source[m]
         _flux_span(lines[window], near, table, counts, order, terms, fluxes)

@@ -28,7 +28,8 @@ class Table(NamedTuple):
         """The same span by span, for a rule with as many points in each of its `spans` spans."""
         values = self.values.reshape(2, spans, -1, self.values.shape[2])
         first = self.first.reshape(spans, -1)[:, 0]
-        return SpanTable(np.ascontiguousarray(first), np.ascontiguousarray(values.transpose(1, 2, 0, 3)))
+        sizes = (0,) * values.shape[2], (0,) * values.shape[3]
+        return SpanTable(np.ascontiguousarray(first), np.ascontiguousarray(values.transpose(1, 2, 0, 3)), *sizes)
 
 
 class SpanTable(NamedTuple):
@@ -36,16 +37,14 @@ class SpanTable(NamedTuple):
 
     first: (spans,) index of the first function that is nonzero there.
     values: (spans, points per span, 2, degree + 1) values and first derivatives of the nonzero ones.
+    points, functions: zeros, one for each Gauss point of a span and one for each function that is nonzero there.
+        The kernels are compiled for the lengths of these tuples.
     """
 
     first: NDArray[np.int64]
     values: Array
-
-    @property
-    def sizes(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Zeros, one for each point of a span and one for each function: sizes that the kernels are compiled for."""
-        _, points, _, functions = self.values.shape
-        return (0,) * points, (0,) * functions
+    points: tuple[int, ...]
+    functions: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ enter by their averages.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,8 @@ from parameterize.spline.volume import FACE_NAMES
 from ..discretization.operator import Operator, from_blocks
 from ..discretization.quadrature import GaussRule, Table
 from ..threads import in_parallel
+
+DIAGONAL = (0, 3, 5)  # the places of uu, vv, ww among the six factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +42,7 @@ class FastDiagonalization:
     threads: int = 1
 
     def __call__(self, residual: Array) -> Array:
-        """Preconditioned residual, both (n_u, n_v, n_w) over the free coefficients."""
+        """Return the preconditioned residual, both (n_u, n_v, n_w) over the free coefficients."""
         u, v, w = self.vectors
         if self.singular:
             residual = residual - residual.mean()
@@ -53,7 +55,7 @@ class FastDiagonalization:
         return result
 
     def _transform(self, u: Array, v: Array, w: Array, x: Array) -> Array:
-        """Three small matrices applied along the three axes of x, which is overwritten."""
+        """Apply three small matrices along the three axes of x, which is overwritten."""
         columns, rows = x.reshape(x.shape[0], -1), np.empty((x.shape[0], x[0].size))
         along_u = rows.reshape(x.shape)
 
@@ -76,69 +78,91 @@ def _pieces(length: int, size: int) -> list[slice]:
 def fast_diagonalization(
     operator: Operator, rule: GaussRule, robin: Mapping[str, float] | None = None, extra_diagonal: Array | None = None
 ) -> FastDiagonalization:
-    """The preconditioner of an operator restricted to its free coefficients.
+    """Build the preconditioner of an operator restricted to its free coefficients.
 
     robin: of the faces with Robin's condition, the average over the face's parameters of alpha times the surface
     element. extra_diagonal: (n_u, n_v, n_w), the diagonal of what is added to the operator elsewhere (Robin's terms).
     """
     robin = robin or {}
-    along, across = _separable_coefficients(operator, rule)
-    averages = [float(w @ m) for w, m in zip(rule.weights, across, strict=True)]  # of the masses' weights
+    slopes, masses, averages = _directional_matrices(operator, rule, robin)
     reaction = operator.mean_mass() / float(np.prod(averages))
-    values, vectors, diagonals = [], [], []
+    values, vectors = zip(*(eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
+    spectrum = _sum_outer(values) + reaction
+    scaling = _scaling(operator, slopes, masses, reaction, extra_diagonal)
+    whole = all(free == slice(0, n) for free, n in zip(operator.window, operator.space.shape, strict=True))
+    singular = whole and reaction == 0.0 and not any(robin.values())
+    if singular:
+        spectrum[0, 0, 0] = np.inf
+    u, v, w = vectors
+    return FastDiagonalization((u, v, w), 1.0 / spectrum, scaling, singular, operator.threads)
+
+
+def _directional_matrices(
+    operator: Operator, rule: GaussRule, robin: Mapping[str, float]
+) -> tuple[list[Array], list[Array], list[float]]:
+    """Return per direction the stiffness matrix K_d and the mass matrix M_d on the free coefficients, and M_d's mean.
+
+    The mean is that of the weight b_d over the direction's parameter.
+    """
+    along, across = _separable_coefficients(operator, rule)
+    averages = [float(w @ b) for w, b in zip(rule.weights, across, strict=True)]
+    slopes, masses = [], []
     for axis, (table, n, free) in enumerate(zip(operator.tables, operator.space.shape, operator.window, strict=True)):
         mass = _gram(table, rule.weights[axis] * across[axis], n, 0)
         slope = _gram(table, rule.weights[axis] * along[axis], n, 1)
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
             # one function only is nonzero at the end, with value 1
             slope[end, end] += robin.get(name, 0.0) * averages[axis] / float(np.prod(averages))
-        mass, slope = mass[free, free], slope[free, free]
-        eigenvalues, eigenvectors = eigh(slope, mass)
-        values.append(eigenvalues)
-        vectors.append(eigenvectors)
-        diagonals.append((np.diag(mass), np.diag(slope)))
-    eigenvalues_3d = _sum_outer(values) + reaction
-    diagonal = sum(np.einsum("i,j,k->ijk", *(diagonals[a][int(a == d)] for a in range(3))) for d in range(3))
-    diagonal += reaction * np.einsum("i,j,k->ijk", *(d[0] for d in diagonals))
+        slopes.append(slope[free, free])
+        masses.append(mass[free, free])
+    return slopes, masses, averages
+
+
+def _scaling(
+    operator: Operator, slopes: list[Array], masses: list[Array], reaction: float, extra_diagonal: Array | None
+) -> Array:
+    """Return D, the square root of the diagonal of P over that of the operator, on the free coefficients."""
+    stiff, mass = ([np.diag(matrix) for matrix in matrices] for matrices in (slopes, masses))
+    terms = [(stiff[0], mass[1], mass[2]), (mass[0], stiff[1], mass[2]), (mass[0], mass[1], stiff[2])]
+    diagonal = sum(np.einsum("i,j,k->ijk", *term) for term in terms)
+    diagonal += reaction * np.einsum("i,j,k->ijk", *mass)
     wanted = operator.diagonal() + (0.0 if extra_diagonal is None else extra_diagonal)
     # A folded map has diagonal entries below zero; their size is all a scaling can use.
-    scaling = np.sqrt(np.abs(diagonal / wanted[operator.window]))
-    whole = all(free == slice(0, n) for free, n in zip(operator.window, operator.space.shape, strict=True))
-    singular = whole and reaction == 0.0 and not any(robin.values())
-    if singular:
-        eigenvalues_3d[0, 0, 0] = np.inf
-    u, v, w = vectors
-    return FastDiagonalization((u, v, w), 1.0 / eigenvalues_3d, scaling, singular, operator.threads)
+    scaling: Array = np.sqrt(np.abs(diagonal / wanted[operator.window]))
+    return scaling
 
 
 def _separable_coefficients(operator: Operator, rule: GaussRule) -> tuple[list[Array], list[Array]]:
-    """Weights at the Gauss points of each direction, for its stiffness and its mass matrix: two lists of (q_a,).
+    """Return the weights a_d and b_d at the Gauss points of each direction: two lists of (q_d,).
 
-    G_dd is close to along[d] of its own parameter times across[l] of the two others, in the sense of least squares of
-    logarithms: there the fit is additive, and its terms are averages over planes. One Gauss point a span is enough.
+    G_dd is close to a_d of its own parameter times b_e and b_f of the two others, in the sense of least squares of
+    logarithms. There the fit is additive, and its terms are averages of log G_dd over planes. One Gauss point a span,
+    the middle one, stands for the span.
     """
     spans = [len(breakpoints(k)) - 1 for k in operator.space.knots]
-    counts = [q // s for q, s in zip(rule.shape, spans, strict=True)]
-    middle = [np.arange(s) * c + c // 2 for s, c in zip(spans, counts, strict=True)]
+    counts = [q // s for q, s in zip(rule.shape, spans, strict=True)]  # Gauss points per span
     lengths = [np.add.reduceat(w, np.arange(s) * c) for w, s, c in zip(rule.weights, spans, counts, strict=True)]
-    means = [[np.zeros(s) for s in spans] for _ in range(3)]  # [d][axis]: of log G_dd
-    for span, q in enumerate(middle[0]):
-        weights = rule.plane_weights(int(q))[np.ix_(middle[2], middle[1])]
-        for d, index in enumerate((0, 3, 5)):
-            plane = from_blocks(operator.factors[q][:, middle[2], index], rule.shape[1])[:, middle[1]]
-            logarithm = np.log(np.maximum(np.abs(plane / weights), 1e-300))  # (w, v)
-            means[d][0][span] = lengths[2] @ logarithm @ lengths[1]
-            means[d][1] += lengths[0][span] * (lengths[2] @ logarithm)
-            means[d][2] += lengths[0][span] * (logarithm @ lengths[1])
-    overall = [float(lengths[0] @ means[d][0]) for d in range(3)]
-    along = [np.exp(means[a][a]) for a in range(3)]
-    across = [np.exp(0.5 * sum(means[d][a] - overall[d] for d in range(3) if d != a)) for a in range(3)]
-    along, across = ([np.repeat(part[a], counts[a]) for a in range(3)] for part in (along, across))
+    u, v, w = (np.arange(s) * c + c // 2 for s, c in zip(spans, counts, strict=True))  # the middle Gauss points
+    means = [[np.zeros(s) for s in spans] for _ in range(3)]  # means[d][axis]: of log G_dd over the two other axes
+    for span, q in enumerate(u):
+        weights = rule.plane_weights(int(q))[np.ix_(w, v)]
+        for mean, index in zip(means, DIAGONAL, strict=True):
+            plane = from_blocks(operator.factors[q][:, w, index], rule.shape[1])[:, v]
+            logarithm = np.log(np.maximum(np.abs(plane / weights), 1e-300))  # (spans of w, spans of v)
+            mean[0][span] = lengths[2] @ logarithm @ lengths[1]
+            mean[1] += lengths[0][span] * (lengths[2] @ logarithm)
+            mean[2] += lengths[0][span] * (logarithm @ lengths[1])
+    overall = [float(lengths[0] @ mean[0]) for mean in means]
+    along, across = [], []
+    for axis, count in enumerate(counts):
+        others = sum(means[d][axis] - overall[d] for d in range(3) if d != axis)
+        along.append(np.repeat(np.exp(means[axis][axis]), count))
+        across.append(np.repeat(np.exp(0.5 * others), count))
     return along, across
 
 
 def _gram(table: Table, weights: Array, n: int, derivative: int) -> Array:
-    """Matrix (n, n) of the one-dimensional integrals of products of the functions or of their derivatives."""
+    """Return the matrix (n, n) of the integrals of products of one direction's functions, or of their derivatives."""
     dense = np.zeros((len(weights), n))
     columns = table.first[:, None] + np.arange(table.values.shape[2])
     np.put_along_axis(dense, columns, table.values[derivative], axis=1)
@@ -146,6 +170,6 @@ def _gram(table: Table, weights: Array, n: int, derivative: int) -> Array:
     return matrix
 
 
-def _sum_outer(rows: list[Array]) -> Array:
+def _sum_outer(rows: Sequence[Array]) -> Array:
     total: Array = rows[0][:, None, None] + rows[1][:, None] + rows[2]
     return total

@@ -1,0 +1,27 @@
+"""A surface and options whose training takes about a second."""
+
+from dataclasses import replace
+
+from shapes import rounded_cube, turned
+
+from parameterize.config import NetworkConfig, preset
+from parameterize.surface.surface import surface_from_arrays
+
+STEPS = (6, 4, 8, 4, 8)
+
+
+def tiny_config():
+    config = preset("fast")
+    return replace(
+        config,
+        starts=1,
+        network=NetworkConfig(width=16, modules=1, frequencies=3),
+        train=replace(config.train, cell=0.2, triangles=200),
+        stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
+        spline=replace(config.spline, control_points=6, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2),
+    )
+
+
+def small_surface(stretch=2.0):
+    points, faces = rounded_cube(200, power=5.0)
+    return surface_from_arrays(stretch * turned(points) + [10.0, 0.0, -3.0], faces, "pillow")
