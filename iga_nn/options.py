@@ -276,7 +276,8 @@ def read_corners(path: Path, frame: UnitFrame | None = None) -> np.ndarray[Any, 
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (ValueError, TypeError, OverflowError, RecursionError):
-        raise InputError(f"{path}: corners must be a JSON list of eight points or of eight vertex numbers") from None
+        expected = 'a JSON list of eight points or of eight vertex numbers, or {"XYZ": eight points}'
+        raise InputError(f"{path}: corners must be {expected}") from None
     if rows.shape not in ((8, 3), (8,)) or not np.all(np.abs(rows) <= _LARGEST_COORDINATE):  # refuses NaN, too
         raise InputError(
             f"{path}: corners must be eight points of three finite coordinates or eight vertex numbers, "

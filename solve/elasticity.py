@@ -100,10 +100,10 @@ def _solve(volume: BSplineVolume, problem: Elasticity, space: TrialSpace, option
     clock.append(time.process_time())
     errors = _errors(volume, space, coefficients, problem, threads) if problem.exact is not None else None
     clock.append(time.process_time())
-    doubtful = doubts(volume, problem, errors, coefficients.size)
-    notices = (*doubtful, *solve_notices(volume, space, system, options.certified, result))
+    judged = doubts(volume, problem, errors, coefficients.size)
+    notices = (*judged.notices, *solve_notices(volume, space, system, options.certified, result))
     spline = np.moveaxis(coefficients, 0, -1)
-    return solution_of(volume, space, spline, result, clock, errors, notices, meaningful=not doubtful)
+    return solution_of(volume, space, spline, result, clock, errors, notices, judged.meaningful)
 
 
 def _displacements(volume: BSplineVolume, space: TrialSpace, problem: Elasticity) -> Array:

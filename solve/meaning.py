@@ -2,66 +2,103 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.norms import Errors
+from .estimate import Estimate
 from .forms.data import ProblemData, in_scaled
+from .forms.formula import Expression
 
-SAMPLES = np.linspace(0.0, 1.0, 9)  # parameters per direction
+# Parameters per direction: the ends, and between them places without a pattern that a periodic formula could share.
+SAMPLES = np.concatenate([[0.0], np.sort(np.random.default_rng(0).uniform(0.0, 1.0, 7)), [1.0]])
+_RANDOM = np.random.default_rng(1)  # points of all sizes, somewhere among which a formula that can vary does so
+ANYWHERE = _RANDOM.choice([-1.0, 1.0], (3, 300)) * 10.0 ** _RANDOM.uniform(-3.0, 4.0, (3, 300))
 SMALLEST = 1e-150  # values whose squares underflow
 ROUNDING = 1e-13  # share of the size by which a formula must vary
 LARGEST_ERROR = 0.5  # relative L2: beyond it more of the solution is wrong than right
+DECISIVE = ("exact", "source", "boundary", "force", "displacement")  # without these nothing is solved
 
 
-def doubts(volume: BSplineVolume, problem: ProblemData, errors: Errors | None, unknowns: int) -> tuple[str, ...]:
-    """Why the numbers of a solve mean nothing, one line each; none where they mean something.
+@dataclass(frozen=True)
+class Doubts:
+    """What is doubtful in the numbers of a solve, one line each, and whether they mean something all the same."""
+
+    notices: tuple[str, ...]
+    meaningful: bool
+
+
+def doubts(volume: BSplineVolume, problem: ProblemData, errors: Errors | None, unknowns: int) -> Doubts:
+    """Judge the formulas of a problem on a volume, and the errors of its solution.
 
     errors: None where they are not known, or compare with the solution of another problem.
     """
     points = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0)
-    return (*empty_formulas(problem, points), *_unresolved(problem, points, errors, unknowns))
+    empty = empty_formulas(problem, points)
+    unresolved = _unresolved(problem, points, errors, unknowns)
+    is_solved = not unresolved and not any(name in DECISIVE for name, _ in empty)
+    return Doubts((*(notice for _, notice in empty), *unresolved), is_solved)
 
 
-def empty_formulas(problem: ProblemData, points: Array) -> tuple[str, ...]:
-    """The formulas of a problem that underflow, or vary by less than rounding, at points (3, ...) of the domain.
+def doubtful_estimate(estimate: Estimate | None) -> tuple[str, ...]:
+    """Say that an estimated error is too large, or not finite; nothing where it is not."""
+    if estimate is None or estimate.l2_relative is None or estimate.l2_relative <= LARGEST_ERROR:
+        return ()
+    return (
+        f"the mesh does not resolve the solution: its relative L2 error is estimated as {estimate.l2_relative:.2g}",
+    )
 
-    A formula without a variable is meant to be constant. Points where a formula is not finite do not count: data of one
-    face need be finite on that face alone.
+
+def empty_formulas(problem: ProblemData, points: Array) -> list[tuple[str, str]]:
+    """The data whose formulas underflow, or vary by less than rounding, at points (3, ...) of the domain: name, notice.
+
+    A formula that is constant everywhere else, too, is meant to be constant. Points where a formula is not finite do
+    not count: data of one face need be finite on that face alone.
     """
     found = []
     for name, formula in problem.formulas:
-        if not formula.variables or (ends := _range(formula(*points))) is None:
+        ends = _range(formula(*points))
+        if ends is None or (fault := _fault(ends)) is None or _is_constant(formula):
             continue
-        low, high = ends
-        size = max(abs(low), abs(high))
-        if size < SMALLEST:
-            fault = "underflows"
-        elif high - low <= ROUNDING * size:
-            fault = "varies by less than rounding"
-        else:
-            continue
-        found.append(f"{name} {_described(formula.text, ends)}: it {fault}, and means nothing here{in_scaled(formula)}")
-    return tuple(found)
+        described = f"{name} {formula.text!r} runs from {ends[0]:.3g} to {ends[1]:.3g} on the domain"
+        found.append((name, f"{described}: it {fault}, and means nothing here{in_scaled(formula, *points)}"))
+    return found
+
+
+def _fault(ends: tuple[float, float]) -> str | None:
+    size = max(abs(ends[0]), abs(ends[1]))
+    if size < SMALLEST:
+        return "underflows"
+    return "varies by less than rounding" if ends[1] - ends[0] <= ROUNDING * size else None
+
+
+def _is_constant(formula: Expression) -> bool:
+    if not formula.variables:
+        return True
+    ends = _range(Expression(formula.text.lower() if formula.is_scaled else formula.text)(*ANYWHERE))
+    return ends is not None and ends[0] == ends[1]
 
 
 def _unresolved(problem: ProblemData, points: Array, errors: Errors | None, unknowns: int) -> tuple[str, ...]:
     if errors is None or errors.l2_relative is None or not errors.l2_relative > LARGEST_ERROR:
         return ()
-    formula = dict(problem.formulas).get("exact")
-    ends = None if formula is None else _range(formula(*points))
-    which = "exact" if formula is None or ends is None else f"exact {_described(formula.text, ends)}"
+    exact = [formula for name, formula in problem.formulas if name == "exact"]
+    ends = [found for formula in exact if (found := _range(formula(*points)))]
+    described = "exact"
+    if ends:
+        low, high = min(low for low, _ in ends), max(high for _, high in ends)
+        text = ";".join(formula.text for formula in exact)
+        described = f"exact {text!r} runs from {low:.3g} to {high:.3g} on the domain"
+    remedy = in_scaled(exact[0], *points) if len(exact) == 1 else ""
     share = f"the relative L2 error is {errors.l2_relative:.2g}"
-    return (f"{which}: {unknowns:,} unknowns do not resolve it, {share}{in_scaled(formula)}",)
+    return (f"{described}: {unknowns:,} unknowns do not resolve it, {share}{remedy}",)
 
 
 def _range(values: Array) -> tuple[float, float] | None:
     """Lowest and highest of the values that are finite; None where there is none."""
     finite = values[np.isfinite(values)]
     return (float(finite.min()), float(finite.max())) if finite.size else None
-
-
-def _described(text: str, ends: tuple[float, float]) -> str:
-    return f"{text!r} runs from {ends[0]:.3g} to {ends[1]:.3g} on the domain"

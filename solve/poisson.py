@@ -165,9 +165,9 @@ def _solve(volume: BSplineVolume, problem: Poisson, space: TrialSpace, options: 
         errors = error_norms(volume, space, coefficients, problem.exact_at, options.thread_count)
     clock.append(time.process_time())
     contradictory = contradictions(volume, problem)
-    doubtful = doubts(volume, problem, None if contradictory else errors, coefficients.size)
-    notices = (*contradictory, *doubtful, *solve_notices(volume, space, system, options.certified, result))
-    return solution_of(volume, space, coefficients, result, clock, errors, notices, meaningful=not doubtful)
+    judged = doubts(volume, problem, None if contradictory else errors, coefficients.size)
+    notices = (*contradictory, *judged.notices, *solve_notices(volume, space, system, options.certified, result))
+    return solution_of(volume, space, coefficients, result, clock, errors, notices, judged.meaningful)
 
 
 def _iterate(

@@ -16,6 +16,7 @@ from .discretization.space import TrialSpace, longest_edge
 from .estimate import Problem, error_estimate
 from .field import SplineField
 from .linear.cg import LinearResult
+from .meaning import doubtful_estimate
 from .report import SolveReport
 
 
@@ -62,4 +63,12 @@ def with_estimate(solution: Solution, space: TrialSpace, problem: Problem) -> So
     found = error_estimate(solution.geometry, space, components, problem)
     seconds = solution.report.seconds
     seconds = seconds | {"errors": seconds["errors"] + time.process_time() - start}
-    return replace(solution, report=replace(solution.report, estimate=found, seconds=seconds))
+    doubtful = doubtful_estimate(found)
+    report = replace(
+        solution.report,
+        estimate=found,
+        seconds=seconds,
+        notices=(*doubtful, *solution.report.notices),  # the last one may be that of a solver that did not converge
+        meaningful=solution.report.meaningful and not doubtful,
+    )
+    return replace(solution, report=report)

@@ -39,7 +39,7 @@ def verdict_in_words(outcome: Outcome) -> str:
         rms = verdict["boundary_rms"][scale]
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
     for level in verdict.get("levels", []):
-        errors = [f"{TITLES[key]} {level[key]:.3e}, " for key in SHOWN_ERRORS if key in level]
+        errors = [f"{TITLES[key]} {level[key]:.3e}, " for key in SHOWN_ERRORS if level.get(key) is not None]
         end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANS NOTHING")
         lines.append(f"{level['dofs']:>8} unknowns {''.join(errors)}{level['iterations']} iterations{end}")
     lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")

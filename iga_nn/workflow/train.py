@@ -100,7 +100,7 @@ def _check_data(equation: Poisson, surface: Surface) -> None:
         evaluate(x, y, z)
     if equation.exact is not None:
         equation.exact_at(x, y, z)
-    for notice in empty_formulas(equation, surface.vertices.T):
+    for _, notice in empty_formulas(equation, surface.vertices.T):
         log.warning("%s", notice)
     normals = vertex_normals(surface.vertices, surface.faces)
     for face in equation.neumann:

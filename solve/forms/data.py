@@ -17,6 +17,8 @@ from .frame import UnitFrame
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
 
+USUAL_SIZE = 5.0  # of coordinates in which formulas are written
+
 Data = str | Callable[[Array, Array, Array], ArrayLike]
 Parsed = Expression | Callable[[Array, Array, Array], ArrayLike]
 
@@ -86,13 +88,19 @@ def finite(name: str, found: Array, x: Array, y: Array, z: Array, data: Parsed |
         good = found[~bad]
         elsewhere = f"; elsewhere it runs from {good.min():.3g} to {good.max():.3g}" if good.size else ""
         where = _first(bad, x, y, z)
-        raise ExpressionError(f"{name} {fault} at {where}, a point of the domain{elsewhere}{in_scaled(data)}")
+        raise ExpressionError(f"{name} {fault} at {where}, a point of the domain{elsewhere}{in_scaled(data, x, y, z)}")
     return found
 
 
-def in_scaled(data: Parsed | None) -> str:
-    """The remedy for a formula in x, y, z whose values mean nothing on a domain: the same in X, Y, Z."""
+def in_scaled(data: Parsed | None, x: Array, y: Array, z: Array) -> str:
+    """The remedy for a formula in x, y, z on a domain far from size 1 or from the origin: the same in X, Y, Z.
+
+    x, y, z: points of the domain, arrays of equal shape.
+    """
     if not isinstance(data, Expression) or data.scaled_text is None:
+        return ""
+    size, away = max(float(np.ptp(c)) for c in (x, y, z)), max(float(np.abs(c).max()) for c in (x, y, z))
+    if away < USUAL_SIZE and size > 1.0 / USUAL_SIZE:
         return ""
     return f"; X, Y, Z are x, y, z scaled to volume 1 about the middle of the domain: try {data.scaled_text!r}"
 

@@ -32,12 +32,15 @@ class UnitFrame:
 
         The volume follows exactly from the six faces (divergence theorem); the bounding box is that of points on them,
         BOX_SAMPLES a span and direction. A folded map counts its folded parts with the opposite sign.
+        Raises ValueError where the volume encloses nothing.
         """
         faces = [_Face(volume, axis, side) for axis, side in product(range(3), (0, 1))]
         low = np.min([face.samples.min(axis=0) for face in faces], axis=0)
         high = np.max([face.samples.max(axis=0) for face in faces], axis=0)
         middle = (low + high) / 2.0
         enclosed = abs(sum(face.flux(middle) for face in faces))
+        if enclosed == 0.0:
+            raise ValueError("X, Y, Z have no scale here: the volume encloses nothing; check it with `iga-nn check`")
         x, y, z = middle.tolist()
         return cls((x, y, z), float(np.cbrt(enclosed)))
 
