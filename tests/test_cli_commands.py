@@ -361,7 +361,7 @@ def small_disk(size):
 @pytest.mark.parametrize("size", [100, 1500, 4000])
 def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training, in_folder, capsys, monkeypatch):
     monkeypatch.setattr(
-        "iga_nn.workflow.output_folder.RunFolder.draw", lambda *_: None
+        "iga_nn.workflow.output_folder.RunFolder.draw", lambda *_, **__: None
     )  # figures come last and take longest
     formula_training()
     benchmark_volume(6).save("map.npz")
@@ -380,7 +380,7 @@ def test_a_full_disk_is_one_line_and_leaves_no_half_file(size, formula_training,
 
 
 def test_what_a_killed_run_left_half_written_goes(formula_training, in_folder, monkeypatch):
-    monkeypatch.setattr("iga_nn.workflow.output_folder.RunFolder.draw", lambda *_: None)
+    monkeypatch.setattr("iga_nn.workflow.output_folder.RunFolder.draw", lambda *_, **__: None)
     formula_training()
     Path("cube").mkdir()
     Path("cube/.volume.1.part.npz").write_bytes(b"half")

@@ -129,7 +129,7 @@ def test_convergence_rates(tmp_path, capsys):
         "orders.csv",
         "orders.png",
     }
-    assert "degree  elements  dofs" in capsys.readouterr().out
+    assert "degree  elements  unknowns" in capsys.readouterr().out
 
 
 def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(formula_training, in_folder, capsys):
