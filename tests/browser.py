@@ -107,7 +107,7 @@ class Tab:
         node = await self.call("DOM.querySelector", nodeId=document["root"]["nodeId"], selector=selector)
         await self.call("DOM.setFileInputFiles", files=[str(path)], nodeId=node["nodeId"])
 
-    async def picture(self, path, width=1280, height=1000, whole=False):
+    async def picture(self, path, width=1280, height=1300, whole=False):
         """A PNG of what is seen at that size of window, or of the whole page."""
         await self.call("Page.bringToFront")  # a tab behind another one is not drawn
         await self.call(

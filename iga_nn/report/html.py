@@ -104,7 +104,7 @@ def _verdict(report: Report) -> str:
     if overlapping:
         meaning += " at x, y, z = " + ", ".join(f"{value:.4g}" for value in quality["boundary_meeting"]["point"]) + "."
     elif quality["bijective"] == "certified" and quality.get("boundary_injective"):
-        meaning += " Nor do its faces meet themselves."
+        meaning += " Nor do its faces meet themselves: the map is one-to-one."
     if quality.get("witness"):
         meaning += " The worst place: u, v, w = " + ", ".join(f"{value:.4g}" for value in quality["witness"]) + "."
     found = f'<div class="verdict {kind}"><strong>{heading}</strong>{escape(meaning)}</div>'
@@ -118,11 +118,11 @@ def _verdict(report: Report) -> str:
 def _facts(report: Report) -> str:
     """The numbers that matter, each with what it is and a remark."""
     quality = report["parameterization"]
-    facts = [("det J > 0", quality["bijective"], f"one-to-one: {reports.one_to_one(report)}")]
+    facts = []
     if "arap" in quality:
         arap, boundary = quality["arap"]["unit_volume"], quality["boundary"]
         facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; at volume 1"))
-        given = f"root mean square at volume 1; {boundary['as_given']['rms']:.3g} in the units given"
+        given = f"rms at volume 1; {boundary['as_given']['rms']:.3g} as given"
         facts.append(("Boundary distance", f"{boundary['unit_volume']['rms']:.3g}", given))
     levels = reports.solved(report).get("levels", [])
     if levels:
