@@ -72,10 +72,10 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the surface data near them loses weight. Once the map is certified,
-    a few more rounds take that back as far as they can, and all the rounds that are left while its boundary meets
-    itself. Anchors along the cube's edges draw F to the surface in those last rounds and, where it is close to begin
-    with, in the first ones: not while what is folded comes apart. The result is the last certified map whose boundary
-    does not meet itself, else the last certified one, else the one with the fewest unproved spans.
+    a few more rounds take that back as far as they can. Anchors along the cube's edges draw F to the surface in those
+    last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
+    result is the last certified map whose boundary does not meet itself, else the last certified one, else the one with
+    the fewest unproved spans.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
@@ -125,8 +125,7 @@ class _Rounds:
     def finished(self) -> bool:
         """Whether no round is left."""
         config = self.energy.config
-        is_polished = self.certified and not self.best.meets_itself and self.polished >= config.polish
-        return self.number >= config.rounds or is_polished
+        return self.number >= config.rounds or (self.certified and self.polished == config.polish)
 
     def begin(self) -> None:
         """Weigh penalties, surface data and anchors for the next round."""
