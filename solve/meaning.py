@@ -77,6 +77,7 @@ def _fault(ends: tuple[float, float]) -> str | None:
 
 
 def _is_constant(formula: Expression) -> bool:
+    """Whether a formula has one value anywhere; X, Y, Z are read as x, y, z, for their frame does not matter here."""
     if not formula.variables:
         return True
     ends = _range(Expression(formula.text.lower() if formula.is_scaled else formula.text)(*ANYWHERE))

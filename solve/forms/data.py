@@ -16,7 +16,6 @@ from .formula import Expression, ExpressionError
 from .frame import UnitFrame
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
-
 USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
 Data = str | Callable[[Array, Array, Array], ArrayLike]
