@@ -84,9 +84,12 @@ class SplineConfig:
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
     min_facing: float = 0.1  # likewise (t_a x t_b) . n of the boundary's tangents and the mesh's normals
     facing_margin: float = 3.0  # times `min_facing`: points below may fall under it in the next step and are watched
+    gap: float = 1e-3  # sheets of a boundary that meets itself are pushed so far apart
+    contact: float = 10.0  # share of `vertex` for the squared depth by which they miss that
     penalties: tuple[float, ...] = (20.0, 100.0, 500.0, 2500.0)  # one a round, then the last one again
     rounds: int = 16  # at most
     polish: int = 3  # of them, after the map is certified for the first time
+    parting: int = 6  # before these, while the boundary of a certified map meets itself, at most
     patient_rounds: int = 2  # after these the anchors let go, and the surface gives way at unproved spans
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most

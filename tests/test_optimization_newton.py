@@ -10,8 +10,9 @@ from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
 from parameterize.cube.cube import project_radially
 from parameterize.history import History
+from parameterize.optimization import newton
 from parameterize.optimization.energy import DistortionEnergy, SplineEnergy
-from parameterize.optimization.newton import optimize
+from parameterize.optimization.newton import Optimized, optimize
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
 from parameterize.quality.quality import arap
@@ -168,3 +169,23 @@ def test_interrupted_between_rounds_goes_on_to_the_same_result(tmp_path):
     resumed, again = optimise_from(start, config, checkpoints=Checkpoints(tmp_path, {}, resume=True))
     assert torch.equal(resumed.control, whole.control)
     assert np.array_equal(again["loss"], columns["loss"]) and np.array_equal(again["step"], columns["step"])
+
+
+@pytest.mark.parametrize(("meets", "rounds"), [([True, True, False], 5), ([False], 3), ([True] * 9, 5)])
+def test_a_boundary_that_meets_itself_is_pushed_apart_before_the_polish(monkeypatch, meets, rounds):
+    """One round at least, two of polish; between them those that part the boundary, two at most."""
+    config = replace(CONFIG, rounds=10, parting=2, polish=2)
+    contacts, taken_back = [], []
+    answers = iter([False, *meets])  # the first is asked of the start
+    proved = certify(as_volume(wavy_control(0.0)))
+    monkeypatch.setattr(Optimized, "of", lambda control, *_: Optimized(control, proved, next(answers, False)))
+    monkeypatch.setattr(newton, "_descend", lambda control, *_: control)
+    monkeypatch.setattr(SplineEnergy, "watch_contact", lambda *_: contacts.append(1))
+    monkeypatch.setattr(SplineEnergy, "take_back", lambda *_: taken_back.append(1))
+    checkpoints = Checkpoints(None, {}, resume=False)
+    saved = []
+    monkeypatch.setattr(checkpoints, "save", lambda *state: saved.append(state))
+    optimize(wavy_control(0.0), KNOTS, surface_fit(), config, history=History(), checkpoints=checkpoints)
+    assert len(saved) == rounds
+    assert len(taken_back) == config.polish
+    assert len(contacts) == min(sum(meets), config.parting)

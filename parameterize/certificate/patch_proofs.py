@@ -1,7 +1,6 @@
 """Three proofs that two Bezier patches meet only where they are joined.
 
-- Patches without a common point: a plane keeps their control points apart (found by Gilbert's algorithm, SIAM J.
-  Control 4, 1966).
+- Patches without a common point: a plane keeps their control points apart.
 - Patches with a common corner: a plane through the corner, with all other control points strictly beside it.
 - Patches with a common edge, unfolded into a rectangle, and a patch by itself: projected to a plane the derivative has
   a positive definite symmetric part, so that <x - y, F(x) - F(y)> > 0 on a convex domain.
@@ -20,7 +19,10 @@ from ..cube.cube import VARYING_AXES
 from .bezier_patches import Mask, Pieces, as_rows, contact
 
 _CHUNK = 4096  # pairs at a time
-_PLANES = 64  # steps towards a separating plane
+_NEWTON_STEPS = 40  # towards a separating plane
+_REACH = 2.0  # no step changes a product by more
+_MARGIN = 0.5  # a product that is enough
+_LIFT = 1e-14  # of the shares' sum, onto a Hessian's diagonal: the vectors may all lie in one plane
 
 
 def settled(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
@@ -89,7 +91,9 @@ def _corner_proof(pieces: Pieces, first: NDArray[np.int64], second: NDArray[np.i
     before = _corner_last(pieces, first, corner)
     behind = _corner_last(pieces, second, corner)
     vectors = np.concatenate([before[:, -1:] - before[:, :-1], behind[:, :-1] - behind[:, -1:]], axis=1)
-    return _apart(np.zeros((len(vectors), 1, 3)), vectors, error)
+    normal = _half_space(vectors)
+    proved: Mask = _along(vectors, normal).min(axis=1) > 4.0 * error * np.abs(normal).sum(axis=1)
+    return proved
 
 
 def _corner_last(pieces: Pieces, rows: NDArray[np.int64], corner: NDArray[np.int64]) -> Array:
@@ -141,25 +145,43 @@ def _along(vectors: Array, direction: Array) -> Array:
 
 
 def _apart(a: Array, b: Array, error: float) -> Mask:
-    """Whether a plane is found with the points a (n, k, 3) on one side and b (n, l, 3) on the other: (n,).
+    """Return whether a plane is found with the points a (n, k, 3) on one side and b (n, l, 3) on the other: (n,).
 
-    Gilbert's algorithm: x moves towards the point of the differences' hull that is nearest to the origin.
+    With a fourth coordinate, and all of a negated, that is a half-space through the origin.
     """
-    done = np.zeros(len(a), dtype=bool)
-    active = np.arange(len(a))
-    x = b.mean(axis=1) - a.mean(axis=1)
-    for _ in range(_PLANES):
-        over_a, over_b = _along(a[active], x), _along(b[active], x)
-        last, first = over_a.argmax(axis=1), over_b.argmin(axis=1)
-        rows = np.arange(len(active))
-        gap = over_b[rows, first] - over_a[rows, last]
-        proved = gap > 4.0 * error * np.abs(x).sum(axis=1)
-        done[active[proved]] = True
-        support = (b[active, first] - a[active, last])[~proved]
-        active, x = active[~proved], x[~proved]
+    middle = a.mean(axis=1, keepdims=True)
+    size = np.abs(b - middle).max(axis=(1, 2))
+    sides = [_with_last(middle - a, size), _with_last(b - middle, -size)]
+    normal = _half_space(np.concatenate(sides, axis=1))[:, :3]
+    gap = _along(b, normal).min(axis=1) - _along(a, normal).max(axis=1)
+    proved: Mask = gap > 4.0 * error * np.abs(normal).sum(axis=1)
+    return proved
+
+
+def _with_last(vectors: Array, value: Array) -> Array:
+    """Return vectors (n, k, 3) with a value (n,) as their fourth coordinate."""
+    column = np.broadcast_to(value[:, None, None], (*vectors.shape[:2], 1))
+    return np.concatenate([vectors, column], axis=2)
+
+
+def _half_space(vectors: Array) -> Array:
+    """Return x (n, d) with positive products x . v with all vectors v (n, k, d), where such a one is found.
+
+    Newton's method on the sum of exp(-x . v / |v|), which does not mind how thin the cone of such x is.
+    """
+    lengths = np.linalg.norm(vectors, axis=2, keepdims=True)
+    units = vectors / np.maximum(lengths, np.finfo(np.float64).tiny)
+    x = np.zeros((len(vectors), vectors.shape[2]))
+    active = np.arange(len(vectors))
+    for _ in range(_NEWTON_STEPS):
+        v = units[active]
+        share = np.exp(-_along(v, x[active]))
+        curvature = np.einsum("nk,nkc,nkd->ncd", share, v, v, optimize=True)
+        lift = _LIFT * np.maximum(share.sum(axis=1), 1.0)
+        curvature += lift[:, None, None] * np.eye(v.shape[2])
+        step = np.linalg.solve(curvature, np.einsum("nk,nkc->nc", share, v)[..., None])[..., 0]
+        x[active] += step / np.maximum(1.0, np.abs(_along(v, step)).max(axis=1) / _REACH)[:, None]
+        active = active[_along(v, x[active]).min(axis=1) < _MARGIN]
         if not active.size:
             break
-        step = x - support
-        length = np.maximum(np.sum(step**2, axis=1), np.finfo(np.float64).tiny)
-        x = x - np.clip(np.sum(x * step, axis=1) / length, 0.0, 1.0)[:, None] * step
-    return done
+    return x

@@ -14,6 +14,7 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..config import SplineConfig
 from .cg import Operator, conjugate_gradients
+from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import SpanBarrier
 from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
@@ -114,6 +115,8 @@ class SplineEnergy:
         self.config, self.surface = config, surface
         self.anchors = EdgeAnchors(surface, config)
         self._facing: FacingPenalty | None = None
+        self._contact: ContactPenalty | None = None
+        self._knots = knots
         self.penalty = config.penalties[0]
         self._distortion = DistortionEnergy(knots, config, device=device)
         mass, slope, curve = grams(knots, config.degree, device)
@@ -134,12 +137,18 @@ class SplineEnergy:
         """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
         self._facing = facing_penalty(self.surface, control, self.config.min_facing, self.config.facing_margin)
 
+    def watch_contact(self, control: Tensor) -> None:
+        """Push apart, from now on, the sheets of F's boundary that are hardly apart at `control`."""
+        self._contact = contact_penalty(self._knots, self.config.degree, control, self.config.gap)
+
     def slide(self, control: Tensor) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
         for _ in range(self.config.slides):
             self.surface.places.slide(control, self.surface.points, 0.5 / control.shape[1])
         self.surface.places.relax(self.config.relaxations)
         self.watch_facing(control)
+        if self._contact is not None:
+            self.watch_contact(control)
 
     def give_way(self, spans: IntArray, factor: float) -> None:
         """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""
@@ -166,6 +175,10 @@ class SplineEnergy:
         off_edges, pull_edges = self.anchors.fit.energy_and_gradient(control)
         energy = config.vertex * (off + config.anchors * off_edges)
         gradient = config.vertex * (pull + config.anchors * pull_edges)
+        if self._contact is not None:
+            overlap, apart = self._contact.energy_and_gradient(control)
+            energy += config.vertex * config.contact * overlap
+            gradient += config.vertex * config.contact * apart
         if self._facing is None:
             return energy, gradient
         turned, push = self._facing.energy_and_gradient(control)
@@ -178,10 +191,12 @@ class SplineEnergy:
         distortion = self._distortion.curvature(control, self.penalty)
         barrier = self.barrier.curvature(control)
         facing = torch.zeros_like if self._facing is None else self._facing.curvature(control, _ROUGH)
+        contact = torch.zeros_like if self._contact is None else self._contact.curvature(control, _ROUGH)
 
         def hessian(x: Tensor) -> Tensor:
             inner = distortion(x) + self._rough_bending(x) + self.penalty * (barrier(x) + facing(x))
-            return inner + config.vertex * (surface(x) + config.anchors * anchors(x))
+            outer = surface(x) + config.anchors * anchors(x) + config.contact * contact(x)
+            return inner + config.vertex * outer
 
         direction, _ = conjugate_gradients(
             hessian,

@@ -71,8 +71,9 @@ def optimize(
     """Minimise from `control` (3, n_u, n_v, n_w), volume 1, in rounds: descend, certify, watch the spans not proved.
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
-    unfold what is left. Where spans stay unproved, the surface data near them loses weight. Once the map is certified,
-    a few more rounds take that back as far as they can. Anchors along the cube's edges draw F to the surface in those
+    unfold what is left. Where spans stay unproved, the surface data near them loses weight. Where the boundary of a
+    certified map meets itself, further rounds push it apart. Once the map is certified, a few more rounds take back
+    what the data has lost as far as they can. Anchors along the cube's edges draw F to the surface in those
     last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
     result is the last certified map whose boundary does not meet itself, else the last certified one, else the one with
     the fewest unproved spans.
@@ -114,7 +115,8 @@ class _Rounds:
     best: Optimized
     near: bool  # whether F was close to the surface all along the cube's edges to begin with
     number: int = 0
-    polished: int = 0  # rounds after the map was certified for the first time
+    parting: int = 0  # rounds in which the boundary of a certified map that meets itself is pushed apart
+    polished: int = 0  # rounds after that, or after the map was certified for the first time
 
     @property
     def certified(self) -> bool:
@@ -125,12 +127,15 @@ class _Rounds:
     def finished(self) -> bool:
         """Whether no round is left."""
         config = self.energy.config
-        return self.number >= config.rounds or (self.certified and self.polished == config.polish)
+        return self.number >= config.rounds or self.polished == config.polish
 
     def begin(self) -> None:
         """Weigh penalties, surface data and anchors for the next round."""
         config, energy = self.energy.config, self.energy
-        if self.certified:
+        if self.certified and self.best.meets_itself and self.parting < config.parting:
+            self.parting += 1
+            energy.watch_contact(self.control)
+        elif self.certified:
             self.polished += 1
             energy.take_back(config.giving_way)
         if self.polished or (self.near and self.number < config.patient_rounds):
@@ -166,7 +171,8 @@ class _Rounds:
             "anchors_yielding": torch.as_tensor(anchors.yielding),
             "active": torch.as_tensor(self.energy.barrier.active),
         }
-        state = {"number": self.number, "polished": self.polished, "history": history.rows}
+        counts = {"number": self.number, "parting": self.parting, "polished": self.polished}
+        state = counts | {"history": history.rows}
         checkpoints.save(_CHECKPOINT, tensors, state)
 
     def restore(self, tensors: dict[str, Tensor], state: dict[str, Any], history: History) -> None:
@@ -178,7 +184,9 @@ class _Rounds:
         energy.barrier.activate(tensors["active"].numpy())
         self.control, best = tensors["control"].to(device), tensors["best"].to(device)
         self.best = Optimized.of(best, self.knots, energy.config)
-        self.number, self.polished = int(state["number"]), int(state["polished"])
+        self.number, self.parting, self.polished = (int(state[name]) for name in ("number", "parting", "polished"))
+        if self.parting:
+            energy.watch_contact(self.control)
         history.rows[:] = [tuple(row) for row in state["history"]]
 
 

@@ -130,7 +130,7 @@ class SlidingParameters:
         along_a = (first[a, rows][:, None] + window) * stride[a][:, None]
         along_b = (first[b, rows][:, None] + window) * stride[b][:, None]
         indices = base[:, None, None] + along_a[:, :, None] + along_b[:, None, :]
-        return FaceWindow(indices.reshape(len(rows), -1), values[a, :, rows], values[b, :, rows])
+        return FaceWindow(indices.reshape(len(rows), (self.degree + 1) ** 2), values[a, :, rows], values[b, :, rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ class FaceWindow:
 
     def weights(self, a: int, b: int) -> Array:
         """Return the control points' weights in the derivative of order a and b: (N, k)."""
-        return (self.in_a[:, a, :, None] * self.in_b[:, b, None, :]).reshape(len(self.indices), -1)
+        return (self.in_a[:, a, :, None] * self.in_b[:, b, None, :]).reshape(self.indices.shape)
 
     def derivatives(self, control: Tensor) -> tuple[Array, Array, Array]:
         """Return F and its tangents t_a and t_b at the points: (N, 3) each."""

@@ -47,7 +47,7 @@ class SampledBoundary:
 
     parameters: Array  # (6 * samples**2, 3), face after face in the order of FACE_NAMES
     points: Array  # (6 * samples**2, 3)
-    triangles: NDArray[np.int64]  # (12 * (samples - 1)**2, 3), either orientation
+    triangles: NDArray[np.int64]  # (12 * (samples - 1)**2, 3), wound outwards where F keeps orientation
 
     @classmethod
     def of(cls, volume: BSplineVolume, samples: int = SAMPLES) -> SampledBoundary:
@@ -55,16 +55,18 @@ class SampledBoundary:
         if samples < 2:
             raise ValueError(f"samples must be at least 2, got {samples}")
         row = np.linspace(0.0, 1.0, samples)
-        number = np.arange(samples**2).reshape(samples, samples)
+        number = np.arange(samples**2, dtype=np.int64).reshape(samples, samples)
         a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
         face = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-        parameters, points = [], []
-        for axis, side in map(axis_and_side, range(6)):
-            u, v, w = (np.array([float(side)]) if k == axis else row for k in range(3))
+        parameters, points, triangles = [], [], []
+        for k in range(6):
+            axis, side = axis_and_side(k)
+            u, v, w = (np.array([float(side)]) if d == axis else row for d in range(3))
             parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
             points.append(volume.grid(u, v, w).reshape(-1, 3))
-        triangles = np.concatenate([face + k * samples**2 for k in range(6)])
-        return cls(np.concatenate(parameters), np.concatenate(points), triangles.astype(np.int64))
+            inwards = (side == 1) == (axis == 1)  # (u, w) is left-handed seen along v
+            triangles.append(k * samples**2 + (face[:, ::-1] if inwards else face))
+        return cls(np.concatenate(parameters), np.concatenate(points), np.concatenate(triangles))
 
 
 def to_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:

@@ -1,0 +1,108 @@
+"""Penalty on parts of F's boundary that run into one another, or nearly so.
+
+Det J > 0 everywhere does not keep two sheets of the boundary apart: the walls of a narrow valley may reach through one
+another. A sample of the boundary lies in another sheet where the boundary winds around the point just outside of it.
+The nearest sample that faces the opposite way is what it has run into, and the two are pushed apart along the normal
+there, as in contact mechanics (node to surface, Wriggers, Computational Contact Mechanics, 2006, chapter 6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import igl
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from ..arrays import Array, IntArray
+from ..quality.distances import SampledBoundary
+from ..spline.volume import BSplineVolume
+from ..surface.geometry import vertex_normals
+from .cg import Operator
+from .sliding import SlidingParameters
+from .tensor_product import ControlRows
+
+_SAMPLES = 110  # a direction and cube face
+_CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
+_ACCURACY = 2.0  # of the fast winding number
+_NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPenalty:
+    """Mean over the boundary's samples of (gap - (F(p) - F(q)) . n)_+^2; only the k samples p in contact count.
+
+    first, second: rows that yield F(p) and F(q). normals (k, 3): the boundary's at q, outwards. share: of one sample.
+    """
+
+    first: ControlRows
+    second: ControlRows
+    normals: Tensor
+    share: float
+    gap: float
+
+    def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
+        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
+        shortfall = (self.gap - self.distances(control)).clamp_min(0.0)
+        return self.share * float(shortfall.square().sum()), self._pull(-2.0 * self.share * shortfall, control)
+
+    def curvature(self, control: Tensor, dtype: torch.dtype) -> Operator:
+        """Return the second derivative at `control` as an operator."""
+        scale = 2.0 * self.share * (self.distances(control) < self.gap).to(dtype)
+        first, second = self.first.to(dtype), self.second.to(dtype)
+        single = replace(self, first=first, second=second, normals=self.normals.to(dtype))
+
+        def product(x: Tensor) -> Tensor:
+            return single._pull(scale * single.distances(x), x)
+
+        return product
+
+    def distances(self, control: Tensor) -> Tensor:
+        """Return (F(p) - F(q)) . n, negative where p lies behind the sheet of q: (k,)."""
+        return ((self.first(control) - self.second(control)) * self.normals).sum(1)
+
+    def _pull(self, factor: Tensor, like: Tensor) -> Tensor:
+        along = factor[:, None] * self.normals
+        return self.first.adjoint(along, like) - self.second.adjoint(along, like)
+
+
+def contact_penalty(knots: tuple[Array, Array, Array], degree: int, control: Tensor, gap: float) -> ContactPenalty:
+    """Return the penalty for the boundary of F at these control points; it is empty where no two sheets are near.
+
+    gap: how far apart sheets must be, in units of the control points (3, n_u, n_v, n_w).
+    """
+    boundary = SampledBoundary.of(
+        BSplineVolume((degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy()), _SAMPLES
+    )
+    normals = vertex_normals(boundary.points, boundary.triangles)
+    touching = _in_another_sheet(boundary.points + gap * normals, boundary)
+    touching, facing = _facing_samples(boundary.points, normals, touching)
+    first, second = (
+        SlidingParameters(knots, degree, boundary.parameters[chosen], _NO_TRIANGLES, device=control.device)
+        for chosen in (touching, facing)
+    )
+    return ContactPenalty(
+        first.rows,
+        second.rows,
+        torch.as_tensor(normals[facing], device=control.device),
+        1.0 / len(boundary.points),
+        gap,
+    )
+
+
+def _in_another_sheet(outside: Array, boundary: SampledBoundary) -> IntArray:
+    """Return which points just outside of the boundary it winds around all the same: (k,)."""
+    winding = igl.FastWindingNumberBVH()
+    winding.init(boundary.points, boundary.triangles)
+    return np.flatnonzero(winding.winding_number(outside, _ACCURACY) > 0.5)
+
+
+def _facing_samples(points: Array, normals: Array, touching: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the samples of `touching` (k,) near which another faces the opposite way, and the nearest such one."""
+    near = np.asarray(cKDTree(points).query(points[touching], k=_CANDIDATES)[1])  # (k, candidates), nearest first
+    opposite = np.einsum("kc,knc->kn", normals[touching], normals[near]) < -0.5
+    found = opposite.any(axis=1)
+    first = opposite[found].argmax(axis=1)
+    return touching[found], near[found, first]

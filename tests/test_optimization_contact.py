@@ -1,0 +1,72 @@
+"""Sheets of a boundary that run into one another, on springs whose turns overlap by a known depth."""
+
+import numpy as np
+import pytest
+import torch
+from volumes import bent, mapped
+
+from parameterize.certificate.boundary import check_boundary
+from parameterize.optimization.cg import conjugate_gradients
+from parameterize.optimization.contact import contact_penalty
+
+GAP = 1e-3
+TURNS = 1.5
+
+
+def spring(gap):
+    """The bar is 0.6 high; one turn lies `gap` above the one before."""
+    return bent(TURNS, TURNS * (0.6 + gap))
+
+
+def control_of(volume):
+    return torch.as_tensor(np.moveaxis(volume.control_points, -1, 0).copy())
+
+
+def contact(volume, gap=GAP):
+    return contact_penalty(volume.knots, 3, control_of(volume), gap)
+
+
+def distances(volume):
+    return contact(volume).distances(control_of(volume)).numpy()
+
+
+@pytest.mark.parametrize("depth", [3e-2, 1e-2])
+def test_the_depth_is_that_by_which_the_turns_overlap(depth):
+    found = distances(spring(-depth))
+    assert len(found) > 100
+    assert np.median(found) == pytest.approx(-depth, rel=0.1)
+
+
+@pytest.mark.parametrize("volume", [spring(0.1), bent(0.9), mapped(lambda u, v, w: (u, v, w), (8, 8, 8))])
+def test_what_is_apart_costs_nothing(volume):
+    energy, gradient = contact(volume).energy_and_gradient(control_of(volume))
+    assert energy == 0.0
+    assert not gradient.any()
+
+
+def test_gradient_and_curvature_are_those_of_the_energy():
+    volume = spring(-1e-2)
+    penalty, control = contact(volume), control_of(volume)
+    direction = 1e-3 * torch.randn(control.shape, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    (before, _), (after, _) = (penalty.energy_and_gradient(control + sign * direction) for sign in (-1.0, 1.0))
+    energy, gradient = penalty.energy_and_gradient(control)
+    bend = float((penalty.curvature(control, torch.float64)(direction) * direction).sum())
+    assert energy > 0.0
+    assert after - before == pytest.approx(2.0 * float((gradient * direction).sum()), rel=0.05)
+    assert after - 2.0 * energy + before == pytest.approx(bend, rel=0.3)  # some samples enter or leave
+
+
+def test_turns_that_overlap_are_parted():
+    volume = spring(-1e-2)
+    assert check_boundary(volume).injective is False
+    control = control_of(volume)
+    for _ in range(4):
+        penalty = contact_penalty(volume.knots, 3, control, GAP)
+        _, gradient = penalty.energy_and_gradient(control)
+        curvature = penalty.curvature(control, torch.float64)
+        step, _ = conjugate_gradients(
+            lambda x, bend=curvature: bend(x) + 1e-6 * x, -gradient, lambda x: x, tolerance=1e-6, max_iterations=200
+        )
+        control = control + step
+    parted = type(volume)(volume.degrees, volume.knots, np.moveaxis(control.numpy(), 0, -1))
+    assert check_boundary(parted).injective is True
