@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, in_brackets
-from .errors import MeshError
+from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
 from .inside import deepest_point
-from .readers.file import LARGEST, check_finite, check_indices, read_mesh
-from .readers.headers import check_face_count
+from .readers.file import read_mesh
 from .self_intersection import SHOWN, crossing_faces, crossing_places, describe_crossings
 from .topology import check_genus, check_manifold, check_volume, choose_component, slivers
 from .welding import orient, signed_volume, weld_and_drop
