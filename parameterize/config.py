@@ -57,6 +57,9 @@ class TrainConfig:
     min_det: float = 0.1  # alpha of the bijectivity term
     wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
     whiten: bool = True  # start from the affine map that makes the domain as wide in all directions, not the identity
+    turn: float = 45.0  # degrees by which that map is turned for each further start
+    det_floor: float = 0.5  # share of `min_det` at which the distortion term holds smaller determinants
+    edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,8 @@ def read_obj(data: bytes, max_faces: int) -> Content:
 
     Raises MeshError, without the file's name, naming the line.
     """
+    if b"\0" in data:
+        raise MeshError("not an OBJ: it holds binary data; export as OBJ text")
     places = array("d")
     polygons: list[list[int]] = []
     relative = False

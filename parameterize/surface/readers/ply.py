@@ -64,7 +64,7 @@ def read_ply(data: bytes, max_faces: int) -> Content:
     if present < needed:
         promised = " and ".join(f"{count} {name}" for name, count in counts.items())
         raise MeshError(f"the header promises {promised}, at least {needed} {unit}, where {present} follow; {DAMAGED}")
-    return _read_rows(rows, elements) if is_text else _read_binary(data, head)
+    return _read_rows(rows, elements) if is_text else _read_binary(data, head, counts["face"])
 
 
 def _elements(lines: list[list[str]]) -> list[Element]:
@@ -113,15 +113,19 @@ def _wanted(words: list[str], element: Element, line: int) -> list[str]:
     raise MeshError(f"line {line}: no {element.name} as the header promises; {DAMAGED}")
 
 
-def _read_binary(data: bytes, head: bytes) -> Content:
-    """Read a binary file whose header, up to `end_header`, is `head`."""
+def _read_binary(data: bytes, head: bytes, promised: int) -> Content:
+    """Read a binary file of so many faces, whose header, up to `end_header`, is `head`."""
     import meshio
-    import trimesh.exchange.ply as trimesh_ply
+    import trimesh.exchange.ply
 
     with library(".ply"):
         if FOR_MESHIO.search(head):
             renamed = re.sub(rb"\bvertex_index\b", b"vertex_indices", head) + data[len(head) :]
             mesh = meshio.read(io.BytesIO(renamed), file_format="ply")
-            return Content(mesh.points.astype(np.float64), [row for block in mesh.cells for row in block.data.tolist()])
-        held = trimesh_ply.load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
-        return Content(held["vertices"].astype(np.float64), held["faces"].astype(np.int64).tolist())
+            places, polygons = mesh.points, [row for block in mesh.cells for row in block.data.tolist()]
+        else:
+            held = trimesh.exchange.ply.load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
+            places, polygons = held["vertices"], held["faces"].astype(np.int64).tolist()
+    if len(polygons) < promised:
+        raise MeshError(f"{promised} faces promised, {len(polygons)} read; {DAMAGED}")
+    return Content(np.asarray(places, dtype=np.float64), polygons)

@@ -13,12 +13,7 @@ WHOLE_NUMBERS = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*+", re.ASCII)
 
 
 def text_lines(data: bytes) -> list[str]:
-    r"""Return the lines of a text without its byte order mark; \n, \r\n and \r end a line.
-
-    Raises MeshError where the file holds binary data.
-    """
-    if b"\0" in data:
-        raise MeshError("it holds binary data where text is expected: export it as text")
+    r"""Return the lines of a text without its byte order mark; \n, \r\n and \r end a line."""
     text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     return text.split("\n")
 
