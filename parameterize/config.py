@@ -106,6 +106,29 @@ class SplineConfig:
 
 
 @dataclass(frozen=True)
+class LayoutConfig:
+    """How the surface is cut and laid out on the cube; a share is one of a mesh edge's length."""
+
+    path_snap: float = 0.1  # share: crossings nearer to a vertex than this take the vertex, so paths leave no slivers
+    stray: float = 20.0  # a path costs so many times more at the distance `stray_cell` from its cube edge
+    stray_cell: float = 0.05
+    orders: int = 24  # in which the paths are traced, at most
+    sweeps: int = 600  # of relaxation, at most
+    patience: int = 60  # sweeps after which one more ring of neighbours may move
+    held_rounds: int = 20  # in which points are held so that no further triangle flips, at most
+    same: float = 1e-7  # share: final cuts this close to a vertex take the vertex
+    nudge: float = 1e-4  # by which vertices move where a mesh edge runs through a corner of the cube
+    nudges: int = 10  # at most
+    settle_steps: int = 8  # Gauss-Newton steps of the final cuts along their edges
+    settle_damping: float = 1e-3  # of these, against parallel directions
+    settle_margin: float = 1e-2  # share that a cut keeps from the ends of its edge
+    undo_rounds: int = 10  # in which such steps are undone at flipped triangles, at most
+
+
+LAYOUT = LayoutConfig()
+
+
+@dataclass(frozen=True)
 class Config:
     """All options of `parameterize.parameterize`."""
 
