@@ -197,8 +197,7 @@ def arap(jacobians: ArrayLike) -> Array:
 
 
 def _arap_of(sigma: Array) -> Array:
-    distortion: Array = np.sum((sigma - 1.0) ** 2, axis=-1)
-    return distortion
+    return np.sum((sigma - 1.0) ** 2, axis=-1)
 
 
 def scaled_jacobian(jacobians: ArrayLike) -> Array:
@@ -206,5 +205,4 @@ def scaled_jacobian(jacobians: ArrayLike) -> Array:
     matrices = np.asarray(jacobians, dtype=np.float64)
     lengths = np.linalg.norm(matrices, axis=-2, keepdims=True)
     units = np.divide(matrices, lengths, out=np.zeros_like(matrices), where=lengths > 0.0)
-    quality: Array = np.linalg.det(units)
-    return quality
+    return np.linalg.det(units)

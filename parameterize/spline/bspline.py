@@ -195,8 +195,7 @@ def divided_spans(knots: Array, parts: int) -> Array:
 def midpoints(knots: Array) -> Array:
     """The middle of every span: inserting them halves all spans."""
     breaks = breakpoints(knots)
-    middles: Array = (breaks[:-1] + breaks[1:]) / 2.0
-    return middles
+    return (breaks[:-1] + breaks[1:]) / 2.0
 
 
 def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:

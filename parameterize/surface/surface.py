@@ -51,13 +51,11 @@ class Surface:
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Points (..., 3) in the user's units -> placed."""
-        placed: Array = self.scale * (np.asarray(points, dtype=np.float64) - self.center) + 0.5
-        return placed
+        return self.scale * (np.asarray(points, dtype=np.float64) - self.center) + 0.5
 
     def from_unit(self, points: ArrayLike) -> Array:
         """Placed points (..., 3) -> the user's units."""
-        restored: Array = (np.asarray(points, dtype=np.float64) - 0.5) / self.scale + self.center
-        return restored
+        return (np.asarray(points, dtype=np.float64) - 0.5) / self.scale + self.center
 
     @property
     def volume(self) -> float:

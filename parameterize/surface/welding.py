@@ -80,21 +80,18 @@ def _is_oriented(faces: IntArray) -> bool:
 
 def _distinct(faces: IntArray) -> NDArray[np.bool_]:
     a, b, c = faces.T
-    distinct: NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
-    return distinct
+    return (a != b) & (b != c) & (c != a)
 
 
 def _areas(vertices: Array, faces: IntArray) -> Array:
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     longest = np.max([np.sum((p - q) ** 2, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    areas: Array = np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(longest, 1e-300)
-    return areas
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(longest, 1e-300)
 
 
 def _short_edges(vertices: Array, faces: IntArray) -> IntArray:
     edges = edge_table(faces)[0]
-    short: IntArray = edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
-    return short
+    return edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
 
 
 def _close_pairs(vertices: Array, faces: IntArray) -> IntArray:

@@ -60,5 +60,4 @@ def tetrahedra_boundary(vertices: Array, tetrahedra: IntArray) -> IntArray:
     corners = np.where(inverted[:, None], tetrahedra[:, [1, 0, 2, 3]], tetrahedra)
     faces = corners[:, OUTWARD_FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    boundary: IntArray = faces[np.sort(first[count == 1])]
-    return boundary
+    return faces[np.sort(first[count == 1])]

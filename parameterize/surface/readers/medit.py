@@ -47,7 +47,7 @@ def _table(name: str, words: list[str], columns: int, numbers: re.Pattern[str]) 
     size = count * (columns + 1)
     if size > len(words) - 1:
         raise MeshError(f".mesh promises {count} {name}, {size} numbers, {len(words) - 1} follow; {DAMAGED}")
-    table = np.array(words[1 : size + 1], dtype=np.str_).reshape(count, columns + 1)[:, :-1]
-    if count and not numbers.fullmatch(" ".join(table.ravel().tolist())):
+    rows = words[1 : size + 1]
+    if count and not numbers.fullmatch(" ".join(rows)):
         raise MeshError(f".mesh with a word that is not a number among its {name}; {DAMAGED}")
-    return table
+    return np.array(rows, dtype=np.str_).reshape(count, columns + 1)[:, :-1]
