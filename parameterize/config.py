@@ -57,6 +57,9 @@ class TrainConfig:
     min_det: float = 0.1  # alpha of the bijectivity term
     wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
     whiten: bool = True  # start from the affine map that makes the domain as wide in all directions, not the identity
+    turn: float = 45.0  # degrees by which that map is turned for each further start
+    det_floor: float = 0.5  # share of `min_det` at which the distortion term holds smaller determinants
+    edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,29 @@ class SplineConfig:
     tolerance: float = 0.1  # of the inner solves, relative
     iterations: int = 20  # of an inner solve, at most
     pull: float = 3e-4  # share of `vertex` in the preconditioner: more would hold back what slides along the surface
+
+
+@dataclass(frozen=True)
+class LayoutConfig:
+    """How the surface is cut and laid out on the cube; a share is one of a mesh edge's length."""
+
+    path_snap: float = 0.1  # share: crossings nearer to a vertex than this take the vertex, so paths leave no slivers
+    stray: float = 20.0  # a path costs so many times more at the distance `stray_cell` from its cube edge
+    stray_cell: float = 0.05
+    orders: int = 24  # in which the paths are traced, at most
+    sweeps: int = 600  # of relaxation, at most
+    patience: int = 60  # sweeps after which one more ring of neighbours may move
+    held_rounds: int = 20  # in which points are held so that no further triangle flips, at most
+    same: float = 1e-7  # share: final cuts this close to a vertex take the vertex
+    nudge: float = 1e-4  # by which vertices move where a mesh edge runs through a corner of the cube
+    nudges: int = 10  # at most
+    settle_steps: int = 8  # Gauss-Newton steps of the final cuts along their edges
+    settle_damping: float = 1e-3  # of these, against parallel directions
+    settle_margin: float = 1e-2  # share that a cut keeps from the ends of its edge
+    undo_rounds: int = 10  # in which such steps are undone at flipped triangles, at most
+
+
+LAYOUT = LayoutConfig()
 
 
 @dataclass(frozen=True)

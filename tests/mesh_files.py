@@ -65,8 +65,13 @@ def medit(version="MeshVersionFormatted 2\nDimension 3", more=""):
     return "\n".join([*rows, "Tetrahedra\n0", "End", ""])
 
 
-def flagged_ply():
+def flagged_ply(faces=TRIANGLES, vertices=CUBE, binary=False):
     """Faces with a property beside the corners."""
-    head, mark, body = ply().decode().partition("end_header\n")
-    rows = body.splitlines()
-    return head + "property uchar flags\n" + mark + "\n".join([*rows[:8], *(row + " 7" for row in rows[8:]), ""])
+    head, mark, body = ply(vertices, faces, binary=binary).partition(b"end_header\n")
+    head += b"property uchar flags\n" + mark
+    if binary:
+        start, row = 12 * len(vertices), 1 + 4 * len(faces[0])
+        return head + body[:start] + b"".join(body[i : i + row] + b"\7" for i in range(start, len(body), row))
+    rows = body.decode().splitlines()
+    n = len(vertices)
+    return head + "\n".join([*rows[:n], *(row + " 7" for row in rows[n:]), ""]).encode()

@@ -10,7 +10,8 @@ from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.jacobian import certify
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.quality.distances import Distances, SampledBoundary, to_boundary, to_mesh
-from parameterize.quality.quality import arap, arap_grid, measure, scaled_jacobian, signed_singular_values
+from parameterize.quality.quality import arap, arap_grid, measure, scaled_jacobian
+from parameterize.quality.singular_values import signed_singular_values
 from parameterize.spline.bspline import collocation, greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 

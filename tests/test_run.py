@@ -265,7 +265,7 @@ def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monk
 @pytest.mark.parametrize("start", [0, 1, 2])
 def test_the_start_map_makes_a_cloud_round(start):
     cloud = np.random.default_rng(0).normal(size=(500, 3)) * [4.0, 1.0, 0.5]
-    matrix = start_map(cloud, start)
+    matrix = start_map(cloud, start, 45.0)
     assert np.linalg.det(matrix) == pytest.approx(1.0)
     spread = np.cov((cloud @ matrix.T).T)
     assert spread == pytest.approx(np.trace(spread) / 3.0 * np.eye(3), abs=1e-9)

@@ -30,7 +30,7 @@ from mesh_files import (
 )
 
 from parameterize.surface.inside import deepest_point
-from parameterize.surface.readers.file import BYTES_AT_LEAST
+from parameterize.surface.readers.common import BYTES_AT_LEAST
 from parameterize.surface.surface import MeshError, load_surface, surface_from_arrays
 from parameterize.surface.triangulation import triangulate
 from parameterize.surface.welding import signed_volume
@@ -85,6 +85,7 @@ ACCEPTED = {
     "mixed.ply": (ply(faces=MIXED, binary=True), "9 polygons cut into 12 triangles"),
     "index.ply": (ply(faces=MIXED).replace(b"vertex_indices", b"vertex_index"), "9 polygons cut"),
     "flags.ply": (flagged_ply(), None),
+    "binary_flags.ply": (flagged_ply(QUADS, binary=True), "6 polygons cut into 12 triangles"),
     "lines.ply": (b"\xef\xbb\xbf" + ply().replace(b"\n3", b"\n\n3").replace(b"\n", b"\r"), None),
     "quads.off": (off(), "6 polygons cut"),
     "colours.off": (off().replace("OFF", "COFF").replace("\n4 ", " 1 0 0 1 # red\n4 "), "6 polygons cut"),
@@ -134,7 +135,7 @@ REFUSED = {
     "two_corners.obj": (obj() + "f 1 2\n", "line 15: a face has 2 corners"),
     "corners.obj": (obj() + "f" + " 1 2 3" * 100 + "\n", "a face has 300 corners, more than 256"),
     "short_row.ply": (ply().replace(b"\n3 0 2 3\n", b"\n36\n"), "line 18: no face as the header promises"),
-    "pair.ply": (ply(faces=[*QUADS, [0, 1]], binary=True), "7 faces promised, 6 read"),
+    "pair.ply": (ply(faces=[*QUADS, [0, 1]], binary=True), "a face with 2 corners, expected at least 3"),
     "zero.obj": (obj() + "f 0 1 2\n", "vertex number 0"),
     "nan.obj": (obj(NOT_A_NUMBER), "1 vertices with NaN or infinite coordinates, the first is vertex 3"),
     "infinite.obj": (obj().replace("v 0.0 0.0 0.0", "v 1e999 0 0"), "1 vertices with NaN or infinite"),
@@ -143,9 +144,9 @@ REFUSED = {
     "range.obj": (obj() + "f 1 2 99\n", "1 vertex numbers out of range, the first is 98"),
     "below.obj": (obj() + "f 1 2 -20\n", "1 vertex numbers out of range, the first is -12"),
     "range.off": (off(faces=[*QUADS, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
-    "binary.off": ("OFF BINARY\n", "a binary OFF is not read: save it as text"),
+    "binary.off": ("OFF BINARY\n", "binary OFF is not supported: save it as text"),
     "pair.off": (off(faces=[*QUADS, [0, 1]]), "line 17: a face has 2 corners"),
-    "corner.off": (off().replace("4 0 2 3 1", "4 0 2 -3 1"), "line 11: a face needs its number of corners"),
+    "corner.off": (off().replace("4 0 2 3 1", "4 0 2 -3 1"), "1 vertex numbers out of range, the first is -3"),
     "line.obj": (obj().replace("f 1 3", "f 1 \\\n3", 1) + "f 1 two 3\n", "line 16: a face needs vertex numbers"),
     "flat.mesh": ("MeshVersionFormatted 2\nDimension 2\n", "not of dimension 3"),
     "short.mesh": (medit().replace(" 0\nTetra", "\nTetra"), "promises 12 Triangles, 48 numbers, 47 follow"),
@@ -154,12 +155,12 @@ REFUSED = {
     "cut.stl": (binary_stl()[:-20], "must have 684 bytes, this one has 664"),
     "long.stl": (binary_stl() + b"abc", "must have 684 bytes, this one has 687"),
     "cut_text.stl": (text_stl()[:-100], "truncated or damaged"),
-    "cut.ply": (ply()[:-40], "rows follow"),
+    "cut.ply": (ply()[:-40], "at least 20 rows, where 15 follow"),
     "cut_binary.ply": (ply(binary=True)[:-30], "truncated or damaged"),
     "cut.off": (off()[:-30], "rows follow"),
     "points.ply": (ply(faces=np.empty((0, 3), int)), "8 vertices and 0 faces is no surface"),
     "strips.ply": (ply().replace(b"element face", b"element tristrips"), "triangle strips"),
-    "billion.ply": (ply(counts=(10**9, 12)), "at least 2000000024 bytes"),
+    "billion.ply": (ply(counts=(10**9, 12)), "at least 1000000012 rows"),
     "billion_binary.ply": (ply(counts=(8, 500_000), binary=True), "at least 500096 bytes"),
     "billion.off": (off(counts=(10**9, 6)), "promises 1000000000 vertices"),
     "billion.stl": (binary_stl()[:80] + struct.pack("<I", 10**9), "must have 50000000084 bytes"),
@@ -173,11 +174,13 @@ REFUSED = {
         "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1 1 1\n3 1 0 1\n9999999999\n0 0 0\n$EndNodes\n",
         "node numbers of the .msh must be 1 to 10000000",
     ),
-    "old.msh": ("$MeshFormat\n4 0 8\n$EndMeshFormat\n", "Gmsh format '4' is not read"),
+    "old.msh": ("$MeshFormat\n4 0 8\n$EndMeshFormat\n", "Gmsh format '4' is not supported"),
     "cut.msh": ("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 8 1 8\n", "without the whole section $Nodes"),
     "many.vtu": (
-        '<VTKFile type="UnstructuredGrid"><Piece NumberOfPoints="1000000000" NumberOfCells="1"></Piece></VTKFile>',
-        "NumberOfPoints=1000000000",
+        '<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="1000000000" NumberOfCells="1">'
+        '<Points><DataArray type="Float64" NumberOfComponents="3">0 0 0</DataArray>'
+        "</Points></Piece></UnstructuredGrid></VTKFile>",
+        "cannot reshape array of size 3 into shape (1000000000,3)",
     ),
     "pieces.vtu": (
         '<VTKFile type="UnstructuredGrid"><UnstructuredGrid>'
@@ -244,6 +247,43 @@ def test_compressed_arrays_of_a_vtu_are_read(tmp_path):
     for compression in ("zlib", "lzma"):
         meshio.write(tmp_path / "cube.vtu", mesh, compression=compression)
         assert is_unit_cube(load_surface(tmp_path / "cube.vtu"))
+
+
+def appended_vtu(encode, points=CUBE):
+    """Bytes of a .vtu whose zlib-compressed arrays stand in one block at its end, as ParaView writes them."""
+    rows, block = "", b""
+    cells = {"connectivity": np.ravel(QUADS), "offsets": np.arange(4, 25, 4), "types": np.full(6, 9)}
+    for name, values in {"Points": np.asarray(points, dtype=float), **cells}.items():
+        kind = f'type="{"Float64" if name == "Points" else "Int64"}" Name="{name}" format="appended"'
+        kind += f' offset="{len(block)}" NumberOfComponents="{3 if name == "Points" else 1}"'
+        rows += ("<Points>{}</Points><Cells>" if name == "Points" else "{}").format(f"<DataArray {kind}/>")
+        packed = zlib.compress(values.tobytes())
+        block += encode(struct.pack("<4I", 1, values.nbytes, 0, len(packed))) + encode(packed)
+    head = '<VTKFile type="UnstructuredGrid" compressor="vtkZLibDataCompressor" byte_order="LittleEndian">'
+    head += f'<UnstructuredGrid><Piece NumberOfPoints="8" NumberOfCells="6">{rows}</Cells></Piece></UnstructuredGrid>'
+    name = "raw" if encode is bytes else "base64"
+    return head.encode() + f'<AppendedData encoding="{name}">_'.encode() + block + b"\n</AppendedData></VTKFile>"
+
+
+@pytest.mark.parametrize("encode", [bytes, base64.b64encode])
+def test_appended_arrays_of_a_vtu_are_read_within_the_limit(encode, tmp_path):
+    assert is_unit_cube(load_surface(write(tmp_path, "cube.vtu", appended_vtu(encode))))
+    bomb = appended_vtu(encode, np.zeros(BYTES_AT_LEAST // 8 + 1000))
+    with pytest.raises(MeshError, match="unpacks to more than"):
+        load_surface(write(tmp_path, "bomb.vtu", bomb), max_faces=4)
+
+
+def test_concave_faces_with_further_properties_are_cut_inside(tmp_path):
+    """A prism over a dart, whose fan from the first corner would leave it."""
+    outline = np.array([[2, 1], [0, 0.5], [-2, 1], [0, 0]])
+    vertices = np.vstack([np.c_[outline, np.full(4, z)] for z in (0.0, 1.0)])
+    sides = [[i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4] for i in range(4)]
+    content = flagged_ply([[3, 2, 1, 0], [4, 5, 6, 7], *sides], vertices, binary=True)
+    surface = load_surface(write(tmp_path, "dart.ply", content))
+    ends = surface.vertices[surface.faces[:4]]
+    areas = np.linalg.norm(np.cross(ends[:, 1] - ends[:, 0], ends[:, 2] - ends[:, 0]), axis=1) / 2
+    assert areas.sum() == pytest.approx(2.0)
+    assert surface.notices == ("6 polygons cut into 12 triangles",)
 
 
 def test_max_faces_is_checked_before_and_after_parsing(tmp_path):

@@ -67,8 +67,7 @@ class BoundaryMap:
                 f"{homeless.size} triangles do not lie on one face of the cube, the first is {homeless[0]}; "
                 "cut the surface along the cube's edges"
             )
-        faces: NDArray[np.int64] = np.argmax(shared, axis=1).astype(np.int64)
-        return faces
+        return np.argmax(shared, axis=1).astype(np.int64)
 
     def flipped(self) -> NDArray[np.int64]:
         """Return the indices of the triangles that do not face outwards, seen from the cube's centre.
@@ -103,5 +102,4 @@ def _rows_of_three(values: Array, name: str) -> Array:
 
 def _on_faces(parameters: Array) -> NDArray[np.bool_]:
     """Which of the six cube faces each parameter lies on, (n, 6) in the order of FACE_NAMES."""
-    on: NDArray[np.bool_] = np.stack([parameters == 0.0, parameters == 1.0], axis=-1).reshape(-1, len(FACE_NAMES))
-    return on
+    return np.stack([parameters == 0.0, parameters == 1.0], axis=-1).reshape(-1, len(FACE_NAMES))

@@ -7,19 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..config import LAYOUT
 from ..spline.volume import BSplineVolume
 from .boundary_map import BoundaryMap
 from .closest_point import damped_fit
 from .cube import snap
 from .cutting import CutMesh, cut_along_rays
 from .flips import untangle
-
-_SAME = 1e-7  # share of a mesh edge: cuts this close to a vertex take the vertex, which NEAR_EDGE then puts on the edge
-_NUDGE, _NUDGES = 1e-4, 10
-_SETTLE_STEPS = 8
-_UNDO_ROUNDS = 10
-_DAMPING = 1e-3  # against parallel directions
-_MARGIN = 1e-2  # share of a mesh edge that a cut keeps from its ends
 
 
 def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parameters: Array) -> BoundaryMap:
@@ -29,8 +23,8 @@ def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parame
     smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
     """
     placed = untangle(parameters, faces)
-    for number in range(_NUDGES):
-        cut = cut_along_rays(placed, faces, _SAME)
+    for number in range(LAYOUT.nudges):
+        cut = cut_along_rays(placed, faces, LAYOUT.same)
         spread = snap(cut.carry(placed))
         spread[: len(placed)] = placed
         plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
@@ -48,14 +42,14 @@ def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int) -> Array
     around = np.unique(np.concatenate([corners[corners < len(placed)], cut.parents[corners].ravel()]))
     around = around[around < len(placed)]
     moved = placed.copy()
-    moved[around] += _NUDGE * np.random.default_rng(number).uniform(-1.0, 1.0, (len(around), 3))
+    moved[around] += LAYOUT.nudge * np.random.default_rng(number).uniform(-1.0, 1.0, (len(around), 3))
     return snap(moved)
 
 
 def _settle_cuts(volume: BSplineVolume, vertices: Array, cut: CutMesh, parameters: Array) -> BoundaryMap:
     """Move each cut vertex along its mesh edge and its parameter along the cube's edge until F(p) is close to it."""
     best = BoundaryMap(cut.carry(vertices), parameters, cut.faces)
-    for _ in range(_SETTLE_STEPS):
+    for _ in range(LAYOUT.settle_steps):
         share, moved = _settled_once(volume, cut, best, len(vertices))
         cut, best = _without_flips(vertices, cut, best, share, moved)
     return best
@@ -71,10 +65,11 @@ def _settled_once(volume: BSplineVolume, cut: CutMesh, best: BoundaryMap, count:
     inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; ends of cuts within a face stay
     start, end = best.vertices[cut.parents[count:].T]
     along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
-    shift, slide = damped_fit(end - start, -along_cube, volume(where) - new, _DAMPING)
+    shift, slide = damped_fit(end - start, -along_cube, volume(where) - new, LAYOUT.settle_damping)
     share, moved = cut.share.copy(), best.parameters.copy()
-    share[count:] = np.clip(share[count:] + shift, _MARGIN, 1.0 - _MARGIN)
-    moved[count:] = np.where(inner, np.clip(where + slide[:, None], _MARGIN**2, 1.0 - _MARGIN**2), where)
+    margin = LAYOUT.settle_margin
+    share[count:] = np.clip(share[count:] + shift, margin, 1.0 - margin)
+    moved[count:] = np.where(inner, np.clip(where + slide[:, None], margin**2, 1.0 - margin**2), where)
     return share, moved
 
 
@@ -82,7 +77,7 @@ def _without_flips(
     vertices: Array, cut: CutMesh, best: BoundaryMap, share: Array, moved: Array
 ) -> tuple[CutMesh, BoundaryMap]:
     """Undo the steps to `share` and `moved` at flipped triangles; return the old cuts and map if some stay flipped."""
-    for _ in range(_UNDO_ROUNDS):
+    for _ in range(LAYOUT.undo_rounds):
         trial = replace(cut, share=share)
         candidate = BoundaryMap(trial.carry(vertices), moved, cut.faces)
         turned = np.setdiff1d(cut.faces[candidate.flipped()].ravel(), np.arange(len(vertices)))

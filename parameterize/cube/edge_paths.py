@@ -7,17 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from ..arrays import Array, IntArray
-from ..surface.edges import directed_edges, edge_table
+from ..config import LAYOUT
+from ..surface.edges import connected, directed_edges, edge_table
 from .cube import CORNERS, EDGES, face_number, project_radially
 from .cutting import CutMesh, cut_along_rays
-
-_SNAP = 0.1  # crossings nearer than this share of a mesh edge to a vertex use the vertex: no slivers along the paths
-_STRAY = 20.0  # how much dearer a path gets at one cell's distance from its cube edge
-_CELL = 0.05
-_TRIES = 24
 
 
 class PathError(RuntimeError):
@@ -54,7 +50,7 @@ def cut_surface(mapped: Array, faces: IntArray, corners: IntArray) -> CubeSurfac
     Raises PathError where the paths do not bound six discs, which happens only far from a cube, or where the corners
     come in the order of a mirrored cube.
     """
-    cut = cut_along_rays(mapped, faces, _SNAP)
+    cut = cut_along_rays(mapped, faces, LAYOUT.path_snap)
     position = cut.carry(mapped)
     paths = _trace_paths(position, cut.faces, corners)
     labels = _patches(cut.faces, paths, corners)
@@ -66,7 +62,7 @@ def cut_surface(mapped: Array, faces: IntArray, corners: IntArray) -> CubeSurfac
 def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
     """Disjoint paths along mesh edges, one a cube edge; where one finds no way, it is traced first in the next try."""
     order = list(range(len(EDGES)))
-    for _ in range(_TRIES):
+    for _ in range(LAYOUT.orders):
         paths, blocked = _trace_in_order(position, faces, corners, order)
         if blocked is None:
             return [paths[k] for k in range(len(EDGES))]
@@ -92,7 +88,7 @@ def _trace_in_order(
         usable[corners[[i, j]]] = True
         keep = usable[edges].all(axis=1)
         stray = _distance_to_segment(radial, CORNERS[i], CORNERS[j])[edges[keep]].max(axis=1)
-        cost = (length[keep] + 1e-9) * (1.0 + _STRAY * stray / _CELL)
+        cost = (length[keep] + 1e-9) * (1.0 + LAYOUT.stray * stray / LAYOUT.stray_cell)
         a, b = edges[keep].T
         graph = coo_array((cost, (a, b)), shape=(len(position),) * 2).tocsr()
         _, previous = dijkstra(graph, directed=False, indices=corners[i], return_predecessors=True)
@@ -120,11 +116,9 @@ def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntAr
     order = np.lexsort(sides.T)
     pairs, owners = sides[order][::2], order.reshape(-1, 2) // 3  # closed mesh: every edge has two triangles
     open_sides = np.array([tuple(p) not in on_path for p in pairs.tolist()])
-    a, b = owners[open_sides].T
-    links = coo_array((np.ones(len(a)), (a, b)), shape=(len(faces),) * 2)
-    count, patch = connected_components(links, directed=False)
-    if count != 6:
-        raise PathError(f"the edge paths bound {count} patches, not 6")
+    patch = connected(owners[open_sides], len(faces))
+    if patch.max() != 5:
+        raise PathError(f"the edge paths bound {patch.max() + 1} patches, not 6")
     labels = np.full(6, -1)
     for k in range(6):
         inside = np.isin(corners, faces[patch == k])

@@ -7,12 +7,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..arrays import Array, IntArray
+from ..config import LAYOUT
 from .cube import snap
 
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
-_SWEEPS = 600
-_PATIENCE = 60
-_UNDO_ROUNDS = 20
 
 
 def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
@@ -38,7 +36,7 @@ def flipped(places: Array, faces: IntArray) -> NDArray[np.bool_]:
 def new_flips(before: Array, after: Array, faces: IntArray) -> NDArray[np.bool_]:
     """Which points (n,) must stay so that no further triangle flips when the others go from `before` to `after`."""
     stay, allowed = np.zeros(len(before), dtype=bool), flipped(before, faces)
-    for _ in range(_UNDO_ROUNDS):
+    for _ in range(LAYOUT.held_rounds):
         bad = flipped(np.where(stay[:, None], before, after), faces) & ~allowed
         if not bad.any():
             return stay
@@ -46,11 +44,11 @@ def new_flips(before: Array, after: Array, faces: IntArray) -> NDArray[np.bool_]
     return np.ones(len(before), dtype=bool)
 
 
-def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
+def untangle(parameters: Array, faces: IntArray, sweeps: int = LAYOUT.sweeps) -> Array:
     """Relax the vertices around flipped triangles until none is left, moving as few and as little as possible.
 
     A relaxed vertex goes half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
-    are flipped at the time move; where they stay so, rings of neighbours join, one after every _PATIENCE sweeps. After
+    are flipped at the time move; where they stay so, rings of neighbours join, one after every `patience` sweeps. After
     `sweeps` some may be left.
     """
     n = len(parameters)
@@ -64,7 +62,7 @@ def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array
             break
         free = np.zeros(n, dtype=bool)
         free[faces[bad].ravel()] = True
-        for _ in range(sweep // _PATIENCE):
+        for _ in range(sweep // LAYOUT.patience):
             free |= (adjacency @ free.astype(float)) > 0.0
         mean = adjacency[free] @ direction
         moved = direction[free] + mean / np.linalg.norm(mean, axis=1, keepdims=True)

@@ -195,8 +195,7 @@ def divided_spans(knots: Array, parts: int) -> Array:
 def midpoints(knots: Array) -> Array:
     """The middle of every span: inserting them halves all spans."""
     breaks = breakpoints(knots)
-    middles: Array = (breaks[:-1] + breaks[1:]) / 2.0
-    return middles
+    return (breaks[:-1] + breaks[1:]) / 2.0
 
 
 def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
@@ -217,20 +216,13 @@ def evaluate_at(
 
     coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
     """
+    from scipy.interpolate import NdBSpline  # slow to load, and needed only where points are evaluated
+
     where = np.atleast_2d(np.asarray(points, dtype=np.float64))
     if where.ndim != 2 or where.shape[1] != 3:
         raise ValueError(f"points must have shape (m, 3), got {where.shape}")
-    windows, values = [], []
-    for a in range(3):
-        first, table = basis_derivatives(knots[a], degrees[a], where[:, a], derivative[a])
-        windows.append(first[:, None] + np.arange(degrees[a] + 1))
-        values.append(table[derivative[a]])
-    result = np.zeros((*coefficients.shape[3:], len(where)))  # components first, so that weights (m,) broadcast
-    for i in range(degrees[0] + 1):  # one row of the support at a time: memory stays linear in m
-        for j in range(degrees[1] + 1):
-            net = coefficients[windows[0][:, i, None], windows[1][:, j, None], windows[2]]  # (m, degree + 1, ...)
-            result += values[0][:, i] * values[1][:, j] * np.einsum("mk,mk...->...m", values[2], net)
-    return np.moveaxis(result, -1, 0)
+    spline = NdBSpline(tuple(knots), coefficients, tuple(degrees))
+    return np.asarray(spline(where, nu=tuple(derivative)))
 
 
 def evaluate_grid(

@@ -1,5 +1,44 @@
-"""What the files of the gate share: the error and the array types."""
+"""The error that refuses a surface, and the checks that files and arrays share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+
+LARGEST = 1e90  # coordinate: volumes beyond its cube leave double precision
 
 
 class MeshError(ValueError):
     """A surface is refused. One line: the file, the defect, how many, where the first is, the remedy."""
+
+
+def check_face_count(count: int, max_faces: int) -> None:
+    """Raise MeshError where a surface has more faces than allowed."""
+    if count > max_faces:
+        raise MeshError(
+            f"{count} faces, more than max_faces={max_faces}: raise --max-faces, or bring them down with --decimate"
+        )
+
+
+def check_finite(vertices: Array) -> None:
+    """Raise MeshError for coordinates that are NaN, infinite or too large to compute volumes with."""
+    broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(broken):
+        raise MeshError(
+            f"{len(broken)} vertices with NaN or infinite coordinates, the first is vertex {broken[0]} (from 0): "
+            "export the surface again"
+        )
+    if abs(vertices).max(initial=0.0) > LARGEST:
+        raise MeshError(f"coordinates beyond {LARGEST:g} cannot be computed with: choose a larger unit of length")
+
+
+def check_indices(vertices: Array, faces: IntArray) -> None:
+    """Raise MeshError where faces name vertices that do not exist."""
+    numbers = faces.ravel()
+    wrong = np.flatnonzero((numbers < 0) | (numbers >= len(vertices)))
+    if len(wrong):
+        raise MeshError(
+            f"{len(wrong)} vertex numbers out of range, the first is {numbers[wrong[0]]} (counted from 0) "
+            f"where there are {len(vertices)} vertices; export the file again"
+        )

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, in_brackets
-from .errors import MeshError
+from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
 from .inside import deepest_point
-from .readers.file import LARGEST, check_finite, check_indices, read_mesh
-from .readers.headers import check_face_count
+from .readers.file import read_mesh
 from .self_intersection import SHOWN, crossing_faces, crossing_places, describe_crossings
 from .topology import check_genus, check_manifold, check_volume, choose_component, slivers
 from .welding import orient, signed_volume, weld_and_drop
@@ -52,13 +51,11 @@ class Surface:
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Points (..., 3) in the user's units -> placed."""
-        placed: Array = self.scale * (np.asarray(points, dtype=np.float64) - self.center) + 0.5
-        return placed
+        return self.scale * (np.asarray(points, dtype=np.float64) - self.center) + 0.5
 
     def from_unit(self, points: ArrayLike) -> Array:
         """Placed points (..., 3) -> the user's units."""
-        restored: Array = (np.asarray(points, dtype=np.float64) - 0.5) / self.scale + self.center
-        return restored
+        return (np.asarray(points, dtype=np.float64) - 0.5) / self.scale + self.center
 
     @property
     def volume(self) -> float:

@@ -9,11 +9,9 @@ from collections.abc import Callable
 
 import igl
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, IntArray
-from .edges import edge_table
+from .edges import connected, edge_table
 from .errors import MeshError
 from .welding import components, signed_volume
 
@@ -71,7 +69,7 @@ def check_manifold(faces: IntArray, where: Where) -> None:
         )
     border = edges[counts == 1]
     if len(border):
-        loops = _loops(border)
+        loops = len(np.unique(connected(border, int(faces.max()) + 1)[border[:, 0]]))
         raise MeshError(
             f"open surface: {loops} boundary {'loop' if loops == 1 else 'loops'} ({len(border)} edges), the first at "
             f"{where(border[0, 0])}: close the {'hole' if loops == 1 else 'holes'}"
@@ -82,13 +80,6 @@ def check_manifold(faces: IntArray, where: Where) -> None:
             f"{len(pinched)} non-manifold vertices (sheets touch in a point), the first at {where(int(pinched[0]))}: "
             "pull the sheets apart there"
         )
-
-
-def _loops(border: IntArray) -> int:
-    names, ends = np.unique(border, return_inverse=True)
-    ends = ends.reshape(-1, 2)
-    graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(names), len(names)))
-    return int(connected_components(graph, directed=False)[0])
 
 
 def check_genus(faces: IntArray) -> None:

@@ -37,8 +37,7 @@ def triangulate(vertices: Array, polygons: list[list[int]]) -> IntArray:
     placed = vertices[corners] - np.repeat(vertices[corners[starts]], sizes, axis=0)
     size = np.maximum.reduceat(abs(placed).max(axis=1), starts)
     placed /= np.repeat(np.maximum(size, 1e-300), sizes)[:, None]
-    triangles: IntArray = corners[_cut_all(placed, sizes)]
-    return triangles
+    return corners[_cut_all(placed, sizes)]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -5,12 +5,10 @@ from __future__ import annotations
 import igl
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ..arrays import Array, IntArray
-from .edges import directed_edges, edge_table
+from .edges import connected, directed_edges, edge_table
 
 WELD_TOLERANCE = 1e-7  # of the box's longest side: what single precision cannot tell apart
 FLAT = 1e-14  # twice a face's area over its longest edge squared, below which it counts as degenerate
@@ -68,10 +66,7 @@ def signed_volume(vertices: Array, faces: IntArray) -> float:
 
 def components(faces: IntArray) -> list[IntArray]:
     """Face numbers of each component (faces sharing a vertex), the largest first."""
-    count = int(faces.max()) + 1
-    edges = directed_edges(faces)
-    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    label = connected(directed_edges(faces), int(faces.max()) + 1)[faces[:, 0]]
     order = np.argsort(label, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     return sorted(groups, key=lambda group: (-len(group), int(group[0])))
@@ -85,21 +80,18 @@ def _is_oriented(faces: IntArray) -> bool:
 
 def _distinct(faces: IntArray) -> NDArray[np.bool_]:
     a, b, c = faces.T
-    distinct: NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
-    return distinct
+    return (a != b) & (b != c) & (c != a)
 
 
 def _areas(vertices: Array, faces: IntArray) -> Array:
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     longest = np.max([np.sum((p - q) ** 2, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    areas: Array = np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(longest, 1e-300)
-    return areas
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(longest, 1e-300)
 
 
 def _short_edges(vertices: Array, faces: IntArray) -> IntArray:
     edges = edge_table(faces)[0]
-    short: IntArray = edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
-    return short
+    return edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
 
 
 def _close_pairs(vertices: Array, faces: IntArray) -> IntArray:
@@ -116,8 +108,6 @@ def _close_pairs(vertices: Array, faces: IntArray) -> IntArray:
 
 
 def _merge(vertices: Array, pairs: IntArray) -> IntArray:
-    """For every vertex the lowest vertex it is joined with, (n,)."""
-    n = len(vertices)
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    label = connected_components(graph, directed=False)[1]
+    """Return for every vertex the lowest vertex that the pairs (k, 2) join it with, (n,)."""
+    label = connected(pairs, len(vertices))
     return np.unique(label, return_index=True)[1][label]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ..optimization.polar import closest_rotation, cofactor, determinant
+from ..optimization.polar import closest_rotation, cofactor
 from .samples import OFFSETS, gather
 
 _POSITION = {tuple(int(v) for v in offset): i for i, offset in enumerate(OFFSETS)}
@@ -100,10 +100,10 @@ def star_shape(corners: Tensor, normals: Tensor) -> Tensor:
     return (-facing).clamp_min(0.0).square().mean()
 
 
-def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float = 1e-3) -> Tensor:
-    """Return L_edge of eq. (3): how far path points (k, 3) and, weakly, their directions are from the cube's edges.
+def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float) -> Tensor:
+    """Return L_edge of eq. (3): how far path points (k, 3) are from the cube's edges, and their directions.
 
-    following: (s, 2) pairs of consecutive path points.
+    following: (s, 2) pairs of consecutive path points. weight: of the directions.
     """
     step = gather(mapped, following[:, 1]) - gather(mapped, following[:, 0])
     aim = target[following[:, 1]] - target[following[:, 0]]
@@ -115,18 +115,3 @@ def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float =
 def folded(det: Tensor) -> int:
     """Return the number of stencils whose Jacobian determinant is not positive."""
     return int((det <= 0.0).sum())
-
-
-__all__ = [
-    "bijectivity",
-    "determinant",
-    "distance",
-    "distortion",
-    "edge_path",
-    "fairness",
-    "folded",
-    "normal_difference",
-    "star_shape",
-    "stencil_jacobian",
-    "triangle_normals",
-]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor, nn
 
@@ -24,13 +26,13 @@ class InverseMap(nn.Module):
     """G(x) = c + A (x - c) + MLP(encoding(x)), c = (1/2, 1/2, 1/2), from the domain (volume 1, around c) to the cube.
 
     The last layer starts at zero, so G *is* the affine map before the first step: with A = I, the default, the identity
-    that the paper trains towards. A is not trained.
+    that the paper trains towards. A is not trained. generator: draws the other layers' first weights.
     """
 
     multiples: Tensor
     affine: Tensor
 
-    def __init__(self, config: NetworkConfig) -> None:
+    def __init__(self, config: NetworkConfig, generator: torch.Generator | None = None) -> None:
         super().__init__()
         self.register_buffer("affine", torch.eye(3))
         self.register_buffer("multiples", torch.arange(1.0, config.frequencies + 1.0))
@@ -38,6 +40,10 @@ class InverseMap(nn.Module):
         self.first = nn.Linear(6 * config.frequencies + 3, config.width)
         self.residual = nn.Sequential(*(ResidualModule(config.width) for _ in range(config.modules)))
         self.last = nn.Linear(config.width, 3)
+        for layer in (m for m in self.modules() if isinstance(m, nn.Linear)):
+            nn.init.kaiming_uniform_(layer.weight, a=math.sqrt(5.0), generator=generator)
+            bound = 1.0 / math.sqrt(layer.in_features)
+            nn.init.uniform_(layer.bias, -bound, bound, generator=generator)
         nn.init.zeros_(self.last.weight)
         nn.init.zeros_(self.last.bias)
 

@@ -16,32 +16,16 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
-from ..cube.cube import CORNERS
-from ..cube.edge_paths import CubeSurface, PathError, choose_corners, cut_surface, edge_targets
+from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
 from ..history import History
 from ..progress import Progress, ProgressCallback, ignore
-from . import losses
 from .network import InverseMap
-from .samples import Stencils, TriangleSampler, gather, interior_points, stencils
-from .target_shapes import nearest, nearest_on_cube_face
+from .objective import BoundarySamples, EdgePaths, Objective
+from .samples import TriangleSampler, interior_points, stencils
 
 _log = logging.getLogger(__name__)
 State = dict[str, Tensor]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
-
-
-@dataclass(frozen=True, eq=False)
-class BoundarySamples:
-    """What a stage knows of the surface: its triangles, and from the later stages corners, edges and cube faces."""
-
-    vertices: Tensor  # (n, 3), volume 1
-    faces: Tensor  # (m, 3)
-    sampler: TriangleSampler
-    labels: Tensor | None = None  # (m,) cube face of each triangle, once the surface is cut
-    corners: Tensor | None = None  # (8,) vertices
-    path: Tensor | None = None  # (k,) vertices on the edge paths
-    path_target: Tensor | None = None  # (k, 3)
-    path_following: Tensor | None = None  # (s, 2)
 
 
 @dataclass
@@ -77,20 +61,20 @@ class Trainer:
         progress: ProgressCallback = ignore,
         checkpoints: Checkpoints | None = None,
     ) -> None:
-        torch.manual_seed(seed % 2**63)
         self.config, self.seed, self.device, self.dtype = config, seed, device, dtype
         self.vertices, self.faces = vertices, faces
         self.corners = given_corners
-        self.network = InverseMap(config.network).to(device=device, dtype=dtype)
+        first_weights = torch.Generator().manual_seed(seed % 2**63)
+        self.network = InverseMap(config.network, first_weights).to(device=device, dtype=dtype)
         if config.train.whiten:
-            first = start_map(interior_points(vertices, faces, config.train.cell), start)
+            first = start_map(interior_points(vertices, faces, config.train.cell), start, config.train.turn)
             self.network.affine.copy_(self._tensor(first))
-        self.stencils: Stencils = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
+        inside = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
+        self.objective = Objective(self.network, inside, config.train)
         self.history = history if history is not None else History()
         self.progress = progress
         self.checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
         self.generator = torch.Generator()
-        self._corner_targets = self._tensor(CORNERS)
 
     def run(self) -> InverseMap:
         """All stages, or those that a checkpoint leaves; the network at the best state of the last one.
@@ -131,34 +115,22 @@ class Trainer:
     def _prepare(self, stage: StageConfig) -> BoundarySamples:
         """Choose corners and cut the surface, where the stage asks for it, by the network as it is."""
         if stage.weights.cor > 0.0 and self.corners is None:
-            self.corners = choose_corners(self.map(self.vertices))
-        if stage.weights.edge == 0.0:
-            return self._boundary(self.vertices, self.faces, self.corners)
-        assert self.corners is not None
-        return self._cut_boundary(cut_surface(self.map(self.vertices), self.faces, self.corners))
+            self.corners = choose_corners(self.mapped())
+        vertices, faces, corners = self.vertices, self.faces, self.corners
+        labels = paths = None
+        if stage.weights.edge > 0.0:
+            assert corners is not None
+            surface = cut_surface(self.mapped(), faces, corners)
+            vertices, faces, corners = surface.cut.carry(vertices), surface.cut.faces, surface.corners
+            path, target, following = edge_targets(self.map(vertices), surface.paths)
+            paths = EdgePaths(self._index(path), self._tensor(target), self._index(following))
+            labels = self._index(surface.face_labels)
+        sampler = TriangleSampler(vertices, faces, self.config.train.triangles, self.device)
+        held = None if corners is None else self._index(corners)
+        return BoundarySamples(self._tensor(vertices), self._index(faces), sampler, held, labels, paths)
 
-    def _boundary(self, vertices: Array, faces: IntArray, corners: IntArray | None) -> BoundarySamples:
-        return BoundarySamples(
-            self._tensor(vertices),
-            torch.as_tensor(faces, device=self.device),
-            TriangleSampler(vertices, faces, self.config.train.triangles, self.device),
-            corners=None if corners is None else torch.as_tensor(corners, device=self.device),
-        )
-
-    def _cut_boundary(self, surface: CubeSurface) -> BoundarySamples:
-        vertices = surface.cut.carry(self.vertices)
-        path, target, following = edge_targets(self.map(vertices), surface.paths)
-        plain = self._boundary(vertices, surface.cut.faces, surface.corners)
-        return BoundarySamples(
-            plain.vertices,
-            plain.faces,
-            plain.sampler,
-            labels=torch.as_tensor(surface.face_labels, device=self.device),
-            corners=plain.corners,
-            path=torch.as_tensor(path, device=self.device),
-            path_target=self._tensor(target),
-            path_following=torch.as_tensor(following, device=self.device),
-        )
+    def _index(self, numbers: IntArray) -> Tensor:
+        return torch.as_tensor(numbers, device=self.device)
 
     def _tensor(self, values: Array) -> Tensor:
         return torch.as_tensor(values, dtype=self.dtype, device=self.device)
@@ -186,7 +158,7 @@ class Trainer:
         """One Adam step; nothing of the state changes before the loss is known."""
         self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
         optimizer.zero_grad(set_to_none=True)
-        loss, folded, terms = self._loss(stage, boundary)
+        loss, folded, terms = self.objective(stage, boundary, self.generator)
         loss.backward()  # type: ignore[no-untyped-call]
         value = float(loss.detach())
         if not math.isfinite(value):
@@ -238,75 +210,17 @@ class Trainer:
         first, last = self.config.train.learning_rate, self.config.train.final_learning_rate
         return last + 0.5 * (first - last) * (1.0 + math.cos(math.pi * step / steps))
 
-    def _loss(self, stage: StageConfig, boundary: BoundarySamples) -> tuple[Tensor, int, dict[str, float]]:
-        """Return the weighted sum of the terms (eq. (2) and (3)), the folded stencils, and the unweighted terms."""
-        picks = boundary.sampler.draw(self.generator)
-        used, place = torch.unique(boundary.faces[picks].flatten(), return_inverse=True)
-        points = [self.stencils.shifted(self.generator), boundary.vertices[used]]
-        points += [boundary.vertices[index] for index in (boundary.corners, boundary.path) if index is not None]
-        nodes, surface, *held = self.network(torch.cat(points)).split([len(p) for p in points])
-        terms, folded = self._interior_terms(gather(nodes, self.stencils.index))
-        terms |= self._surface_terms(stage, boundary, gather(surface, place), picks)
-        terms |= self._held_terms(boundary, held)
-        weights = {name: getattr(stage.weights, name) for name in terms}
-        if "cor" in terms:
-            weights["cor"] = stage.weights.cor or stage.given_corner_weight
-        total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
-        return total, folded, {name: float(term.detach()) for name, term in terms.items()}
 
-    def _interior_terms(self, nodes: Tensor) -> tuple[dict[str, Tensor], int]:
-        """Return the terms of L_inner (section 4.4.2) on mapped stencils (r, 19, 3), and the number folded."""
-        cell, alpha = self.stencils.cell, self.config.train.min_det
-        jacobian = losses.stencil_jacobian(nodes, cell)
-        det = losses.determinant(jacobian)
-        terms = {
-            "bij": losses.bijectivity(det, alpha),
-            "arap": losses.distortion(jacobian, det, alpha / 2.0),
-            "fair": losses.fairness(nodes, cell),
-        }
-        return terms, losses.folded(det)
+def start_map(points: Array, start: int, turn: float) -> Array:
+    """Return the linear map (3, 3) of determinant 1 that makes a cloud of points (m, 3) equally wide in all directions.
 
-    def _surface_terms(
-        self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor
-    ) -> dict[str, Tensor]:
-        """Return the terms of L_bound (section 4.4.1) on the corners (3 t, 3) of the mapped triangles `picks` (t,)."""
-        goal = self._goal(stage, boundary, surface, picks)
-        normals = losses.triangle_normals(surface.view(-1, 3, 3))
-        goal_normals = losses.triangle_normals(goal.view(-1, 3, 3))
-        wrong_side = self.config.train.wrong_side if stage.target == "cube" else 0.0
-        return {
-            "dist": losses.distance(surface, goal),
-            "norm": losses.normal_difference(normals, goal_normals, wrong_side),
-            "star": losses.star_shape(surface.view(-1, 3, 3), normals),
-        }
-
-    def _held_terms(self, boundary: BoundarySamples, held: list[Tensor]) -> dict[str, Tensor]:
-        """Return the terms of L_bound for what is held: the mapped corners (8, 3), then the path points (k, 3)."""
-        terms = {}
-        if boundary.corners is not None:
-            terms["cor"] = losses.distance(held[0], self._corner_targets)
-        if boundary.path is not None and boundary.path_target is not None and boundary.path_following is not None:
-            terms["edge"] = losses.edge_path(held[1], boundary.path_target, boundary.path_following)
-        return terms
-
-    @torch.no_grad()
-    def _goal(self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor) -> Tensor:
-        """Nearest points of the target shape, on each triangle's own cube face once the surface is cut."""
-        if boundary.labels is None:
-            return nearest(stage.target, surface)
-        return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
-
-
-def start_map(points: Array, start: int) -> Array:
-    """Linear map (3, 3) of determinant 1 that makes a cloud of points (m, 3) as wide in all directions.
-
-    Symmetric for start 0; for the others the cloud is then turned by 45 degrees about the axes y, z and x in turn,
-    which leads the cube's edges over other parts of the surface.
+    It is symmetric for start 0. For each later start it then turns the cloud by `turn` degrees about one of the axes
+    y, z and x, which leads the cube's edges over other parts of the surface.
     """
     values, vectors = np.linalg.eigh(np.cov(points.T))
     whitening = (vectors * np.sqrt(values.prod() ** (1.0 / 3.0) / values)) @ vectors.T
-    turn = Rotation.from_rotvec(np.pi / 4.0 * np.eye(3)[start % 3] * (start > 0))
-    return np.asarray(turn.as_matrix() @ whitening)
+    rotation = Rotation.from_rotvec(np.radians(turn) * np.eye(3)[start % 3] * (start > 0))
+    return np.asarray(rotation.as_matrix() @ whitening)
 
 
 def _part(tensors: State, prefix: str) -> State:

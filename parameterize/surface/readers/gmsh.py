@@ -1,6 +1,6 @@
-"""Gmsh files before the parser: the sections a mesh needs, and node numbers it can make a table of.
+"""Gmsh files, read by meshio once the sections that hold the mesh, and its node numbers, are checked.
 
-The parser allocates up to the highest node number, so one damaged digit would take all memory.
+meshio allocates up to the highest node number, so one damaged digit would take all memory.
 """
 
 from __future__ import annotations
@@ -11,37 +11,42 @@ import numpy as np
 
 from ...arrays import IntArray
 from ..errors import MeshError
+from .cells import read_by_meshio
+from .common import Content
 
 NUMBERS_PER_NODE = 100  # the highest node number, over the number of nodes
 NUMBERS_AT_LEAST = 10_000_000
 
 
-def trim_gmsh(data: bytes) -> bytes:
-    """The sections $MeshFormat, $Nodes and $Elements of a .msh file of version 2.2 or 4.1, text or binary.
+def read_gmsh(data: bytes, _: int) -> Content:
+    """Read the sections $MeshFormat, $Nodes and $Elements of a .msh file of version 2.2 or 4.1, text or binary.
 
     Raises MeshError, without the file's name, for other versions, missing sections and damaged node rows.
     """
+    import meshio.gmsh
+
     form = re.match(rb"\s*\$MeshFormat\s+(\S+)\s+([01])\s+8", data)
     if not form:
         raise MeshError("not a .msh: no $MeshFormat; save as Gmsh 4.1")
     version = form.group(1).decode("latin-1")
     if version not in ("2", "2.1", "2.2", "4.1"):
-        raise MeshError(f"Gmsh format {version!r} is not read: save as Gmsh 4.1 or 2.2")
-    body = _section(data, b"Nodes")
-    blocks, binary = version == "4.1", form.group(2) == b"1"
+        raise MeshError(f"Gmsh format {version!r} is not supported: save as Gmsh 4.1 or 2.2")
+    number_rows = _block_numbers if version == "4.1" else _row_numbers
+    nodes = _section(data, b"Nodes")
     try:
-        numbers = (_block_numbers if blocks else _row_numbers)(body, binary)
+        numbers = number_rows(nodes, binary=form.group(2) == b"1")
     except (ValueError, IndexError, OverflowError, MemoryError):
         raise MeshError("damaged node rows in the .msh: export it again") from None
     highest = max(NUMBERS_AT_LEAST, NUMBERS_PER_NODE * len(numbers))
     if not len(numbers) or numbers.min() < 1 or numbers.max() > highest:
         raise MeshError(f"node numbers of the .msh must be 1 to {highest}: renumber the nodes, or export it again")
     parts = [(name, _section(data, name)) for name in (b"MeshFormat", b"Nodes", b"Elements")]
-    return b"".join(b"$%b\n%b$End%b\n" % (name, content, name) for name, content in parts)
+    trimmed = b"".join(b"$%b\n%b$End%b\n" % (name, content, name) for name, content in parts)
+    return read_by_meshio(trimmed, ".msh", meshio.gmsh.read)
 
 
 def _section(data: bytes, name: bytes) -> bytes:
-    """Bytes between the lines $name and $Endname."""
+    """Return the bytes between the lines $name and $Endname."""
     start = re.search(rb"\$%b\r?\n" % name, data)
     stop = data.find(b"$End" + name, start.end()) if start else -1
     if not start or stop < 0:
@@ -49,8 +54,8 @@ def _section(data: bytes, name: bytes) -> bytes:
     return data[start.end() : stop]
 
 
-def _row_numbers(body: bytes, binary: bool) -> IntArray:
-    """Version 2: the count, then rows `number x y z`, 28 bytes each when binary."""
+def _row_numbers(body: bytes, *, binary: bool) -> IntArray:
+    """Return the node numbers of version 2: the count, then rows `number x y z`, 28 bytes each when binary."""
     head, _, rows = body.partition(b"\n")
     count = int(head)
     if binary:
@@ -61,8 +66,8 @@ def _row_numbers(body: bytes, binary: bool) -> IntArray:
     return np.array([int(word) for word in words[::4]], dtype=np.int64)
 
 
-def _block_numbers(body: bytes, binary: bool) -> IntArray:
-    """Version 4.1: counts, then blocks of `dimension entity parametric count`, the numbers, the coordinates."""
+def _block_numbers(body: bytes, *, binary: bool) -> IntArray:
+    """Return those of version 4.1: counts, then blocks `dimension entity parametric count`, numbers, coordinates."""
     words = [] if binary else body.split()
     blocks = int(np.frombuffer(body, "<u8", 1)[0]) if binary else int(words[0])
     at, found = (32 if binary else 4), [np.empty(0, dtype=np.int64)]

@@ -1,41 +1,53 @@
-"""Medit files before the parser: the sections that hold a mesh, in the one layout it reads.
-
-The parser takes a section's name and its count on two lines for granted, and knows few of the format's other sections.
-"""
+"""Medit text: the sections that hold vertices and cells; others are skipped, and so are reference numbers."""
 
 from __future__ import annotations
 
 import re
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import IntArray
 from ..errors import MeshError
-from .headers import DAMAGED, header_count
+from .cells import from_cells
+from .common import DAMAGED, Content, header_count
+from .text import NUMBERS, WHOLE_NUMBERS, text_lines
 
-ASIDE = re.compile(rb'#[^\r\n]*|"[^"\r\n]*"')  # comments, and names of other files
-KEYWORD = re.compile(rb"(?<!\S)([A-Z][A-Za-z]{3,})(?!\S)")
-COLUMNS = {b"Vertices": 4, b"Triangles": 4, b"Quadrilaterals": 5, b"Tetrahedra": 5}  # the last is a reference number
-COLUMNS |= {b"Pyramids": 6, b"Prisms": 7, b"Hexahedra": 9}  # named by the refusal
+ASIDE = re.compile(r'#[^\n]*|"[^"\n]*"')  # comments, and names of other files
+KEYWORD = re.compile(r"(?<!\S)([A-Z][A-Za-z]{3,})(?!\S)")
+CELLS = {"Triangles": ("triangle", 3), "Quadrilaterals": ("quad", 4), "Tetrahedra": ("tetra", 4)}
+CELLS |= {"Pyramids": ("pyramid", 5), "Prisms": ("prism", 6), "Hexahedra": ("hexahedron", 8)}  # named by the refusal
 
 
-def trim_medit(data: bytes) -> bytes:
-    """Vertices and cells of a .mesh text of dimension 3; empty sections are left out.
+def read_medit(data: bytes, _: int) -> Content:
+    """Read vertices and cells of a .mesh text of dimension 3.
 
     Raises MeshError, without the file's name, for a file that is no such text or promises more than it holds.
     """
-    text = ASIDE.sub(b" ", data.removeprefix(b"\xef\xbb\xbf"))
-    before, *parts = KEYWORD.split(text)
-    if before.strip() or parts[:1] != [b"MeshVersionFormatted"]:
+    before, *parts = KEYWORD.split(ASIDE.sub(" ", "\n".join(text_lines(data))))
+    if before.strip() or parts[:1] != ["MeshVersionFormatted"]:
         raise MeshError("not a .mesh: expected the text format that starts with MeshVersionFormatted")
-    kept = [b"MeshVersionFormatted 2\nDimension 3\n"]
+    vertices = np.empty((0, 3))
+    cells: list[tuple[str, IntArray]] = []
     for name, body in zip(parts[::2], parts[1::2], strict=True):
-        if name == b"Dimension" and body.split() != [b"3"]:
+        words = body.split()
+        if name == "Dimension" and words != ["3"]:
             raise MeshError("the .mesh is not of dimension 3: export three coordinates each")
-        if name in COLUMNS:
-            words = body.split()
-            count = header_count(words[0] if words else b"")
-            size = count * COLUMNS[name]
-            if size > len(words) - 1:
-                promised = f"{count} {name.decode()}, {size} numbers"
-                raise MeshError(f".mesh promises {promised}, {len(words) - 1} follow; {DAMAGED}")
-            if count:
-                kept.append(b"%b\n%d\n%b\n" % (name, count, b" ".join(words[1 : size + 1])))
-    return b"".join(kept)
+        if name == "Vertices":
+            vertices = _table(name, words, 3, NUMBERS).astype(np.float64)
+        elif name in CELLS:
+            kind, size = CELLS[name]
+            cells.append((kind, _table(name, words, size, WHOLE_NUMBERS).astype(np.int64) - 1))
+    return from_cells(vertices, cells)
+
+
+def _table(name: str, words: list[str], columns: int, numbers: re.Pattern[str]) -> NDArray[np.str_]:
+    """Return the rows of a section (count, columns) without the reference number at the end of each, still as words."""
+    count = header_count(words[0] if words else "")
+    size = count * (columns + 1)
+    if size > len(words) - 1:
+        raise MeshError(f".mesh promises {count} {name}, {size} numbers, {len(words) - 1} follow; {DAMAGED}")
+    rows = words[1 : size + 1]
+    if count and not numbers.fullmatch(" ".join(rows)):
+        raise MeshError(f".mesh with a word that is not a number among its {name}; {DAMAGED}")
+    return np.array(rows, dtype=np.str_).reshape(count, columns + 1)[:, :-1]

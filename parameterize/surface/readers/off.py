@@ -1,58 +1,47 @@
-"""OFF before the parser: the same vertices and faces as OBJ records, each on the line it stands on in the file.
-
-Colours, normals and texture coordinates, which follow a row's coordinates or corners, are left out.
-"""
+"""OFF text: vertices and faces; the colours, normals and texture coordinates that may follow in a row are skipped."""
 
 from __future__ import annotations
 
 import re
 
-from ..errors import MeshError
-from .headers import DAMAGED, header_count
-from .obj import CORNER, face_record
+import numpy as np
+
+from ..errors import MeshError, check_face_count
+from .common import DAMAGED, Content, header_count
+from .text import coordinates, corners, text_lines
 
 HEADER = re.compile(r"(?:ST)?C?N?OFF", re.IGNORECASE)
 
 
-def off_to_obj(data: bytes) -> bytes:
-    r"""An OFF, COFF, NOFF, STOFF or a mixture of these as OBJ text; comments and \r line ends are taken as meant.
+def read_off(data: bytes, max_faces: int) -> Content:
+    """Read an OFF, COFF, NOFF or STOFF text, or a mixture of these; comments are skipped.
 
     Raises MeshError, without the file's name, for a file that is no such text, promises more rows than it holds, or
     has a face without its corners.
     """
-    text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    lines = [line.split("#", 1)[0] for line in text.split("\n")]
-    rows = [number for number, line in enumerate(lines) if line.strip()]
-    first = lines[rows[0]].lstrip() if rows else ""
-    header = HEADER.match(first)
+    lines = [line.split("#", 1)[0].strip() for line in text_lines(data)]
+    rows = [(number, line) for number, line in enumerate(lines, 1) if line]
+    header = HEADER.match(rows[0][1]) if rows else None
     if not header:
         raise MeshError(f"not an OFF: the first word must be OFF; {DAMAGED}")
-    lines[rows[0]] = first[header.end() :]  # the counts may follow on the same line
-    rows = rows if lines[rows[0]].strip() else rows[1:]
-    numbers = lines[rows[0]].split() if rows else []
-    if numbers[:1] == ["BINARY"]:
-        raise MeshError("a binary OFF is not read: save it as text")
-    if len(numbers) < 2:
+    same_line = rows[0][1][header.end() :].split()  # the counts may stand there or on the next line
+    rows = rows[1:]
+    counts = same_line or (rows.pop(0)[1].split() if rows else [])
+    if counts[:1] == ["BINARY"]:
+        raise MeshError("binary OFF is not supported: save it as text")
+    if len(counts) < 2:
         raise MeshError(f"OFF without the counts of vertices and faces; {DAMAGED}")
-    vertices, faces = header_count(numbers[0]), header_count(numbers[1])
-    present = len(rows) - 1
-    if present < vertices + faces:
-        raise MeshError(f"OFF promises {vertices} vertices and {faces} faces, {present} rows follow; {DAMAGED}")
-    records = [""] * len(lines)
-    for number in rows[1 : 1 + vertices]:
-        records[number] = "v " + lines[number]
-    for number in rows[1 + vertices : 1 + vertices + faces]:
-        records[number] = _face(lines[number].split(), number + 1)
-    return "\n".join(records).encode()
+    n, m = header_count(counts[0]), header_count(counts[1])
+    if len(rows) < n + m:
+        raise MeshError(f"OFF promises {n} vertices and {m} faces, {len(rows)} rows follow; {DAMAGED}")
+    check_face_count(m, max_faces)
+    vertices = np.array([coordinates(line.split(), number) for number, line in rows[:n]])
+    return Content(vertices.reshape(-1, 3), [_corners(line.split(), number) for number, line in rows[n : n + m]])
 
 
-def _face(words: list[str], number: int) -> str:
-    """The record of a row `n i_1 ... i_n ...`, numbers counted from 0; `number` is the line's."""
-    size = int(words[0]) if CORNER.fullmatch(words[0]) else 0
-    corners = words[1 : size + 1]
-    try:
-        if corners and len(corners) == size:
-            return face_record(corners)
-    except ValueError:
-        pass
-    raise MeshError(f"line {number}: a face needs its number of corners and as many vertices; {DAMAGED}")
+def _corners(words: list[str], line: int) -> list[int]:
+    """Return the vertex numbers of a row `n i_1 ... i_n ...`."""
+    size = int(words[0]) if words[0].isdecimal() and len(words[0]) < 4 else 0
+    if not 0 < size < len(words):
+        raise MeshError(f"line {line}: a face needs its number of corners and as many vertices; {DAMAGED}")
+    return corners(words[1 : size + 1], line)

@@ -1,67 +1,131 @@
-"""PLY text before the parser: its vertices and faces as OBJ records, whatever other properties stand beside them."""
+"""PLY, text and binary: the places of its vertices and the corners of its faces; other properties are skipped.
+
+Text is read here. Binary files are read by meshio where faces have their corners alone, whose number may differ, and
+by trimesh where faces have further properties, all faces then with the same number of corners.
+"""
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Iterator
+from dataclasses import dataclass
 
-from ..errors import MeshError
-from .headers import DAMAGED, header_count
-from .obj import face_record
+import numpy as np
 
-Properties = list[tuple[str, bool]]  # names in a row's order, and whether each is a list
+from ..errors import MeshError, check_face_count
+from .common import DAMAGED, Content, header_count, library
+from .text import coordinates, corners, text_lines
+
+SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
+SIZES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
+NUMBER = rb"\s+property\s+(?:float|float32|double|uchar|uint8|int|int32|uint|uint32)\s+\w+"
+PLACE = b"".join(rb"\s+property\s+(?:float|float32|double)\s+" + axis for axis in (b"x", b"y", b"z"))
+CORNERS = rb"\s+property\s+list\s+(?:uchar|uint8|int|int32)\s+u?int(?:32)?\s+vertex_ind(?:ex|ices)"
+CORNER_NAMES = {"vertex_index", "vertex_indices"}
+FOR_MESHIO = re.compile(
+    rb"\selement\s+vertex\s+\d+" + PLACE + b"(?:" + NUMBER + rb")*\s+element\s+face\s+\d+" + CORNERS + rb"\s*\Z"
+)
 
 
-def text_ply_to_obj(data: bytes) -> bytes | None:
-    """The records `v x y z` and `f a b ...` of a PLY of format ascii; None for a binary one.
+@dataclass(frozen=True)
+class Element:
+    """An element that the header names.
 
-    Each record stands on its line of the file, so that errors name it. The header must have been checked. Raises
-    MeshError, without the file's name, for rows without the properties that the header names.
+    properties: of each row, in order: name, whether it is a list, and the bytes of its number or its list's length.
     """
-    head = data.partition(b"end_header")[0]
-    if not re.search(rb"[\r\n]format[ \t]+ascii\b", head):
-        return None
-    text = data.decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
-    lines = [line.split() for line in text.split("\n")]
-    end = lines.index(["end_header"]) if ["end_header"] in lines else len(lines)
-    rows = (number for number in range(end + 1, len(lines)) if lines[number])
-    records = [""] * len(lines)
-    for name, count, properties in _elements(lines[:end]):
-        for _, number in zip(range(count), rows, strict=False):
-            if name in ("vertex", "face"):
-                try:
-                    held = _row(lines[number], properties)
-                    records[number] = _vertex(held) if name == "vertex" else _face(held)
-                except (LookupError, ValueError):
-                    raise MeshError(f"line {number + 1}: no {name} as the header promises; {DAMAGED}") from None
-    return "\n".join(records).encode()
+
+    name: str
+    count: int
+    properties: list[tuple[str, bool, int]]
 
 
-def _elements(lines: list[list[str]]) -> Iterator[tuple[str, int, Properties]]:
-    """Name, count and properties of each element of the header."""
-    starts = [i for i, words in enumerate(lines) if words[:1] == ["element"] and len(words) == 3]
-    for start, stop in zip(starts, [*starts[1:], len(lines)], strict=True):
-        rows = [words for words in lines[start + 1 : stop] if words[:1] == ["property"] and len(words) > 2]
-        yield lines[start][1], header_count(lines[start][2]), [(words[-1], words[1] == "list") for words in rows]
+def read_ply(data: bytes, max_faces: int) -> Content:
+    """Read a PLY. Raises MeshError, without the file's name, for a file that is none or promises more than it holds."""
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    head, mark, body = data.partition(b"end_header")
+    if not data.startswith(b"ply") or not mark:
+        raise MeshError(f"not a PLY: no header from 'ply' to 'end_header'; {DAMAGED}")
+    lines = [line.split() for line in text_lines(head)]
+    is_text = ["format", "ascii"] in [words[:2] for words in lines]
+    elements = _elements(lines)
+    counts = {element.name: element.count for element in elements}
+    if counts.get("tristrips"):
+        raise MeshError("PLY with triangle strips (element tristrips): save its faces as triangles")
+    if not counts.get("vertex") or not counts.get("face"):
+        found = f"{counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces"
+        raise MeshError(f"PLY with {found} is no surface: export the faces too")
+    check_face_count(counts["face"], max_faces)
+    if is_text:
+        rows = [(line, text.split()) for line, text in enumerate(text_lines(body), len(lines)) if text.strip()]
+        present, needed, unit = len(rows), sum(counts.values()), "rows"
+    else:
+        least = {element.name: sum(size for *_, size in element.properties) for element in elements}
+        present, needed, unit = len(body), sum(least[name] * count for name, count in counts.items()), "bytes"
+    if present < needed:
+        promised = " and ".join(f"{count} {name}" for name, count in counts.items())
+        raise MeshError(f"the header promises {promised}, at least {needed} {unit}, where {present} follow; {DAMAGED}")
+    return _read_rows(rows, elements) if is_text else _read_binary(data, head, counts["face"])
 
 
-def _row(words: list[str], properties: Properties) -> dict[str, list[str]]:
-    """The words of each property; raises LookupError and ValueError where there are fewer."""
+def _elements(lines: list[list[str]]) -> list[Element]:
+    """Return the elements that the words of the header's lines name, in order."""
+    elements: list[Element] = []
+    for words in lines:
+        if words[:1] == ["element"] and len(words) == 3:
+            elements.append(Element(words[1], header_count(words[2]), []))
+        elif words[:1] == ["property"] and len(words) > 2 and elements:
+            is_list = words[1] == "list"
+            elements[-1].properties.append((words[-1], is_list, SIZES.get(words[1 + is_list], 1)))
+    return elements
+
+
+def _read_rows(rows: list[tuple[int, list[str]]], elements: list[Element]) -> Content:
+    """Return what the rows of a text hold, each given by its line number and its words."""
+    places, polygons = [], []
+    for element in elements:
+        mine, rows = rows[: element.count], rows[element.count :]
+        for line, words in mine:
+            if element.name == "vertex":
+                places.append(coordinates(_wanted(words, element, line), line))
+            elif element.name == "face":
+                polygons.append(corners(_wanted(words, element, line), line))
+    return Content(np.array(places), polygons)
+
+
+def _wanted(words: list[str], element: Element, line: int) -> list[str]:
+    """Return the words of x, y and z in a vertex's row, or of the corners in a face's row."""
     held: dict[str, list[str]] = {}
     at = 0
-    for name, is_list in properties:
-        size = header_count(words[at]) if is_list else 1
-        at += is_list
-        held[name] = words[at : at + size]
-        if len(held[name]) < size:
-            raise LookupError(name)
-        at += size
-    return held
+    try:
+        for name, is_list, _ in element.properties:
+            size = header_count(words[at]) if is_list else 1
+            at += is_list
+            held[name] = words[at : at + size]
+            at += size
+        if at <= len(words):
+            return (
+                held["x"] + held["y"] + held["z"]
+                if element.name == "vertex"
+                else held["vertex_index" if "vertex_index" in held else "vertex_indices"]
+            )
+    except (LookupError, MeshError):
+        pass
+    raise MeshError(f"line {line}: no {element.name} as the header promises; {DAMAGED}")
 
 
-def _vertex(held: dict[str, list[str]]) -> str:
-    return f"v {held['x'][0]} {held['y'][0]} {held['z'][0]}"
+def _read_binary(data: bytes, head: bytes, promised: int) -> Content:
+    """Read a binary file of so many faces, whose header, up to `end_header`, is `head`."""
+    import meshio
+    import trimesh.exchange.ply
 
-
-def _face(held: dict[str, list[str]]) -> str:
-    return face_record(held["vertex_index" if "vertex_index" in held else "vertex_indices"])
+    with library(".ply"):
+        if FOR_MESHIO.search(head):
+            renamed = re.sub(rb"\bvertex_index\b", b"vertex_indices", head) + data[len(head) :]
+            mesh = meshio.read(io.BytesIO(renamed), file_format="ply")
+            places, polygons = mesh.points, [row for block in mesh.cells for row in block.data.tolist()]
+        else:
+            held = trimesh.exchange.ply.load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
+            places, polygons = held["vertices"], held["faces"].astype(np.int64).tolist()
+    if len(polygons) < promised:
+        raise MeshError(f"{promised} faces promised, {len(polygons)} read; {DAMAGED}")
+    return Content(np.asarray(places, dtype=np.float64), polygons)

@@ -1,17 +1,62 @@
-"""STL text before the parser: the solids without their names, which may hold any words, nor what stands before them."""
+"""STL, text and binary, read by trimesh once the counts are checked.
+
+Of a text, the names of the solids, which may be any words, and what stands before the first one are cut out first.
+"""
 
 from __future__ import annotations
 
+import io
 import re
+
+import numpy as np
+
+from ..errors import MeshError, check_face_count
+from .common import DAMAGED, Content, library
 
 SOLID = re.compile(rb"^[ \t]*((?:end)?solid)\b.*$", re.IGNORECASE | re.MULTILINE)
 BEFORE = 4096  # bytes in which the first solid begins
 
 
-def trim_stl(data: bytes) -> bytes:
-    r"""An STL text with \n line ends that begins with `solid`; anything else as it is."""
-    if b"\0" in data or len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
-        return data
+def read_stl(data: bytes, max_faces: int) -> Content:
+    """Read the triangles of an STL; each has vertices of its own.
+
+    Raises MeshError, without the file's name, for a file whose size or number of corners does not fit its facets.
+    """
+    import trimesh
+
+    promised = int.from_bytes(data[80:84], "little")
+    expected = 84 + 50 * promised
+    is_binary = len(data) == expected
+    text = data if is_binary or b"\0" in data else _trimmed(data)
+    says_solid = text[:512].lstrip().lower().startswith(b"solid")
+    if not is_binary and says_solid and b"\0" not in data:
+        promised = _facets(text)
+    elif len(data) < 84:
+        raise MeshError(f"not an STL: {len(data)} bytes, the header alone takes 84; {DAMAGED}")
+    elif not is_binary:
+        raise MeshError(f"STL of {promised} triangles must have {expected} bytes, this one has {len(data)}; {DAMAGED}")
+    check_face_count(promised, max_faces)
+    with library(".stl"):
+        mesh = trimesh.load_mesh(io.BytesIO(text), file_type="stl", process=False)
+        vertices, triangles = np.array(mesh.vertices, dtype=np.float64), mesh.faces.tolist()
+    if len(triangles) < promised:
+        raise MeshError(f"{promised} faces promised, {len(triangles)} read; {DAMAGED}")
+    return Content(vertices, triangles, ("binary STL although it starts with 'solid'",) * (is_binary and says_solid))
+
+
+def _trimmed(data: bytes) -> bytes:
+    r"""Return a text that begins with `solid`, its lines ended by \n and its solids without names; others as it is."""
     text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     first = SOLID.search(text[:BEFORE])
     return SOLID.sub(rb"\1", text[first.start() :]) if first else data
+
+
+def _facets(text: bytes) -> int:
+    """Return the number of facets; raise MeshError where their beginnings, ends and corners do not match."""
+    lower = text.lower()
+    facets = len(re.findall(rb"\bendfacet\b", lower))
+    opened = len(re.findall(rb"\bfacet\s+normal\b", lower))
+    corners = len(re.findall(rb"\bvertex\s", lower))
+    if b"endsolid" not in lower or opened != facets or corners != 3 * facets:
+        raise MeshError(f"STL text with {opened} facets begun, {facets} ended and {corners} corners; {DAMAGED}")
+    return facets

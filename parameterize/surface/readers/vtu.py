@@ -1,4 +1,4 @@
-"""A limit on what the compressed arrays of a .vtu unpack to: meshio takes whatever is in them.
+"""VTK's .vtu, read by meshio once what it declares, and what its compressed arrays unpack to, is within the limits.
 
 A few kilobytes can hold gigabytes of zeros; what a block really unpacks to is known only while it is unpacked.
 """
@@ -6,39 +6,77 @@ A few kilobytes can hold gigabytes of zeros; what a block really unpacks to is k
 from __future__ import annotations
 
 import lzma
+import re
 import zlib
+from base64 import b64decode
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import SimpleNamespace
 from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
 
 from ..errors import MeshError
+from .cells import read_by_meshio
+from .common import DAMAGED, Content, library, most_bytes
+
+UNPACKERS: dict[str, Callable[[], Any]] = {
+    "vtkZLibDataCompressor": zlib.decompressobj,
+    "vtkLZMADataCompressor": lzma.LZMADecompressor,
+}
 
 
-@contextmanager
-def unpacking_at_most(limit: int) -> Iterator[None]:
-    """Within the block, meshio's reader raises MeshError where a .vtu unpacks to more than `limit` bytes in all."""
-    from meshio.vtu import _vtu
+def read_vtu(data: bytes, max_faces: int) -> Content:
+    """Read a .vtu of one piece; raise MeshError, without the file's name, where it is not whole or too large."""
+    import meshio.vtu
 
+    if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
+        raise MeshError(f"not a whole .vtu: no <VTKFile> ... </VTKFile>; {DAMAGED}")
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise MeshError("the .vtu declares a document type, whose entities are not expanded: remove the declaration")
+    pieces = len(re.findall(rb"<Piece\b", data))
+    if pieces > 1:
+        raise MeshError(
+            f"the .vtu holds {pieces} pieces: merge them into one, in ParaView with Merge Blocks, and save it"
+        )
+    _check_unpacked(data, most_bytes(max_faces))
+    return read_by_meshio(data, ".vtu", meshio.vtu.read)
+
+
+def _check_unpacked(data: bytes, limit: int) -> None:
+    """Raise MeshError where the compressed arrays unpack to more than `limit` bytes in all."""
     left = limit
+    with library(".vtu"):
+        head, _, rest = data.partition(b"<AppendedData")
+        root = ElementTree.fromstring(head + b"</VTKFile>" if rest else data)  # noqa: S314 - it has no entities
+        if "compressor" not in root.attrib:
+            return
+        tag, _, appended = rest.partition(b"_")
+        order = ">" if root.get("byte_order") == "BigEndian" else "<"
+        word = np.dtype(order + ("u8" if root.get("header_type") == "UInt64" else "u4"))
+        for array in root.iter("DataArray"):
+            form = array.get("format")
+            inline = (array.text or "").strip().encode() if form == "binary" else b""
+            packed = appended[int(array.attrib["offset"]) :] if form == "appended" else inline
+            for block in _blocks(packed, word, is_raw=b"raw" in tag and form == "appended") if packed else ():
+                unpacker = UNPACKERS[root.attrib["compressor"]]()
+                left -= len(unpacker.decompress(block, max_length=left + 1))
+                if left < 0:
+                    raise ValueError(f"unpacks to more than {limit} bytes")
+                if unpacker.unused_data:
+                    raise ValueError("an array holds more than its blocks")
 
-    def capped(unpacker: Callable[[], Any]) -> SimpleNamespace:
-        def decompress(packed: bytes) -> bytes:
-            nonlocal left
-            stream = unpacker()
-            data: bytes = stream.decompress(packed, max_length=left + 1)
-            left -= len(data)
-            if left < 0:
-                raise MeshError(f"unpacks to more than {limit} bytes")
-            if not stream.eof:
-                raise MeshError("an array of it ends too early")
-            return data
 
-        return SimpleNamespace(decompress=decompress)
+def _blocks(packed: bytes, word: np.dtype[Any], *, is_raw: bool) -> Iterator[bytes]:
+    """Yield the compressed blocks of an array: behind their number, two sizes and theirs, base64 or raw."""
 
-    before = _vtu.zlib, _vtu.lzma
-    _vtu.zlib, _vtu.lzma = capped(zlib.decompressobj), capped(lzma.LZMADecompressor)
-    try:
-        yield
-    finally:
-        _vtu.zlib, _vtu.lzma = before
+    def place(size: int) -> int:
+        return size if is_raw else -(-size // 3) * 4
+
+    decode = bytes if is_raw else b64decode
+    count = int(np.frombuffer(decode(packed[: place(word.itemsize)])[: word.itemsize], word)[0])
+    table = (3 + count) * word.itemsize
+    sizes = np.frombuffer(decode(packed[: place(table)])[:table], word)[3:]
+    body = decode(packed[place(table) :])
+    ends = np.cumsum(sizes, dtype=word)
+    for start, end in zip([0, *ends], ends, strict=False):
+        yield body[start:end]

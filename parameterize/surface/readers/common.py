@@ -1,0 +1,57 @@
+"""What the readers of all formats share: what they return, how they count, and how a library's errors are told."""
+
+from __future__ import annotations
+
+import io
+import logging
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+
+from ...arrays import Array
+from ..errors import MeshError
+
+DAMAGED = "the file is truncated or damaged, export it again"
+BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
+BYTES_AT_LEAST = 64 << 20
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """What a surface file holds.
+
+    vertices: (n, 3). polygons: the vertex numbers of each face, counted from 0; they may be out of range.
+    notices: what the user should know about how the file was read, one line each.
+    """
+
+    vertices: Array
+    polygons: list[list[int]]
+    notices: tuple[str, ...] = ()
+
+
+def most_bytes(max_faces: int) -> int:
+    """Return how many bytes a file of `max_faces` faces may take, packed or unpacked."""
+    return BYTES_AT_LEAST + BYTES_PER_FACE * max_faces
+
+
+def header_count(word: str) -> int:
+    """Return the number of elements that a word of the header gives; raise MeshError where it is no number."""
+    if not re.fullmatch(r"\d{1,18}", word, re.ASCII):
+        raise MeshError(f"the header's count {word[:20]!r} is not a number of elements; {DAMAGED}")
+    return int(word)
+
+
+@contextmanager
+def library(suffix: str) -> Iterator[None]:
+    """Raise MeshError for whatever a library's parser raises in the block, which neither prints nor logs."""
+    logger = logging.getLogger("trimesh")
+    before, logger.disabled = logger.disabled, True
+    try:
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            yield
+    except Exception as error:  # a parser may fail on a damaged file in any way
+        first = (str(error).strip().splitlines() or [type(error).__name__])[0][:120]
+        raise MeshError(f"not readable as {suffix} ({first}); {DAMAGED}") from None
+    finally:
+        logger.disabled = before
