@@ -94,20 +94,13 @@ if TYPE_CHECKING:
     from .surface.surface import MeshError, Surface, load_surface, surface_from_arrays
 
 _HOME = {
-    "BSplineVolume": "spline.volume",
-    "BoundaryMap": "cube.boundary_map",
-    "Certificate": "certificate.jacobian",
-    "Config": "config",
-    "MeshError": "surface.surface",
-    "Parameterization": "run",
-    "QualityReport": "quality.quality",
-    "Surface": "surface.surface",
-    "certify": "certificate.jacobian",
-    "load_surface": "surface.surface",
-    "measure": "quality.quality",
-    "parameterize": "run",
-    "preset": "config",
-    "surface_from_arrays": "surface.surface",
+    "certificate.jacobian": ("Certificate", "certify"),
+    "config": ("Config", "preset"),
+    "cube.boundary_map": ("BoundaryMap",),
+    "quality.quality": ("QualityReport", "measure"),
+    "run": ("Parameterization", "parameterize"),
+    "spline.volume": ("BSplineVolume",),
+    "surface.surface": ("MeshError", "Surface", "load_surface", "surface_from_arrays"),
 }
 
 __all__ = [
@@ -130,8 +123,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Load a public name from the module it lives in (PEP 562)."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'parameterize' has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-    globals()[name] = value
-    return value
+    for home, names in _HOME.items():
+        if name in names:
+            return getattr(import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module 'parameterize' has no attribute {name!r}")

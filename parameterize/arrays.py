@@ -1,4 +1,4 @@
-"""What most functions take and return: two kinds of arrays; and how a point is written."""
+"""The two kinds of arrays that most functions take and return, and how a point is written."""
 
 from __future__ import annotations
 
@@ -12,5 +12,5 @@ IntArray = NDArray[np.int64]
 
 
 def in_brackets(point: Iterable[float]) -> str:
-    """The three coordinates of a point for a reader: "(0.25, 1, -3.5e-07)"."""
+    """Return the three coordinates of a point as text: "(0.25, 1, -3.5e-07)"."""
     return "({:.6g}, {:.6g}, {:.6g})".format(*point)

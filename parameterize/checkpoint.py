@@ -43,7 +43,7 @@ class Checkpoints:
                 path.unlink()
 
     def of_start(self, start: int) -> Checkpoints:
-        """The same, with files of their own for another start of the run than the first, number 0."""
+        """Return the checkpoints of another start of the run, in files of their own; the first start is number 0."""
         other = copy(self)
         other._suffix = f"-{start}" if start else ""
         return other
@@ -60,7 +60,7 @@ class Checkpoints:
         save_bytes(self._folder / f"{name}{self._suffix}.safetensors", content)
 
     def load(self, name: str) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
-        """Tensors and state of checkpoint `name`; None where there is none or the run starts afresh.
+        """Return the tensors and the state of checkpoint `name`, or None where there is none or the run starts afresh.
 
         Raises CheckpointError naming what differs, or for an unreadable file.
         """
@@ -90,12 +90,12 @@ class Checkpoints:
 
 
 def _digest(tensors: Mapping[str, Tensor], header: Mapping[str, str]) -> str:
-    """SHA-256 of everything a checkpoint holds."""
+    """Return the SHA-256 of everything that a checkpoint holds."""
     return hashlib.sha256(to_bytes(dict(tensors)) + json.dumps(header, sort_keys=True).encode()).hexdigest()
 
 
 def _differing(wanted: Any, found: Any) -> list[str]:
-    """Dotted names of the entries that are not equal in two tables of plain JSON values."""
+    """Return the dotted names of the entries in which two tables of plain JSON values differ."""
     names: list[str] = []
     for key in sorted(wanted.keys() | found.keys()):
         ours, theirs = wanted.get(key), found.get(key)

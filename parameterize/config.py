@@ -143,7 +143,7 @@ class Config:
     starts: int = 2  # a map that is not certified is tried anew with the cube turned, so many times in all
 
     def scaled(self, factor: float) -> Config:
-        """The same run with every stage shortened (or lengthened) by `factor` (at most 100); at least one step each."""
+        """Return the same options with `factor` (at most 100) times as many steps in every stage, at least one each."""
         if not 0.0 < factor <= 100.0:
             raise ValueError(f"steps factor must be positive and at most 100, got {factor}")
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
@@ -151,12 +151,12 @@ class Config:
         return replace(self, stages=stages, spline=spline)
 
     def with_control_points(self, n: int) -> Config:
-        """The same run with n x n x n control points."""
+        """Return the same options with n x n x n control points."""
         return replace(self, spline=replace(self.spline, control_points=n))
 
 
 def _stages(steps: tuple[int, int, int, int, int]) -> tuple[StageConfig, ...]:
-    """Section 4.3.1 with Table 1's weights; S(2) and S(1) together are the paper's first stage."""
+    """Return the stages of section 4.3.1 with the weights of Table 1; S(2) and S(1) are the paper's first stage."""
     free, tight = StageWeights(), StageWeights(dist=1e4, cor=1e3)
     return (
         StageConfig("S(2)", "S(2)", steps[0], free),
@@ -183,7 +183,7 @@ PRESETS = {
 
 
 def preset(name: str) -> Config:
-    """The named preset: "fast" (default, made for two CPU cores) or "paper". Raises ValueError for another name."""
+    """Return the preset "fast" (the default, made for two CPU cores) or "paper"; raise ValueError for another name."""
     if name not in PRESETS:
         raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")
     return PRESETS[name]

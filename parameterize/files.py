@@ -40,7 +40,7 @@ def save_text(path: str | Path, text: str) -> None:
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """A temporary name beside `target`, of the same suffix, for the block to write to; then it is renamed.
+    """Yield a temporary name beside `target`, of the same suffix, to write to; the file is renamed after the block.
 
     Raises OSError naming the target; where the block fails, the target stays as it was.
     """
@@ -56,7 +56,7 @@ def replacing(target: Path) -> Iterator[Path]:
 
 
 def unfinished(target: Path) -> list[Path]:
-    """What processes that were killed while they wrote `target` left beside it."""
+    """Return the files left beside `target` by processes that were killed while they wrote it."""
     return list(target.parent.glob(f".{escape(target.stem)}.*.part{escape(target.suffix)}"))
 
 
@@ -88,7 +88,7 @@ def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[A
 
 
 def _read_array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
-    """One array; its header is compared with the size before any memory is taken for it."""
+    """Return one array, once its header agrees with its size: before that no memory is allocated."""
     with archive.open(entry) as stream:
         read_header = npy.read_array_header_1_0 if npy.read_magic(stream) == (1, 0) else npy.read_array_header_2_0
         shape, _, dtype = read_header(stream)

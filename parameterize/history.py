@@ -1,4 +1,4 @@
-"""History: what every step of a run says of itself, as history.npz holds it."""
+"""History: loss, folds and terms of every step of a run, as history.npz holds them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class History:
         self.rows.append((stage, step, loss, folded, terms))
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Columns of equal length; NaN where a term is not used."""
+        """Return columns of equal length, with NaN where a term is not used."""
         names = sorted({name for row in self.rows for name in row[4]})
         columns: dict[str, np.ndarray] = {
             "stage": np.array([row[0] for row in self.rows]),

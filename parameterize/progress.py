@@ -1,4 +1,4 @@
-"""What a long run tells its caller after each step."""
+"""Progress: what a long run reports to its caller after each step."""
 
 from __future__ import annotations
 
@@ -29,4 +29,4 @@ ProgressCallback = Callable[[Progress], None]
 
 
 def ignore(_: Progress) -> None:
-    """The callback of a silent run."""
+    """Do nothing: the callback of a silent run."""

@@ -49,7 +49,7 @@ def test_options_reach_the_gate(an_empty_folder):
     write_obj(sample("cube"), an_empty_folder / "block.obj")
     with pytest.raises(MeshError, match="more than max_faces=10"):
         resolve("block.obj", max_faces=10)
-    with pytest.raises(MeshError, match="no component 3"):
+    with pytest.raises(MeshError, match="component 3 does not exist"):
         resolve("block.obj", component=3)
 
 

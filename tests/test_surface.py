@@ -135,7 +135,7 @@ REFUSED = {
     "two_corners.obj": (obj() + "f 1 2\n", "line 15: a face has 2 corners"),
     "corners.obj": (obj() + "f" + " 1 2 3" * 100 + "\n", "a face has 300 corners, more than 256"),
     "short_row.ply": (ply().replace(b"\n3 0 2 3\n", b"\n36\n"), "line 18: no face as the header promises"),
-    "pair.ply": (ply(faces=[*QUADS, [0, 1]], binary=True), "a face with 2 corners, expected at least 3"),
+    "pair.ply": (ply(faces=[*QUADS, [0, 1]], binary=True), "a face has 2 corners, expected at least 3"),
     "zero.obj": (obj() + "f 0 1 2\n", "vertex number 0"),
     "nan.obj": (obj(NOT_A_NUMBER), "1 vertices with NaN or infinite coordinates, the first is vertex 3"),
     "infinite.obj": (obj().replace("v 0.0 0.0 0.0", "v 1e999 0 0"), "1 vertices with NaN or infinite"),
@@ -158,7 +158,7 @@ REFUSED = {
     "cut.ply": (ply()[:-40], "at least 20 rows, where 15 follow"),
     "cut_binary.ply": (ply(binary=True)[:-30], "truncated or damaged"),
     "cut.off": (off()[:-30], "rows follow"),
-    "points.ply": (ply(faces=np.empty((0, 3), int)), "8 vertices and 0 faces is no surface"),
+    "points.ply": (ply(faces=np.empty((0, 3), int)), "8 vertices and 0 faces, a surface needs both"),
     "strips.ply": (ply().replace(b"element face", b"element tristrips"), "triangle strips"),
     "billion.ply": (ply(counts=(10**9, 12)), "at least 1000000012 rows"),
     "billion_binary.ply": (ply(counts=(8, 500_000), binary=True), "at least 500096 bytes"),
@@ -175,7 +175,10 @@ REFUSED = {
         "node numbers of the .msh must be 1 to 10000000",
     ),
     "old.msh": ("$MeshFormat\n4 0 8\n$EndMeshFormat\n", "Gmsh format '4' is not supported"),
-    "cut.msh": ("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 8 1 8\n", "without the whole section $Nodes"),
+    "cut.msh": (
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 8 1 8\n",
+        "section $Nodes of the .msh is missing or cut off",
+    ),
     "many.vtu": (
         '<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="1000000000" NumberOfCells="1">'
         '<Points><DataArray type="Float64" NumberOfComponents="3">0 0 0</DataArray>'
@@ -321,7 +324,7 @@ def test_lists_components_and_takes_the_one_asked_for():
     assert len(small.faces) == 80
     assert any("component 1 taken of 2" in line for line in small.notices)
     assert surface_from_arrays(*pair, component=0).center == pytest.approx([5, 0, 0], abs=0.05)
-    with pytest.raises(MeshError, match="no component 2: counted from 0 there are 2"):
+    with pytest.raises(MeshError, match="component 2 does not exist: there are 2, counted from 0"):
         surface_from_arrays(*pair, component=2)
 
 

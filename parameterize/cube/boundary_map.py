@@ -56,7 +56,7 @@ class BoundaryMap:
 
     @cached_property
     def cube_faces(self) -> NDArray[np.int64]:
-        """The cube face of each triangle, (m,) indices into FACE_NAMES; the first one where a sliver lies on an edge.
+        """Return the cube face of each triangle, (m,) indices into FACE_NAMES; the first of two on an edge.
 
         Raises ValueError where the corners of a triangle share no face.
         """
@@ -101,5 +101,5 @@ def _rows_of_three(values: Array, name: str) -> Array:
 
 
 def _on_faces(parameters: Array) -> NDArray[np.bool_]:
-    """Which of the six cube faces each parameter lies on, (n, 6) in the order of FACE_NAMES."""
+    """Return which of the six cube faces each parameter lies on, (n, 6) in the order of FACE_NAMES."""
     return np.stack([parameters == 0.0, parameters == 1.0], axis=-1).reshape(-1, len(FACE_NAMES))

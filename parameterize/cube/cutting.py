@@ -30,7 +30,7 @@ class CutMesh:
     share: Array
 
     def carry(self, values: Array) -> Array:
-        """Values at the input's vertices (n_input, k), interpolated along the split edges: (n, k)."""
+        """Return values (n, k) at all vertices, interpolated along split edges from those of the input (n_input, k)."""
         result = np.empty((len(self.parents), values.shape[1]))
         n = len(values)
         result[:n] = values
@@ -75,7 +75,7 @@ def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tu
 def _crossings(
     height: Array, position: Array, faces: IntArray, axes: tuple[int, int, int], snap: float
 ) -> tuple[IntArray, Array]:
-    """Mesh edges (k, 2) to split at the plane, and where (k,): of triangles that a cube edge's half plane crosses.
+    """Return the mesh edges (k, 2) to split, of triangles that a cube edge's half plane crosses, and the places (k,).
 
     A triangle meets the plane in a segment. It is left whole only where that segment stays beyond one of the cube's
     corners; so, after all planes, no half plane passes through the inside of a triangle.
@@ -97,7 +97,7 @@ def _crossings(
 
 
 def split_edges(faces: IntArray, edges: IntArray, first_new: int) -> IntArray:
-    """Faces after putting vertex `first_new + i` on edge i (given once, smaller index first); (m, 3) -> (m', 3).
+    """Return the faces (m', 3) once vertex `first_new + i` stands on edge i, which is given once, smaller number first.
 
     One split edge of a triangle gives two triangles, two give three, three give four.
     """

@@ -35,7 +35,7 @@ class CubeSurface:
 
 
 def choose_corners(mapped: Array) -> IntArray:
-    """The vertex farthest towards each corner of the cube: argmax <v - A, P - A>, eight different vertices."""
+    """Return the vertices (8,) farthest towards the cube's corners, argmax <v - A, P - A>, all different."""
     reach = (mapped - 0.5) @ (CORNERS - 0.5).T  # (n, 8)
     candidates = np.unique(np.argsort(-reach, axis=0)[:8])
     rows, columns = linear_sum_assignment(-reach[candidates])
@@ -60,7 +60,7 @@ def cut_surface(mapped: Array, faces: IntArray, corners: IntArray) -> CubeSurfac
 
 
 def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
-    """Disjoint paths along mesh edges, one a cube edge; where one finds no way, it is traced first in the next try."""
+    """Return disjoint paths along mesh edges, one for each cube edge; one that is blocked is traced first next time."""
     order = list(range(len(EDGES)))
     for _ in range(LAYOUT.orders):
         paths, blocked = _trace_in_order(position, faces, corners, order)
@@ -75,7 +75,7 @@ def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[In
 def _trace_in_order(
     position: Array, faces: IntArray, corners: IntArray, order: list[int]
 ) -> tuple[dict[int, IntArray], int | None]:
-    """Shortest paths, made dear away from the cube edge they stand for; and the first edge that found no way."""
+    """Return the shortest paths, which cost more away from their cube edge, and the first edge that found no way."""
     edges = edge_table(faces)[0]
     length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
     radial = 0.5 + project_radially(position - 0.5)
@@ -108,7 +108,7 @@ def _distance_to_segment(points: Array, start: Array, end: Array) -> Array:
 
 
 def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntArray:
-    """Flood-fill the triangles between the paths; label each of the six patches by its four corners."""
+    """Return the cube face (m,) of each triangle: the paths bound six patches, each known by its four corners."""
     on_path = {
         tuple(sorted(pair)) for path in paths for pair in zip(path[:-1].tolist(), path[1:].tolist(), strict=True)
     }
@@ -133,14 +133,14 @@ def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntAr
 
 
 def _mirrored(faces: IntArray, labels: IntArray, path: IntArray) -> bool:
-    """Whether the face to the left of the path from corner (0,0,0) to (0,0,1), seen from outside, is not u0."""
+    """Return whether the face to the left of the path from corner (0,0,0) to (0,0,1), seen from outside, is not u0."""
     sides = directed_edges(faces)
     left = np.flatnonzero((sides == path[:2]).all(axis=1))[0] // 3
     return bool(labels[left] != 0)
 
 
 def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array, IntArray]:
-    """Path vertices (k,), targets on the cube's edges by mapped arc length (k, 3), pairs of neighbours (s, 2)."""
+    """Return path vertices (k,), their targets on the cube's edges by arc length (k, 3), neighbouring pairs (s, 2)."""
     vertices: list[IntArray] = []
     targets: list[Array] = []
     following: list[IntArray] = []

@@ -34,7 +34,7 @@ def flipped(places: Array, faces: IntArray) -> NDArray[np.bool_]:
 
 
 def new_flips(before: Array, after: Array, faces: IntArray) -> NDArray[np.bool_]:
-    """Which points (n,) must stay so that no further triangle flips when the others go from `before` to `after`."""
+    """Return which points (n,) must stay so that no further triangle flips when the others go to `after`."""
     stay, allowed = np.zeros(len(before), dtype=bool), flipped(before, faces)
     for _ in range(LAYOUT.held_rounds):
         bad = flipped(np.where(stay[:, None], before, after), faces) & ~allowed

@@ -57,7 +57,7 @@ def lay_out(mapped: Array, vertices: Array, faces: IntArray, corners: IntArray) 
 
 
 def _bridges(patch: IntArray, fixed: NDArray[np.bool_]) -> IntArray:
-    """Inner edges (k, 2) between two vertices of the rim: a triangle of such edges could end up flat."""
+    """Return the inner edges (k, 2) between two vertices of the rim: a triangle of such edges could end up flat."""
     edges, count = edge_table(patch)
     return edges[(count == 2) & fixed[edges].all(axis=1)]
 
@@ -78,9 +78,10 @@ def _spread(places: Array, vertices: Array, patch: IntArray, fixed: NDArray[np.b
 
 
 def _combinations(flat: Array, vertices: Array, triangles: IntArray) -> csr_array:
-    """Weights (n, n) of the neighbours in each vertex's place, rows of sum 1: mean value coordinates.
+    """Return the mean value coordinates of each vertex, (n, n): the weights of its neighbours, which sum to 1.
 
-    Of the places (n, 2) where the triangles around a vertex lie side by side, else of the surface's triangles.
+    They are computed from the places (n, 2) where the triangles around the vertex do not overlap there, and otherwise
+    from the triangles of the surface itself.
     """
     turned = np.zeros(len(flat), dtype=bool)
     ab, ac = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
@@ -99,7 +100,7 @@ def _combinations(flat: Array, vertices: Array, triangles: IntArray) -> csr_arra
 
 
 def _half_tangents(points: Array, i: IntArray, j: IntArray, k: IntArray) -> tuple[Array, Array]:
-    """tan(angle / 2) at corner i over the lengths of i-j and i-k."""
+    """Return tan(angle / 2) at corner i, divided by the length of i-j and by that of i-k."""
     to_j, to_k = points[j] - points[i], points[k] - points[i]
     length_j, length_k = (np.maximum(np.linalg.norm(d, axis=1), _TINY) for d in (to_j, to_k))
     cosine = (to_j * to_k).sum(axis=1) / (length_j * length_k)

@@ -31,13 +31,13 @@ class Distances:
 
     @classmethod
     def of(cls, values: Array) -> Distances:
-        """From distances (m,); each counts the same. Raises ValueError when there are none."""
+        """Summarise distances (m,), each with the same weight; raise ValueError when there are none."""
         if values.size == 0:
             raise ValueError("there are no distances to summarise: the list of points is empty")
         return cls(float(np.sqrt(np.mean(values**2))), float(np.mean(values)), float(np.max(values)))
 
     def scaled(self, scale: float) -> Distances:
-        """The same distances in another unit of length."""
+        """Return the same distances in another unit of length."""
         return Distances(scale * self.rms, scale * self.mean, scale * self.max)
 
 
@@ -70,12 +70,12 @@ class SampledBoundary:
 
 
 def to_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Distance of each point (m, 3) to the nearest point of a triangle mesh: (m,)."""
+    """Return the distance of each point (m, 3) to the nearest point of a triangle mesh: (m,)."""
     return _closest(points, vertices, faces)[0]
 
 
 def nearest_on_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, Array]:
-    """The nearest point of a triangle mesh to each point (m, 3), and the normal of its triangle, of length 1."""
+    """Return the nearest point of a triangle mesh to each point (m, 3), and the unit normal of its triangle."""
     _, triangle, weights = _closest(points, vertices, faces)
     corners = vertices[faces[triangle]]  # (m, 3, 3)
     cross = doubled_areas(vertices, faces[triangle])
@@ -84,14 +84,14 @@ def nearest_on_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) ->
 
 
 def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> Array:
-    """Distance of each point (m, 3) to the boundary of the spline: (m,)."""
+    """Return the distance of each point (m, 3) to the boundary of the spline: (m,)."""
     return foot_points(points, volume, boundary)[2]
 
 
 def foot_points(
     points: Array, volume: BSplineVolume, boundary: SampledBoundary
 ) -> tuple[Array, NDArray[np.int64], Array]:
-    """Closest points of the spline's boundary to points (m, 3): parameters (m, 3), cube faces (m,), distances (m,).
+    """Return parameters (m, 3), cube faces (m,) and distances (m,) of the boundary's closest points to points (m, 3).
 
     The nearest point of the sampled triangles gives a cube face and parameters on it; Gauss-Newton steps in that face
     then lower the distance to the spline itself. The distances are to points of the spline's boundary, so never less
@@ -130,7 +130,7 @@ def _foot_step(volume: BSplineVolume, where: Array, points: Array, axis: NDArray
 
 
 def _closest(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64], Array]:
-    """For each point (m, 3) the distance (m,) to the mesh, the nearest triangle (m,), barycentric weights (m, 3)."""
+    """Return for points (m, 3) the distance (m,) to the mesh, the nearest triangle (m,), barycentric weights (m, 3)."""
     target = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int64)
     squared, index, foot = igl.point_mesh_squared_distance(

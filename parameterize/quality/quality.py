@@ -66,7 +66,7 @@ class QualityReport:
     samples_per_face: int = SAMPLES
 
     def as_dict(self) -> dict[str, Any]:
-        """The section in plain Python types, ready for JSON; a bound that is not finite is None."""
+        """Return the section in plain Python types, ready for JSON; a bound that is not finite is None."""
         bound = self.certificate.lower_bound
         return {
             "control_points": list(self.control_points),
@@ -167,16 +167,16 @@ def _distortion(sigma: Array, weights: Array) -> Distortion:
 def arap_grid(
     volume: BSplineVolume, n_gauss: int = 3, scale: float = 1.0
 ) -> tuple[tuple[Array, Array, Array], Array, Array]:
-    """ARAP distortion of scale * F at `n_gauss` Gauss points a direction and span.
+    """Return the ARAP distortion of scale * F at `n_gauss` Gauss points per direction and span.
 
-    Returns the points per axis, the values (m_u, m_v, m_w), and the weights of the integral over the cube, same shape.
+    That is the points of each axis, the values (m_u, m_v, m_w), and the weights of the integral over the cube.
     """
     points, sigma, weights = _singular_grid(volume, n_gauss)
     return points, _arap_of(scale * sigma), weights
 
 
 def _singular_grid(volume: BSplineVolume, n_gauss: int) -> tuple[tuple[Array, Array, Array], Array, Array]:
-    """Gauss points per axis, signed singular values (m_u, m_v, m_w, 3), weights (m_u, m_v, m_w)."""
+    """Return Gauss points per axis, signed singular values (m_u, m_v, m_w, 3), weights (m_u, m_v, m_w)."""
     rules = [gauss_points(k, n_gauss) for k in volume.knots]
     u, v, w = (points.ravel() for points, _ in rules)
     sigma = np.empty((len(u), len(v), len(w), 3))
@@ -189,7 +189,7 @@ def _singular_grid(volume: BSplineVolume, n_gauss: int) -> tuple[tuple[Array, Ar
 
 
 def arap(jacobians: ArrayLike) -> Array:
-    """As-rigid-as-possible distortion: the sum of (sigma_i - 1)^2, sigma_3 signed with det: (..., 3, 3) -> (...).
+    """Return the as-rigid-as-possible distortion sum (sigma_i - 1)^2, sigma_3 signed like det: (..., 3, 3) -> (...).
 
     (Paper, section 3.2, which leaves the sign open: with it the mirror image of a rigid map costs 4, not 0.)
     """
@@ -201,7 +201,7 @@ def _arap_of(sigma: Array) -> Array:
 
 
 def scaled_jacobian(jacobians: ArrayLike) -> Array:
-    """Det J over the product of its columns' lengths, from -1 to 1; 0 where a column vanishes: (..., 3, 3) -> (...)."""
+    """Return det J over the product of its columns' lengths, -1 to 1, 0 where one vanishes: (..., 3, 3) -> (...)."""
     matrices = np.asarray(jacobians, dtype=np.float64)
     lengths = np.linalg.norm(matrices, axis=-2, keepdims=True)
     units = np.divide(matrices, lengths, out=np.zeros_like(matrices), where=lengths > 0.0)

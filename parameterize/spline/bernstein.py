@@ -17,7 +17,7 @@ from ..arrays import Array
 
 
 def extraction(knots: Array, degree: int) -> tuple[NDArray[np.int64], Array]:
-    """Bernstein coefficients of every span from the spline's own coefficients.
+    """Return what turns the spline's coefficients into the Bernstein coefficients of every span.
 
     Returns `first` (n_spans,), the first B-spline coefficient that a span needs, and `weights`
     (n_spans, degree + 1, degree + 1): row j yields the j-th Bernstein coefficient, the blossom at degree - j times
@@ -43,7 +43,7 @@ def extraction(knots: Array, degree: int) -> tuple[NDArray[np.int64], Array]:
 
 
 def binomials(degree: int) -> Array:
-    """C(degree, i), shape (degree + 1,)."""
+    """Return C(degree, i), shape (degree + 1,)."""
     return np.array([float(comb(degree, i)) for i in range(degree + 1)])
 
 
@@ -67,7 +67,7 @@ def add_products(a: Array, b: Array, sign: float, out: Array) -> None:
 
 
 def halving(degree: int) -> Array:
-    """De Casteljau at t = 1/2 as two matrices, (2, degree + 1, degree + 1): the left half's coefficients, the right's.
+    """Return de Casteljau's halving as two matrices (2, degree + 1, degree + 1), for the left and the right half.
 
     The entries are exact for degree <= 53, each row sums to 1.
     """
@@ -76,7 +76,7 @@ def halving(degree: int) -> Array:
 
 
 def elevation(degree: int, raised: int) -> Array:
-    """The same polynomial in degree `raised`, (raised + 1, degree + 1): rows sum to 1 (Farouki 2012, section 3.3)."""
+    """Return the matrix (raised + 1, degree + 1) that raises the degree; rows sum to 1 (Farouki 2012, section 3.3)."""
     rows, columns = range(raised + 1), range(degree + 1)
     return np.array(
         [
@@ -87,7 +87,7 @@ def elevation(degree: int, raised: int) -> Array:
 
 
 def split(coefficients: Array) -> Array:
-    """The eight halves of trivariate polynomials: (k, d_0, d_1, d_2) -> (k, 2, 2, 2, d_0, d_1, d_2)."""
+    """Return trivariate polynomials on the eighths of their span: (k, d_0, d_1, d_2) -> (k, 2, 2, 2, d_0, d_1, d_2)."""
     pieces = coefficients
     for axis in range(3):  # the half's number goes in front of the axis that it halves
         position = 1 + 2 * axis

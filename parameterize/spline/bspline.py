@@ -17,9 +17,9 @@ from ..arrays import Array, IntArray
 
 
 def open_uniform_knots(n_control_points: int, degree: int) -> Array:
-    """Open knot vector on [0, 1] with equal spans (the paper's "quasi-uniform" knots, section 3.1).
+    """Return the open knot vector on [0, 1] with equal spans, shape (n_control_points + degree + 1,).
 
-    Returns an array of shape (n_control_points + degree + 1,).
+    The paper calls these knots "quasi-uniform" (section 3.1).
     Raises ValueError when there are too few control points for the degree.
     """
     if degree < 1:
@@ -31,7 +31,7 @@ def open_uniform_knots(n_control_points: int, degree: int) -> Array:
 
 
 def real_array(values: ArrayLike, name: str) -> Array:
-    """`values` in double precision; raises ValueError where they are not real numbers."""
+    """Return `values` in double precision; raise ValueError where they are not real numbers."""
     array = np.asarray(values)
     if array.dtype.kind not in "iuf":
         raise ValueError(f"{name} must be real numbers, got {array.dtype}")
@@ -58,18 +58,18 @@ def check_knots(knots: ArrayLike, degree: int) -> Array:
 
 
 def breakpoints(knots: Array) -> Array:
-    """Distinct knots, shape (n_spans + 1,): the boundaries of the spans."""
+    """Return the distinct knots, shape (n_spans + 1,): the ends of the spans."""
     return np.unique(knots)
 
 
 def greville(knots: Array, degree: int) -> Array:
-    """Greville points, shape (n,): with them as control points the spline is the identity."""
+    """Return the Greville points, shape (n,): with them as control points the spline is the identity."""
     n = len(knots) - degree - 1
     return np.array([knots[i + 1 : i + degree + 1].mean() for i in range(n)])
 
 
 def find_spans(knots: Array, degree: int, x: ArrayLike) -> NDArray[np.int64]:
-    """Index i with knots[i] <= x < knots[i + 1] for each x (the last span is closed), same shape as `x`."""
+    """Return the index i with knots[i] <= x < knots[i + 1] for each x, same shape as `x`; the last span is closed."""
     n = len(knots) - degree - 1
     spans = np.searchsorted(knots, np.asarray(x, dtype=np.float64), side="right") - 1
     last = int(np.searchsorted(knots, knots[n], side="left")) - 1
@@ -77,9 +77,9 @@ def find_spans(knots: Array, degree: int, x: ArrayLike) -> NDArray[np.int64]:
 
 
 def basis_derivatives(knots: Array, degree: int, x: ArrayLike, derivatives: int = 0) -> tuple[NDArray[np.int64], Array]:
-    """Values and derivatives of the `degree + 1` basis functions that are nonzero at each point.
+    """Return values and derivatives of the `degree + 1` basis functions that are nonzero at each point.
 
-    Returns `first` (m,), the index of the first such function, and `values` (derivatives + 1, m, degree + 1).
+    That is `first` (m,), the index of the first such function, and `values` (derivatives + 1, m, degree + 1).
     Points outside the knot range continue the polynomial of the nearest span.
     (The NURBS Book, algorithms A2.2 and A2.3; derivatives by differencing lower-degree values, eq. 2.7.)
     """
@@ -97,7 +97,7 @@ def basis_derivatives(knots: Array, degree: int, x: ArrayLike, derivatives: int 
 
 
 def _nonzero_by_degree(knots: Array, degree: int, x: Array, spans: NDArray[np.int64]) -> list[Array]:
-    """Cox-de Boor: entry q holds the (m, q + 1) nonzero values of degree q."""
+    """Return the nonzero values of all degrees by Cox and de Boor: entry q has shape (m, q + 1)."""
     table = [np.ones((x.size, 1))]
     for q in range(1, degree + 1):
         values = np.zeros((x.size, q + 1))
@@ -111,7 +111,7 @@ def _nonzero_by_degree(knots: Array, degree: int, x: Array, spans: NDArray[np.in
 
 
 def _differentiate(knots: Array, q: int, spans: NDArray[np.int64], lower: Array) -> Array:
-    """Degree q derivatives (m, q + 1) from degree q - 1 values or derivatives (m, q)."""
+    """Return derivatives of degree q (m, q + 1) from values or derivatives of degree q - 1 (m, q)."""
     result = np.zeros((lower.shape[0], q + 1))
     for r in range(q):
         slope = q * lower[:, r] / (knots[spans + r + 1] - knots[spans + r + 1 - q])
@@ -121,7 +121,7 @@ def _differentiate(knots: Array, q: int, spans: NDArray[np.int64], lower: Array)
 
 
 def collocation(knots: Array, degree: int, x: ArrayLike, derivative: int = 0) -> csr_array:
-    """Sparse matrix (m, n) with the given derivative of every basis function at every point."""
+    """Return the sparse matrix (m, n) with the given derivative of every basis function at every point."""
     first, values = basis_derivatives(knots, degree, x, derivative)
     width = values.shape[2]
     return sparse_rows(values[derivative], first[:, None] + np.arange(width), len(knots) - degree - 1)
@@ -141,7 +141,7 @@ def window_numbers(windows: Sequence[IntArray], sizes: Sequence[int]) -> IntArra
 
 
 def gauss_points(knots: Array, n_points: int) -> tuple[Array, Array]:
-    """Gauss-Legendre points and weights on every span, each of shape (n_spans, n_points)."""
+    """Return Gauss-Legendre points and weights on every span, each of shape (n_spans, n_points)."""
     nodes, weights = np.polynomial.legendre.leggauss(n_points)
     breaks = breakpoints(knots)
     half = np.diff(breaks)[:, None] / 2.0
@@ -150,7 +150,7 @@ def gauss_points(knots: Array, n_points: int) -> tuple[Array, Array]:
 
 
 def insert_knots(knots: Array, degree: int, new: ArrayLike) -> tuple[Array, csr_array]:
-    """Knot insertion: the finer knot vector and the matrix (n_new, n) that maps control points onto it.
+    """Return the finer knot vector, and the matrix (n_new, n) from the old control points to the new ones.
 
     The spline itself does not change. One knot at a time (Boehm; The NURBS Book, eq. 5.15).
     Raises ValueError for a knot outside the open range.
@@ -176,30 +176,30 @@ def insert_knots(knots: Array, degree: int, new: ArrayLike) -> tuple[Array, csr_
 
 
 def insertion_into(knots: Array, degree: int, finer: Array) -> csr_array:
-    """The matrix (n_finer, n) of inserting what a finer knot vector has more.
+    """Return the matrix (n_finer, n) that inserts the knots which a finer knot vector has in addition.
 
     Raises ValueError where that lacks one of the knots, or its ends differ.
     """
     own, wanted = Counter(knots.tolist()), Counter(finer.tolist())
     if own - wanted:
-        raise ValueError("the finer knot vector lacks a knot of the other")
+        raise ValueError("the finer knot vector must hold every knot of the coarser one")
     return insert_knots(knots, degree, list((wanted - own).elements()))[1]
 
 
 def divided_spans(knots: Array, parts: int) -> Array:
-    """The ends of the spans and of `parts` equal parts of each, in order."""
+    """Return the ends of `parts` equal parts of every span, in order."""
     breaks = breakpoints(knots)
     return np.interp(np.arange(parts * (len(breaks) - 1) + 1) / parts, np.arange(len(breaks)), breaks)
 
 
 def midpoints(knots: Array) -> Array:
-    """The middle of every span: inserting them halves all spans."""
+    """Return the middle of every span: inserting them halves all spans."""
     breaks = breakpoints(knots)
     return (breaks[:-1] + breaks[1:]) / 2.0
 
 
 def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
-    """Sparse matrix (m, n) times one axis of length n of `field`; that axis then has length m."""
+    """Return `field` with a sparse matrix (m, n) applied along one axis, whose length goes from n to m."""
     moved = np.moveaxis(field, axis, 0)
     flat = np.asarray(matrix @ moved.reshape(moved.shape[0], -1))
     return np.moveaxis(flat.reshape(-1, *moved.shape[1:]), 0, axis)
@@ -212,7 +212,7 @@ def evaluate_at(
     points: ArrayLike,
     derivative: Sequence[int] = (0, 0, 0),
 ) -> Array:
-    """A trivariate spline, or one of its partial derivatives, at points (m, 3).
+    """Evaluate a trivariate spline, or one of its partial derivatives, at points (m, 3).
 
     coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
     """
@@ -232,7 +232,7 @@ def evaluate_grid(
     points: Sequence[ArrayLike],
     derivative: Sequence[int] = (0, 0, 0),
 ) -> Array:
-    """The same on the tensor grid of three point rows: (len(u), len(v), len(w)) or (len(u), len(v), len(w), c)."""
+    """Evaluate on the tensor grid of three rows of points: (len(u), len(v), len(w)) or (len(u), len(v), len(w), c)."""
     field = coefficients
     for a in sorted(range(3), key=lambda axis: np.size(points[axis])):  # the shortest row first: least work
         field = apply_along(collocation(knots[a], degrees[a], points[a], derivative[a]), field, a)

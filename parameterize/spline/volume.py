@@ -30,7 +30,7 @@ Knots = tuple[Array, Array, Array]
 
 
 def checked_knots(degrees: Sequence[int], knots: Sequence[ArrayLike], counts: Sequence[int], what: str) -> Knots:
-    """The three knot vectors of as many functions a direction, as float arrays.
+    """Return the three knot vectors as float arrays; `counts` are the numbers of functions, which errors call `what`.
 
     Raises ValueError where one is not open from 0 to 1, or does not fit its degree and count.
     """
@@ -53,7 +53,7 @@ def save_spline(path: str | Path, degrees: Sequence[int], knots: Sequence[Array]
 
 
 def load_spline(path: str | Path, content: str) -> tuple[tuple[int, int, int], Knots, Array]:
-    """Degrees, knots and the array of that name. Raises FileNotFoundError, ValueError for another file."""
+    """Read degrees, knots and the array named `content`. Raises FileNotFoundError, or ValueError for another file."""
     data = load_arrays(path, ("degrees", "knots_u", "knots_v", "knots_w", content))
     if data["degrees"].shape != (3,) or data["degrees"].dtype.kind not in "iu":
         raise ValueError(f"{path}: degrees must be three integers")
@@ -93,27 +93,27 @@ class BSplineVolume:
 
     @classmethod
     def uniform(cls, control_points: ArrayLike, degree: int = 3) -> BSplineVolume:
-        """Volume with the same degree and equal spans in the three directions."""
+        """Make a volume with the same degree and equal spans in the three directions."""
         points = real_array(control_points, "control_points")
         knots = tuple(open_uniform_knots(n, degree) for n in points.shape[:3])
         return cls((degree, degree, degree), knots, points)  # type: ignore[arg-type]
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Number of control points per direction."""
+        """Return the number of control points per direction."""
         return self.control_points.shape[:3]
 
     def __call__(self, points: ArrayLike) -> Array:
-        """F at points (m, 3) of the unit cube: (m, 3)."""
+        """Return F at points (m, 3) of the unit cube: (m, 3)."""
         return self._at(points, (0, 0, 0))
 
     def jacobian(self, points: ArrayLike) -> Array:
-        """J[i, a, b] = dF_a / du_b at points (m, 3): (m, 3, 3)."""
+        """Return J[i, a, b] = dF_a / du_b at points (m, 3): (m, 3, 3)."""
         units = np.eye(3, dtype=int)
         return np.stack([self._at(points, tuple(row)) for row in units], axis=-1)
 
     def hessian(self, points: ArrayLike) -> Array:
-        """H[i, a, b, c] = d2F_a / du_b du_c at points (m, 3): (m, 3, 3, 3)."""
+        """Return H[i, a, b, c] = d2F_a / du_b du_c at points (m, 3): (m, 3, 3, 3)."""
         units = np.eye(3, dtype=int)
         rows = [[self._at(points, tuple(units[b] + units[c])) for c in range(3)] for b in range(3)]
         return np.moveaxis(np.array(rows), (0, 1), (2, 3))
@@ -122,15 +122,15 @@ class BSplineVolume:
         return evaluate_at(self.degrees, self.knots, self.control_points, points, derivative)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: tuple[int, int, int] = (0, 0, 0)) -> Array:
-        """F or one of its partial derivatives on a tensor grid: (len(u), len(v), len(w), 3)."""
+        """Return F or one of its partial derivatives on a tensor grid: (len(u), len(v), len(w), 3)."""
         return evaluate_grid(self.degrees, self.knots, self.control_points, (u, v, w), derivative)
 
     def grid_jacobian(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
-        """Jacobian on a tensor grid: (len(u), len(v), len(w), 3, 3), last index the parametric direction."""
+        """Return the Jacobian on a tensor grid: (len(u), len(v), len(w), 3, 3), last index the parametric direction."""
         return np.stack([self.grid(u, v, w, d) for d in ((1, 0, 0), (0, 1, 0), (0, 0, 1))], axis=-1)
 
     def refined(self, levels: int = 1) -> BSplineVolume:
-        """The same map with every span halved `levels` times, exactly (knot insertion)."""
+        """Return the same map with every span halved `levels` times, exactly (knot insertion)."""
         if levels < 0:
             raise ValueError(f"levels must be non-negative, got {levels}")
         volume = self
@@ -144,11 +144,11 @@ class BSplineVolume:
         return volume
 
     def face(self, axis: int, side: int) -> Array:
-        """Control points of a boundary face, e.g. (n_v, n_w, 3) for axis 0; side 0 or 1."""
+        """Return the control points of a boundary face, e.g. (n_v, n_w, 3) for axis 0; side 0 or 1."""
         return np.take(self.control_points, 0 if side == 0 else -1, axis=axis)
 
     def transformed(self, scale: float, offset: ArrayLike) -> BSplineVolume:
-        """The map scale * F + offset."""
+        """Return the map scale * F + offset."""
         return BSplineVolume(self.degrees, self.knots, scale * self.control_points + np.asarray(offset))
 
     def save(self, path: str | Path) -> None:

@@ -1,4 +1,4 @@
-"""Fewer triangles for a surface that has too many: only where the user asks for it."""
+"""Reduces the number of triangles of a surface, only where the user asks for it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .surface import Surface, surface_from_arrays
 
 
 def decimate(surface: Surface, max_faces: int) -> Surface:
-    """The surface with at most `max_faces` triangles; itself where it has no more.
+    """Return the surface with at most `max_faces` triangles, or itself where it has no more.
 
     Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), none that makes triangles intersect. A
     notice says the counts and the largest distance moved; `sha256` is that of the new arrays.

@@ -30,7 +30,7 @@ def check_finite(vertices: Array) -> None:
             "export the surface again"
         )
     if abs(vertices).max(initial=0.0) > LARGEST:
-        raise MeshError(f"coordinates beyond {LARGEST:g} cannot be computed with: choose a larger unit of length")
+        raise MeshError(f"coordinates must not exceed {LARGEST:g} in magnitude: choose a larger unit of length")
 
 
 def check_indices(vertices: Array, faces: IntArray) -> None:

@@ -14,7 +14,7 @@ LEVELS = 16
 
 
 def deepest_point(vertices: Array, faces: IntArray) -> tuple[Array, float]:
-    """Interior point (3,) farthest from the surface, to a thousandth of its depth, and that depth.
+    """Return the interior point (3,) farthest from the surface, to a thousandth of its depth, and that depth.
 
     Branch and bound over cells: the signed distance changes by no more than the way walked, so a cell whose centre's
     depth plus half its diagonal falls short of the best depth found cannot hold the deepest point. Deterministic.

@@ -1,4 +1,4 @@
-"""Self-intersection of a surface: which faces pass through each other, and where."""
+"""Finds the faces of a surface that pass through each other, and where."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SHOWN = 5  # pairs that the summary lists
 
 
 def crossing_faces(vertices: Array, faces: IntArray) -> IntArray:
-    """Pairs (k, 2) of faces that meet outside of their common vertices and edges, decided by exact predicates.
+    """Return the pairs (k, 2) of faces that meet outside of their common vertices and edges, by exact predicates.
 
     Two faces with a common edge are not compared: folded flat upon each other, they are not found.
     """
@@ -21,14 +21,14 @@ def crossing_faces(vertices: Array, faces: IntArray) -> IntArray:
 
 
 def crossing_places(vertices: Array, faces: IntArray, pairs: IntArray) -> Array:
-    """A place (k, 3) for each pair: the middle of what the boxes of the two faces have in common."""
+    """Return a place (k, 3) for each pair: the middle of what the boxes of the two faces have in common."""
     corners = vertices[faces[pairs]]  # (k, 2, 3, 3)
     low, high = corners.min(axis=2).max(axis=1), corners.max(axis=2).min(axis=1)
     return np.asarray((low + high) / 2.0)
 
 
 def describe_crossings(vertices: Array, faces: IntArray, pairs: IntArray) -> str:
-    """How many, and the first with its place: one line."""
+    """Return one line: the number of pairs, and the first with its place."""
     first, second = pairs[0].tolist()
     place = in_brackets(crossing_places(vertices, faces, pairs[:1])[0])
     count = "1 pair" if len(pairs) == 1 else f"{len(pairs)} pairs"

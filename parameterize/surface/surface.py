@@ -1,4 +1,4 @@
-"""The gate: a closed surface as the method needs it, or a MeshError that says why not."""
+"""Surface: a closed surface of genus 0, checked and repaired, or a MeshError that says why it is refused."""
 
 from __future__ import annotations
 
@@ -50,26 +50,27 @@ class Surface:
     crossings: IntArray
 
     def to_unit(self, points: ArrayLike) -> Array:
-        """Points (..., 3) in the user's units -> placed."""
+        """Return points (..., 3), given in the user's units, as placed."""
         return self.scale * (np.asarray(points, dtype=np.float64) - self.center) + 0.5
 
     def from_unit(self, points: ArrayLike) -> Array:
-        """Placed points (..., 3) -> the user's units."""
+        """Return placed points (..., 3) in the user's units."""
         return (np.asarray(points, dtype=np.float64) - 0.5) / self.scale + self.center
 
     @property
     def volume(self) -> float:
-        """Enclosed volume, user's units."""
+        """Return the enclosed volume in the user's units."""
         return float(self.scale**-3.0)
 
     @property
     def bbox(self) -> tuple[Array, Array]:
-        """Lowest and highest corner of the bounding box, (3,) each, user's units."""
+        """Return the lowest and the highest corner of the bounding box, (3,) each, in the user's units."""
         return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
     def summary(self) -> dict[str, Any]:
-        """The section `input` of report.json."""
+        """Return the section `input` of report.json."""
         first = self.crossings[:SHOWN]
+        places = crossing_places(self.vertices, self.faces, first)
         return {
             "file": self.source or self.name,
             "sha256": self.sha256,
@@ -80,8 +81,7 @@ class Surface:
             "self_intersections": {
                 "pairs": len(self.crossings),
                 "first": [
-                    {"faces": pair, "near": place}
-                    for pair, place in zip(first.tolist(), self._places(first).tolist(), strict=True)
+                    {"faces": pair, "near": place} for pair, place in zip(first.tolist(), places.tolist(), strict=True)
                 ],
             },
             "notices": list(self.notices),
@@ -93,9 +93,6 @@ class Surface:
             found = describe_crossings(self.vertices, self.faces, self.crossings)
             name = self.source or self.name
             raise MeshError(f"{name}: {found}: pull the sheets apart there, or check without --strict")
-
-    def _places(self, pairs: IntArray) -> Array:
-        return crossing_places(self.vertices, self.faces, pairs)
 
 
 def load_surface(path: str | Path, *, component: int | None = None, max_faces: int = MAX_FACES) -> Surface:
@@ -126,7 +123,7 @@ def surface_from_arrays(
     component: int | None = None,
     max_faces: int = MAX_FACES,
 ) -> Surface:
-    """Surface from vertices (n, 3) and triangles (m, 3) of vertex numbers; the same checks as load_surface.
+    """Make a surface of vertices (n, 3) and triangles (m, 3) of vertex numbers, with the checks of load_surface.
 
     Raises MeshError (a ValueError) naming what is wrong with the arrays or the surface.
     """
@@ -154,7 +151,7 @@ def _gate(
     component: int | None,
     max_faces: int,
 ) -> Surface:
-    """Check, normalise, weld, choose the component, check the topology, orient, place."""
+    """Make a surface: check, normalise, weld, choose the component, check the topology, orient, place."""
     check_face_count(len(faces), max_faces)
     if len(faces) < 4:
         raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
@@ -197,7 +194,7 @@ def _gate(
 
 
 def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:
-    """Middle (3,) and longest side of the box of the used vertices, and what to say about it."""
+    """Return middle (3,) and longest side of the box of the used vertices, and notices of its size and place."""
     used = vertices[np.unique(faces)]
     low, high = used.min(axis=0), used.max(axis=0)
     size = float((high - low).max())

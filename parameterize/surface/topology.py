@@ -1,4 +1,4 @@
-"""What the gate refuses (open, non-manifold, several components, genus, no volume) and what it warns of.
+"""Checks the topology: open, non-manifold, in several components, of higher genus or without volume is refused.
 
 Positions in messages are the user's: the caller passes `where`, which turns a vertex number into text.
 """
@@ -22,7 +22,7 @@ LISTED = 8
 
 
 def choose_component(vertices: Array, faces: IntArray, component: int | None) -> tuple[IntArray, list[str]]:
-    """Faces of the only component, or of the one asked for (0 the largest), and notices.
+    """Return the faces of the only component, or of the one asked for (0 the largest), and notices.
 
     Raises MeshError listing the components, and saying which lies inside the largest.
     """
@@ -33,7 +33,7 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
     sizes += f", and {len(groups) - LISTED} more" if len(groups) > LISTED else ""
     if component is not None:
         if not 0 <= component < len(groups):
-            raise MeshError(f"no component {component}: counted from 0 there are {len(groups)} ({sizes})")
+            raise MeshError(f"component {component} does not exist: there are {len(groups)}, counted from 0 ({sizes})")
         notice = [f"component {component} taken of {len(groups)} ({sizes})"] if len(groups) > 1 else []
         return faces[groups[component]], notice
     outer, nested = _inside(vertices, faces, groups)
@@ -46,7 +46,7 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
 
 
 def _inside(vertices: Array, faces: IntArray, groups: list[IntArray]) -> tuple[int, list[int]]:
-    """Number of the widest component, and of those that lie inside it with every vertex, not only overlap it."""
+    """Return the number of the widest component, and of those that lie inside it with every vertex."""
     listed = [vertices[np.unique(faces[group])] for group in groups[: LISTED + 1]]
     outer = int(np.argmax([np.linalg.norm(np.ptp(points, axis=0)) for points in listed]))
     nested = []
@@ -99,7 +99,7 @@ def check_volume(vertices: Array, faces: IntArray) -> None:
 
 
 def slivers(vertices: Array, faces: IntArray, where: Where) -> list[str]:
-    """A notice of the triangles with a tiny angle, if any: accepted, but they may spoil the result."""
+    """Return a notice of the triangles with a tiny angle, if any: they are accepted, but may spoil the result."""
     corners = vertices[faces]  # (m, 3, 3)
     ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     doubled = np.linalg.norm(np.cross(ahead[:, 0], behind[:, 0]), axis=1)  # (m,) twice the area

@@ -22,7 +22,7 @@ THINNEST = 1e-12  # shape (1: equilateral, 0: flat) below which all weigh the sa
 
 
 def triangulate(vertices: Array, polygons: list[list[int]]) -> IntArray:
-    """Triangles (m, 3) in the polygons' order, wound like them; a polygon of n corners gives n - 2.
+    """Return triangles (m, 3) in the polygons' order, wound like them; a polygon of n corners gives n - 2.
 
     Vertex numbers must be in range and coordinates finite; a triangle may repeat a corner only where its polygon does.
     Raises MeshError for a polygon of more than 256 corners.
@@ -42,7 +42,7 @@ def triangulate(vertices: Array, polygons: list[list[int]]) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _cut_all(points: Array, sizes: IntArray) -> IntArray:
-    """Triangles (m, 3), as rows of `points`, of polygons that follow one another there, sizes (p,) corners each."""
+    """Return triangles (m, 3), as rows of `points`, of polygons that follow one another there, of sizes (p,)."""
     triangles = np.empty((len(points) - 2 * len(sizes), 3), dtype=np.int64)
     chains = np.empty((MAX_CORNERS, 2), dtype=np.int64)  # still to be cut, each by the triangle on its closing edge
     start = end = 0
@@ -63,7 +63,7 @@ def _cut_all(points: Array, sizes: IntArray) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _apices(points: Array) -> IntArray:
-    """For a chain of corners i..k, at [i, k], the corner that makes the triangle on its closing edge k-i, (n, n)."""
+    """Return at [i, k] the corner of the triangle on the closing edge k-i of the chain of corners i..k, (n, n)."""
     n = len(points)
     weight = np.zeros((n, n))
     apex = np.zeros((n, n), dtype=np.int64)
@@ -82,7 +82,7 @@ def _apices(points: Array) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _weight(a: Array, b: Array, c: Array) -> float:
-    """Area of a triangle, and a trace of its shape, which decides where areas are the same."""
+    """Return the area of a triangle and a trace of its shape, which decides where areas are the same."""
     normal_squared = edges_squared = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3

@@ -1,4 +1,4 @@
-"""What the gate mends and says: duplicate vertices, degenerate faces, winding."""
+"""Repairs a mesh and says so: duplicate vertices, degenerate faces, inconsistent winding."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FLAT = 1e-14  # twice a face's area over its longest edge squared, below which i
 
 
 def is_closed(faces: IntArray) -> bool:
-    """Whether every edge has exactly two faces."""
+    """Return whether every edge has exactly two faces."""
     return len(faces) > 0 and bool(np.all(edge_table(faces)[1] == 2))
 
 
@@ -48,7 +48,7 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
 
 
 def orient(faces: IntArray) -> tuple[IntArray, list[str]] | None:
-    """Wind all faces of a closed component alike: faces (m, 3) and notices, or None where that is impossible."""
+    """Return the faces (m, 3) of a closed component wound alike, and notices, or None where that is impossible."""
     if _is_oriented(faces):
         return faces, []
     turned, _ = igl.bfs_orient(faces)
@@ -59,13 +59,13 @@ def orient(faces: IntArray) -> tuple[IntArray, list[str]] | None:
 
 
 def signed_volume(vertices: Array, faces: IntArray) -> float:
-    """Volume enclosed by faces wound outward; negative when inward."""
+    """Return the volume enclosed by faces wound outward; it is negative when they are wound inward."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     return float(np.sum(np.cross(a, b) * c) / 6.0)
 
 
 def components(faces: IntArray) -> list[IntArray]:
-    """Face numbers of each component (faces sharing a vertex), the largest first."""
+    """Return the face numbers of each component (faces sharing a vertex), the largest first."""
     label = connected(directed_edges(faces), int(faces.max()) + 1)[faces[:, 0]]
     order = np.argsort(label, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
@@ -95,7 +95,7 @@ def _short_edges(vertices: Array, faces: IntArray) -> IntArray:
 
 
 def _close_pairs(vertices: Array, faces: IntArray) -> IntArray:
-    """Pairs of used vertices within the tolerance, as chains: cells of a fine grid first, then neighbouring cells."""
+    """Return pairs (k, 2) that link used vertices within the tolerance: in cells of a fine grid, then between cells."""
     used = np.unique(faces)
     cell = np.zeros(len(used), dtype=np.int64)
     for axis in range(3):

@@ -18,7 +18,7 @@ class ResidualModule(nn.Module):
         self.linear = nn.Linear(width, width)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(m, width) -> (m, width)."""
+        """Return the module's values: (m, width) -> (m, width)."""
         return x + torch.relu(self.linear(x))
 
 
@@ -48,14 +48,14 @@ class InverseMap(nn.Module):
         nn.init.zeros_(self.last.bias)
 
     def encode(self, x: Tensor) -> Tensor:
-        """(m, 3) -> (m, 6 N + 3): x, sin(n k x) / (n k), cos(n k x) / (n k)."""
+        """Return x, sin(n k x) / (n k), cos(n k x) / (n k) for n = 1..N: (m, 3) -> (m, 6 N + 3)."""
         nk = self.multiples * self.scale  # (N,)
         phase = x[:, None, :] * nk[:, None]  # (m, N, 3)
         waves = torch.cat([torch.sin(phase), torch.cos(phase)], dim=2) / nk[:, None]
         return torch.cat([x, waves.flatten(1)], dim=1)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(m, 3) -> (m, 3)."""
+        """Return G at points: (m, 3) -> (m, 3)."""
         hidden = torch.relu(self.first(self.encode(x)))
         shift: Tensor = self.last(self.residual(hidden))
         return (x - 0.5) @ self.affine.T + 0.5 + shift

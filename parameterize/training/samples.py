@@ -1,4 +1,4 @@
-"""What the losses are evaluated on: interior stencils (section 4.4.2) and surface triangles, both seeded."""
+"""Samples that the losses are evaluated on: interior stencils (section 4.4.2) and surface triangles, both seeded."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ class Stencils:
     cell: float
 
     def shifted(self, generator: torch.Generator) -> Tensor:
-        """The nodes moved together by one random vector of [-h/2, h/2]^3."""
+        """Return the nodes, all moved by one random vector of [-h/2, h/2]^3."""
         shift = torch.rand(3, generator=generator, dtype=self.nodes.dtype) - 0.5
         return self.nodes + (self.cell * shift).to(self.nodes.device)
 
 
 def gather(rows: Tensor, index: Tensor) -> Tensor:
-    """rows[index] for rows (n, k) and any index shape, with a repeatable gradient.
+    """Return rows[index] for rows (n, k) and any index shape, with a repeatable gradient.
 
     Plain indexing adds the gradients of repeated rows in the order in which threads happen to come.
     """
@@ -51,13 +51,13 @@ def gather(rows: Tensor, index: Tensor) -> Tensor:
 
 
 def signed_distance(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Distance to the surface, negative inside: (m, 3) -> (m,)."""
+    """Return the distance to the surface, negative inside: (m, 3) -> (m,)."""
     kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     return np.asarray(igl.signed_distance(points, vertices, faces, sign_type=kind)[0])
 
 
 def lattice(vertices: Array, cell: float, margin: float) -> tuple[Array, NDArray[np.int64]]:
-    """Lattice points (k, 3) that fill the bounding box grown by `margin`, and their integer coordinates."""
+    """Return lattice points (k, 3) that fill the bounding box grown by `margin`, and their integer coordinates."""
     low = np.floor((vertices.min(0) - margin) / cell).astype(int)
     high = np.ceil((vertices.max(0) + margin) / cell).astype(int)
     axes = [np.arange(a, b + 1) for a, b in zip(low, high, strict=True)]
@@ -68,7 +68,7 @@ def lattice(vertices: Array, cell: float, margin: float) -> tuple[Array, NDArray
 def stencils(
     vertices: Array, faces: NDArray[np.int64], cell: float, *, device: torch.device, dtype: torch.dtype
 ) -> Stencils:
-    """Centres at every lattice point inside the surface or within h/2 of it: about the domain, whatever the shift."""
+    """Return stencils around every lattice point inside the surface or within h/2 of it, to cover it at any shift."""
     points, index = lattice(vertices, cell, cell / 2.0)
     centres = index[signed_distance(points, vertices, faces) < cell / 2.0]
     needed, inverse = np.unique((centres[:, None, :] + OFFSETS).reshape(-1, 3), axis=0, return_inverse=True)
@@ -80,7 +80,7 @@ def stencils(
 
 
 def interior_points(vertices: Array, faces: NDArray[np.int64], cell: float) -> Array:
-    """Lattice points inside the surface: (k, 3)."""
+    """Return the lattice points inside the surface: (k, 3)."""
     points, _ = lattice(vertices, cell, 0.0)
     return points[signed_distance(points, vertices, faces) < 0.0]
 
@@ -95,7 +95,7 @@ class TriangleSampler:
         self._device = device
 
     def draw(self, generator: torch.Generator) -> Tensor:
-        """Indices (count,) of triangles: systematic sampling, one random offset along the cumulated area."""
+        """Return indices (count,) of triangles by systematic sampling: one random offset along the cumulated area."""
         if self._count == len(self._cumulative):
             return torch.arange(self._count, device=self._device)
         start = torch.rand(1, generator=generator, dtype=torch.float64)

@@ -11,13 +11,13 @@ from ..cube.cube import axis_and_side
 
 
 def cuboid_scale(d: float) -> float:
-    """v^(-1/3) with v the volume of all points within d of the unit cube: S(d) has volume 1."""
+    """Return v^(-1/3), v the volume of all points within d of the unit cube: scaled by it, S(d) has volume 1."""
     volume = 4.0 / 3.0 * pi * d**3 + 3.0 * pi * d**2 + 6.0 * d + 1.0
     return float(volume ** (-1.0 / 3.0))
 
 
 def nearest_on_cube(points: Tensor) -> Tensor:
-    """Nearest points on the boundary of [0, 1]^3, for points inside or outside: (m, 3) -> (m, 3)."""
+    """Return the nearest points on the boundary of [0, 1]^3, for points inside or outside: (m, 3) -> (m, 3)."""
     clamped = points.clamp(0.0, 1.0)
     to_face, axis = torch.minimum(clamped, 1.0 - clamped).min(dim=1, keepdim=True)  # (m, 1)
     on_face = clamped.scatter(1, axis, clamped.gather(1, axis).round())
@@ -25,13 +25,13 @@ def nearest_on_cube(points: Tensor) -> Tensor:
 
 
 def nearest_on_cube_face(points: Tensor, face: Tensor) -> Tensor:
-    """Nearest points on given faces of the cube; face (m,) in 0..5 = u0, u1, v0, v1, w0, w1."""
+    """Return the nearest points on given faces of the cube; face (m,) in 0..5 = u0, u1, v0, v1, w0, w1."""
     axis, side = axis_and_side(face[:, None])
     return points.clamp(0.0, 1.0).scatter(1, axis, side.to(points.dtype))
 
 
 def nearest_on_cuboid(points: Tensor, d: float) -> Tensor:
-    """Nearest points on the boundary of S(d), d > 0: (m, 3) -> (m, 3)."""
+    """Return the nearest points on the boundary of S(d), d > 0: (m, 3) -> (m, 3)."""
     scale = cuboid_scale(d)
     local = (points - 0.5) / scale + 0.5  # there, S(d) is the unit cube grown by d
     core = local.clamp(0.0, 1.0)
@@ -45,14 +45,14 @@ def nearest_on_cuboid(points: Tensor, d: float) -> Tensor:
 
 
 def _face_normal(on_face: Tensor) -> Tensor:
-    """Outward unit normal of the cube at points of its boundary (one of the faces' normals on an edge)."""
+    """Return the outward unit normal of the cube at points of its boundary; on an edge that of one of its faces."""
     centred = on_face - 0.5
     axis = centred.abs().argmax(dim=1, keepdim=True)
     return torch.zeros_like(centred).scatter(1, axis, centred.gather(1, axis).sign())
 
 
 def nearest(target: str, points: Tensor) -> Tensor:
-    """Nearest points on the boundary of "cube", "S(1)" or "S(2)"."""
+    """Return the nearest points on the boundary of "cube", "S(1)" or "S(2)"."""
     if target == "cube":
         return nearest_on_cube(points)
     return nearest_on_cuboid(points, float(target[2:-1]))

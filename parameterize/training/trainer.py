@@ -18,7 +18,7 @@ from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
 from ..history import History
-from ..progress import Progress, ProgressCallback, ignore
+from ..progress import Progress, ProgressCallback
 from .network import InverseMap
 from .objective import BoundarySamples, EdgePaths, Objective
 from .samples import TriangleSampler, interior_points, stencils
@@ -30,7 +30,7 @@ _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
 
 @dataclass
 class _Run:
-    """Where the training stands within a stage; what a checkpoint holds beside the network and the optimiser."""
+    """Where the training stands: stage, step, and the network at the start of the stage and at its best."""
 
     number: int
     step: int
@@ -42,7 +42,7 @@ class _Run:
 class Trainer:
     """Trains G on one surface.
 
-    vertices (n, 3) at volume 1, faces (m, 3); given_corners (8,) vertex numbers or None; start: see start_map.
+    vertices: (n, 3), at volume 1. faces: (m, 3). given_corners: (8,) vertex numbers or None. start: see `start_map`.
     The random numbers of a step depend on the seed, the stage and the step alone.
     """
 
@@ -53,17 +53,18 @@ class Trainer:
         config: Config,
         *,
         seed: int,
-        start: int = 0,
+        start: int,
         device: torch.device,
-        dtype: torch.dtype = torch.float32,
-        given_corners: IntArray | None = None,
-        history: History | None = None,
-        progress: ProgressCallback = ignore,
-        checkpoints: Checkpoints | None = None,
+        dtype: torch.dtype,
+        given_corners: IntArray | None,
+        history: History,
+        progress: ProgressCallback,
+        checkpoints: Checkpoints,
     ) -> None:
         self.config, self.seed, self.device, self.dtype = config, seed, device, dtype
-        self.vertices, self.faces = vertices, faces
-        self.corners = given_corners
+        self.vertices, self.faces, self.corners = vertices, faces, given_corners
+        self.history, self.progress, self.checkpoints = history, progress, checkpoints
+        self.generator = torch.Generator()
         first_weights = torch.Generator().manual_seed(seed % 2**63)
         self.network = InverseMap(config.network, first_weights).to(device=device, dtype=dtype)
         if config.train.whiten:
@@ -71,13 +72,9 @@ class Trainer:
             self.network.affine.copy_(self._tensor(first))
         inside = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
         self.objective = Objective(self.network, inside, config.train)
-        self.history = history if history is not None else History()
-        self.progress = progress
-        self.checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
-        self.generator = torch.Generator()
 
     def run(self) -> InverseMap:
-        """All stages, or those that a checkpoint leaves; the network at the best state of the last one.
+        """Train all stages, or those that a checkpoint leaves; return the network at the best state of the last one.
 
         Where the mapped surface is still too far from a cube for its edges to be traced, the stages that fix them are
         left out and a warning says so: the spline stage moves edges anyway. Raises PathError where the user gave the
@@ -85,12 +82,9 @@ class Trainer:
         """
         given = self.corners is not None
         saved = self.checkpoints.load(_CHECKPOINT)
-        first = 0 if saved is None else int(saved[1]["number"])
-        for number in range(first, len(self.config.stages)):
-            stage = self.config.stages[number]
-            run = _Run(number, 0, self._state(), self._state())
-            if saved is not None and number == first:
-                run = self._load_run(*saved)
+        first = int(saved[1]["number"]) if saved else 0
+        for number, stage in list(enumerate(self.config.stages))[first:]:
+            run = self._load_run(*saved) if saved else _Run(number, 0, self._state(), self._state())
             try:
                 boundary = self._prepare(stage)
             except PathError as error:
@@ -99,17 +93,18 @@ class Trainer:
                 _log.warning("training ends before stage %s: %s", stage.name, error)
                 break
             optimizer = torch.optim.Adam(self.network.parameters(), lr=self.config.train.learning_rate)
-            if saved is not None and number == first:
+            if saved:
                 self._load_progress(saved[0], optimizer)
             self._train(run, boundary, optimizer)
+            saved = None
         return self.network
 
     def map(self, points: Array) -> Array:
-        """G at points (m, 3), as float64."""
+        """Return G at points (m, 3), as float64."""
         return map_points(self.network, points, self.device, self.dtype)
 
     def mapped(self) -> Array:
-        """G at the surface's vertices (n, 3), as the network is now."""
+        """Return G at the surface's vertices (n, 3), as the network is now."""
         return self.map(self.vertices)
 
     def _prepare(self, stage: StageConfig) -> BoundarySamples:
@@ -136,7 +131,7 @@ class Trainer:
         return torch.as_tensor(values, dtype=self.dtype, device=self.device)
 
     def _train(self, run: _Run, boundary: BoundarySamples, optimizer: torch.optim.Adam) -> None:
-        """One stage; ends with the network at its best state (fewest folded samples, then lowest loss)."""
+        """Train one stage, and leave the network at its best state: fewest folded samples, then lowest loss."""
         stage = self.config.stages[run.number]
         later = sum(s.steps for s in self.config.stages[run.number + 1 :])
         started, begun = time.perf_counter(), run.step
@@ -155,7 +150,7 @@ class Trainer:
         self.network.load_state_dict(run.best)
 
     def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: torch.optim.Adam) -> None:
-        """One Adam step; nothing of the state changes before the loss is known."""
+        """Take one Adam step; nothing of the state changes before the loss is known."""
         self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
         optimizer.zero_grad(set_to_none=True)
         loss, folded, terms = self.objective(stage, boundary, self.generator)
@@ -189,7 +184,7 @@ class Trainer:
         self.checkpoints.save(_CHECKPOINT, tensors, state)
 
     def _load_run(self, tensors: State, state: dict[str, Any]) -> _Run:
-        """Bring back everything but network and optimiser as they were; the network is left at the stage's start."""
+        """Restore everything but the optimiser; leave the network as it was at the start of the stage."""
         self.corners = None if state["corners"] is None else np.array(state["corners"])
         self.history.rows[:] = [tuple(row) for row in state["history"]]
         start, best = _part(tensors, "start"), _part(tensors, "best")
@@ -206,7 +201,7 @@ class Trainer:
         optimizer.load_state_dict({"state": moments, "param_groups": optimizer.state_dict()["param_groups"]})
 
     def _learning_rate(self, step: int, steps: int) -> float:
-        """Cosine decay from the first to the final learning rate."""
+        """Return the learning rate, which falls along a cosine from the first to the final one."""
         first, last = self.config.train.learning_rate, self.config.train.final_learning_rate
         return last + 0.5 * (first - last) * (1.0 + math.cos(math.pi * step / steps))
 
@@ -224,7 +219,7 @@ def start_map(points: Array, start: int, turn: float) -> Array:
 
 
 def _part(tensors: State, prefix: str) -> State:
-    """The entries named `prefix`.something, under that something."""
+    """Return the entries whose names begin with `prefix` and a dot, without that beginning."""
     return {key.removeprefix(f"{prefix}."): value for key, value in tensors.items() if key.startswith(f"{prefix}.")}
 
 
@@ -232,6 +227,6 @@ def _part(tensors: State, prefix: str) -> State:
 def map_points(
     network: InverseMap, points: Array, device: torch.device, dtype: torch.dtype, block: int = 65_536
 ) -> Array:
-    """G at points (m, 3) in blocks, as float64."""
+    """Return G at points (m, 3) as float64, computed in blocks."""
     pieces = torch.as_tensor(points, dtype=dtype, device=device)
     return np.asarray(torch.cat([network(piece) for piece in torch.split(pieces, block)]).double().cpu())

@@ -44,7 +44,7 @@ def from_cells(vertices: Array, cells: list[tuple[str, IntArray]]) -> Content:
         check_indices(vertices, rows)
     tetrahedra = [rows for kind, rows in cells if kind == "tetra"]
     if any(rows.shape[1:] != (4,) for rows in tetrahedra):
-        raise MeshError(f"tetrahedra with fewer corners than 4; {DAMAGED}")
+        raise MeshError(f"a tetrahedron has fewer corners than 4; {DAMAGED}")
     if tetrahedra:
         return Content(vertices, tetrahedra_boundary(vertices, np.concatenate(tetrahedra)).tolist())
     polygons = [polygon for kind, rows in cells if kind in POLYGONS for polygon in rows.tolist()]

@@ -78,7 +78,7 @@ def _triangles(content: Content, max_faces: int) -> IntArray:
     check_indices(content.vertices, corners)
     fewest = min(map(len, content.polygons), default=0)
     if fewest < 3:
-        raise MeshError(f"a face with {fewest} corners, expected at least 3; {DAMAGED}")
+        raise MeshError(f"a face has {fewest} corners, expected at least 3; {DAMAGED}")
     check_face_count(len(corners) - 2 * len(content.polygons), max_faces)  # before the time is spent on them
     return triangulate(content.vertices, content.polygons)
 

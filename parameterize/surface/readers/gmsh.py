@@ -50,7 +50,7 @@ def _section(data: bytes, name: bytes) -> bytes:
     start = re.search(rb"\$%b\r?\n" % name, data)
     stop = data.find(b"$End" + name, start.end()) if start else -1
     if not start or stop < 0:
-        raise MeshError(f".msh without the whole section ${name.decode()}: export it again")
+        raise MeshError(f"the section ${name.decode()} of the .msh is missing or cut off: export it again")
     return data[start.end() : stop]
 
 

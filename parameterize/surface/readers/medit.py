@@ -46,8 +46,8 @@ def _table(name: str, words: list[str], columns: int, numbers: re.Pattern[str]) 
     count = header_count(words[0] if words else "")
     size = count * (columns + 1)
     if size > len(words) - 1:
-        raise MeshError(f".mesh promises {count} {name}, {size} numbers, {len(words) - 1} follow; {DAMAGED}")
+        raise MeshError(f"the .mesh promises {count} {name}, {size} numbers, {len(words) - 1} follow; {DAMAGED}")
     rows = words[1 : size + 1]
     if count and not numbers.fullmatch(" ".join(rows)):
-        raise MeshError(f".mesh with a word that is not a number among its {name}; {DAMAGED}")
+        raise MeshError(f"the .mesh has a word that is not a number among its {name}; {DAMAGED}")
     return np.array(rows, dtype=np.str_).reshape(count, columns + 1)[:, :-1]

@@ -30,7 +30,7 @@ def read_off(data: bytes, max_faces: int) -> Content:
     if counts[:1] == ["BINARY"]:
         raise MeshError("binary OFF is not supported: save it as text")
     if len(counts) < 2:
-        raise MeshError(f"OFF without the counts of vertices and faces; {DAMAGED}")
+        raise MeshError(f"the OFF lacks the counts of vertices and faces; {DAMAGED}")
     n, m = header_count(counts[0]), header_count(counts[1])
     if len(rows) < n + m:
         raise MeshError(f"OFF promises {n} vertices and {m} faces, {len(rows)} rows follow; {DAMAGED}")

@@ -50,10 +50,10 @@ def read_ply(data: bytes, max_faces: int) -> Content:
     elements = _elements(lines)
     counts = {element.name: element.count for element in elements}
     if counts.get("tristrips"):
-        raise MeshError("PLY with triangle strips (element tristrips): save its faces as triangles")
+        raise MeshError("the PLY holds triangle strips (element tristrips): save its faces as triangles")
     if not counts.get("vertex") or not counts.get("face"):
         found = f"{counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces"
-        raise MeshError(f"PLY with {found} is no surface: export the faces too")
+        raise MeshError(f"the PLY holds {found}, a surface needs both: export the faces too")
     check_face_count(counts["face"], max_faces)
     if is_text:
         rows = [(line, text.split()) for line, text in enumerate(text_lines(body), len(lines)) if text.strip()]
