@@ -50,14 +50,17 @@ def _check_unpacked(data: bytes, limit: int) -> None:
         root = ElementTree.fromstring(head + b"</VTKFile>" if rest else data)  # noqa: S314 - it has no entities
         if "compressor" not in root.attrib:
             return
-        tag, _, appended = rest.partition(b"_")
+        tag, _, appended = rest.rpartition(b"</AppendedData")[0].partition(b"_")
         order = ">" if root.get("byte_order") == "BigEndian" else "<"
         word = np.dtype(order + ("u8" if root.get("header_type") == "UInt64" else "u4"))
         for array in root.iter("DataArray"):
-            form = array.get("format")
-            inline = (array.text or "").strip().encode() if form == "binary" else b""
-            packed = appended[int(array.attrib["offset"]) :] if form == "appended" else inline
-            for block in _blocks(packed, word, is_raw=b"raw" in tag and form == "appended") if packed else ():
+            if array.get("format") == "appended":
+                packed, is_raw = appended[int(array.attrib["offset"]) :], b"raw" in tag
+            elif array.get("format") == "binary":
+                packed, is_raw = (array.text or "").strip().encode(), False
+            else:
+                continue
+            for block in _blocks(packed, word, is_raw=is_raw):
                 unpacker = UNPACKERS[root.attrib["compressor"]]()
                 left -= len(unpacker.decompress(block, max_length=left + 1))
                 if left < 0:
@@ -67,7 +70,7 @@ def _check_unpacked(data: bytes, limit: int) -> None:
 
 
 def _blocks(packed: bytes, word: np.dtype[Any], *, is_raw: bool) -> Iterator[bytes]:
-    """Yield the compressed blocks of an array: behind their number, two sizes and theirs, base64 or raw."""
+    """Yield the compressed blocks of an array, raw or base64; before them stand their number and their sizes."""
 
     def place(size: int) -> int:
         return size if is_raw else -(-size // 3) * 4
