@@ -2,6 +2,7 @@
 
 A knot vector is *open*: its first and last `degree + 1` knots coincide. The basis has `len(knots) - degree - 1`
 functions. Recurrences are those of Piegl and Tiller, *The NURBS Book* (2nd ed.), chapter 2.
+scipy.interpolate is slow to load: it is imported where it is used.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array, identity
+from scipy.sparse import csr_array
 
 from ..arrays import Array, IntArray
 
@@ -152,27 +153,16 @@ def gauss_points(knots: Array, n_points: int) -> tuple[Array, Array]:
 def insert_knots(knots: Array, degree: int, new: ArrayLike) -> tuple[Array, csr_array]:
     """Return the finer knot vector, and the matrix (n_new, n) from the old control points to the new ones.
 
-    The spline itself does not change. One knot at a time (Boehm; The NURBS Book, eq. 5.15).
-    Raises ValueError for a knot outside the open range.
+    The spline itself does not change. Raises ValueError for a knot outside the open range.
     """
-    current, matrix = knots, csr_array(identity(len(knots) - degree - 1))
+    from scipy.interpolate import BSpline
+
+    spline = BSpline(knots, np.eye(len(knots) - degree - 1), degree)
     for t in np.sort(np.atleast_1d(np.asarray(new, dtype=np.float64))):
         if not knots[0] < t < knots[-1]:
             raise ValueError(f"new knot {t} lies outside the open interval ({knots[0]}, {knots[-1]})")
-        k = int(find_spans(current, degree, t))
-        n = len(current) - degree - 1
-        i = np.arange(n + 1)
-        inside = (i > k - degree) & (i <= k)
-        alpha = np.where(i <= k - degree, 1.0, 0.0)
-        alpha[inside] = (t - current[i[inside]]) / (current[i[inside] + degree] - current[i[inside]])
-        step = csr_array(
-            (np.concatenate([alpha[:n], 1.0 - alpha[1:]]), (np.concatenate([i[:n], i[1:]]), np.tile(np.arange(n), 2))),
-            shape=(n + 1, n),
-        )
-        matrix = csr_array(step @ matrix)
-        current = np.insert(current, k + 1, t)
-    matrix.eliminate_zeros()
-    return current, matrix
+        spline = spline.insert_knot(t)
+    return spline.t, csr_array(spline.c)
 
 
 def insertion_into(knots: Array, degree: int, finer: Array) -> csr_array:
@@ -216,7 +206,7 @@ def evaluate_at(
 
     coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
     """
-    from scipy.interpolate import NdBSpline  # slow to load, and needed only where points are evaluated
+    from scipy.interpolate import NdBSpline
 
     where = np.atleast_2d(np.asarray(points, dtype=np.float64))
     if where.ndim != 2 or where.shape[1] != 3:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, IntArray, in_brackets
 from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
 from .inside import deepest_point
-from .readers.file import read_mesh
+from .readers.file import RawMesh, read_mesh
 from .self_intersection import SHOWN, crossing_faces, crossing_places, describe_crossings
 from .topology import check_genus, check_manifold, check_volume, choose_component, slivers
 from .welding import orient, signed_volume, weld_and_drop
@@ -108,7 +108,7 @@ def load_surface(path: str | Path, *, component: int | None = None, max_faces: i
     try:
         raw = read_mesh(Path(path), max_faces)
         name = Path(path).name.split(".")[0] or Path(path).name
-        surface = _gate(raw.vertices, raw.faces, name, source, raw.sha256, raw.notices, component, max_faces)
+        surface = _gate(raw, name, source, component, max_faces)
     except MeshError as error:
         raise MeshError(f"{source}: {error}") from None
     logger.debug("%s: %d vertices, %d faces", source, len(surface.vertices), len(surface.faces))
@@ -136,27 +136,19 @@ def surface_from_arrays(
             raise MeshError(f"faces must be integers of shape (m, 3), got {triangles.dtype} of shape {triangles.shape}")
         triangles = triangles.astype(np.int64)
         digest = hashlib.sha256(points.tobytes() + triangles.tobytes()).hexdigest()
-        return _gate(points, triangles, name, "", digest, (), component, max_faces)
+        check_finite(points)
+        check_indices(points, triangles)
+        return _gate(RawMesh(points, triangles, digest, ()), name, "", component, max_faces)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
 
 
-def _gate(
-    vertices: Array,
-    faces: IntArray,
-    name: str,
-    source: str,
-    sha256: str,
-    notices: tuple[str, ...],
-    component: int | None,
-    max_faces: int,
-) -> Surface:
+def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces: int) -> Surface:
     """Make a surface: check, normalise, weld, choose the component, check the topology, orient, place."""
+    vertices, faces = raw.vertices, raw.faces
     check_face_count(len(faces), max_faces)
     if len(faces) < 4:
         raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
-    check_finite(vertices)
-    check_indices(vertices, faces)
     middle, size, remarks = _box(vertices, faces)
     kept, triangles, mended = weld_and_drop((vertices - middle) / size, faces)
     if len(triangles) < 4:
@@ -184,8 +176,8 @@ def _gate(
         vertices=vertices[kept],
         faces=triangles,
         source=source,
-        sha256=sha256,
-        notices=(*notices, *remarks, *mended, *chosen, *turned, *doubts),
+        sha256=raw.sha256,
+        notices=(*raw.notices, *remarks, *mended, *chosen, *turned, *doubts),
         scale=unit_scale / size,
         center=deepest * size + middle,
         unit_vertices=placed.astype(np.float32).astype(np.float64),
