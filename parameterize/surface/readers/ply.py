@@ -18,25 +18,20 @@ from .text import coordinates, corners, text_lines
 
 SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
 SIZES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
-NUMBER = rb"\s+property\s+(?:float|float32|double|uchar|uint8|int|int32|uint|uint32)\s+\w+"
-PLACE = b"".join(rb"\s+property\s+(?:float|float32|double)\s+" + axis for axis in (b"x", b"y", b"z"))
-CORNERS = rb"\s+property\s+list\s+(?:uchar|uint8|int|int32)\s+u?int(?:32)?\s+vertex_ind(?:ex|ices)"
-CORNER_NAMES = {"vertex_index", "vertex_indices"}
-FOR_MESHIO = re.compile(
-    rb"\selement\s+vertex\s+\d+" + PLACE + b"(?:" + NUMBER + rb")*\s+element\s+face\s+\d+" + CORNERS + rb"\s*\Z"
-)
+FOR_MESHIO = {"uchar", "uint8", "int", "int32", "uint", "uint32", "float", "float32", "double"}
+CORNERS = ("vertex_index", "vertex_indices")
 
 
 @dataclass(frozen=True)
 class Element:
     """An element that the header names.
 
-    properties: of each row, in order: name, whether it is a list, and the bytes of its number or its list's length.
+    properties: name and types of each in order: one type for a number, those of the length and the items for a list.
     """
 
     name: str
     count: int
-    properties: list[tuple[str, bool, int]]
+    properties: list[tuple[str, list[str]]]
 
 
 def read_ply(data: bytes, max_faces: int) -> Content:
@@ -59,12 +54,12 @@ def read_ply(data: bytes, max_faces: int) -> Content:
         rows = [(line, text.split()) for line, text in enumerate(text_lines(body), len(lines)) if text.strip()]
         present, needed, unit = len(rows), sum(counts.values()), "rows"
     else:
-        least = {element.name: sum(size for *_, size in element.properties) for element in elements}
+        least = {element.name: sum(SIZES.get(types[0], 1) for _, types in element.properties) for element in elements}
         present, needed, unit = len(body), sum(least[name] * count for name, count in counts.items()), "bytes"
     if present < needed:
         promised = " and ".join(f"{count} {name}" for name, count in counts.items())
         raise MeshError(f"the header promises {promised}, at least {needed} {unit}, where {present} follow; {DAMAGED}")
-    return _read_rows(rows, elements) if is_text else _read_binary(data, head, counts["face"])
+    return _read_rows(rows, elements) if is_text else _read_binary(data, elements)
 
 
 def _elements(lines: list[list[str]]) -> list[Element]:
@@ -73,9 +68,8 @@ def _elements(lines: list[list[str]]) -> list[Element]:
     for words in lines:
         if words[:1] == ["element"] and len(words) == 3:
             elements.append(Element(words[1], header_count(words[2]), []))
-        elif words[:1] == ["property"] and len(words) > 2 and elements:
-            is_list = words[1] == "list"
-            elements[-1].properties.append((words[-1], is_list, SIZES.get(words[1 + is_list], 1)))
+        elif words[:1] == ["property"] and len(words) in (3, 5) and elements:
+            elements[-1].properties.append((words[-1], words[2:4] if len(words) == 5 else words[1:2]))
     return elements
 
 
@@ -97,35 +91,35 @@ def _wanted(words: list[str], element: Element, line: int) -> list[str]:
     held: dict[str, list[str]] = {}
     at = 0
     try:
-        for name, is_list, _ in element.properties:
-            size = header_count(words[at]) if is_list else 1
-            at += is_list
+        for name, types in element.properties:
+            size = header_count(words[at]) if len(types) > 1 else 1
+            at += len(types) - 1
             held[name] = words[at : at + size]
             at += size
+        names = ["x", "y", "z"] if element.name == "vertex" else [name for name in held if name in CORNERS][:1]
         if at <= len(words):
-            return (
-                held["x"] + held["y"] + held["z"]
-                if element.name == "vertex"
-                else held["vertex_index" if "vertex_index" in held else "vertex_indices"]
-            )
+            return [word for name in names for word in held[name]]
     except (LookupError, MeshError):
         pass
     raise MeshError(f"line {line}: no {element.name} as the header promises; {DAMAGED}")
 
 
-def _read_binary(data: bytes, head: bytes, promised: int) -> Content:
-    """Read a binary file of so many faces, whose header, up to `end_header`, is `head`."""
+def _read_binary(data: bytes, elements: list[Element]) -> Content:
+    """Read a binary file whose header names these elements."""
     import meshio
     import trimesh.exchange.ply
 
+    faces = next(element for element in elements if element.name == "face")
+    used = {kind for element in elements for _, types in element.properties for kind in types}
+    only_corners = [name in CORNERS for name, _ in faces.properties] == [True]
     with library(".ply"):
-        if FOR_MESHIO.search(head):
-            renamed = re.sub(rb"\bvertex_index\b", b"vertex_indices", head) + data[len(head) :]
+        if only_corners and used <= FOR_MESHIO and [element.name for element in elements] == ["vertex", "face"]:
+            renamed = re.sub(rb"\bvertex_index\b", b"vertex_indices", data, count=1)
             mesh = meshio.read(io.BytesIO(renamed), file_format="ply")
             places, polygons = mesh.points, [row for block in mesh.cells for row in block.data.tolist()]
         else:
             held = trimesh.exchange.ply.load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
             places, polygons = held["vertices"], held["faces"].astype(np.int64).tolist()
-    if len(polygons) < promised:
-        raise MeshError(f"{promised} faces promised, {len(polygons)} read; {DAMAGED}")
+    if len(polygons) < faces.count:
+        raise MeshError(f"{faces.count} faces promised, {len(polygons)} read; {DAMAGED}")
     return Content(np.asarray(places, dtype=np.float64), polygons)
