@@ -68,8 +68,9 @@ def _elements(lines: list[list[str]]) -> list[Element]:
     for words in lines:
         if words[:1] == ["element"] and len(words) == 3:
             elements.append(Element(words[1], header_count(words[2]), []))
-        elif words[:1] == ["property"] and len(words) in (3, 5) and elements:
-            elements[-1].properties.append((words[-1], words[2:4] if len(words) == 5 else words[1:2]))
+        elif words[:1] == ["property"] and len(words) > 2 and elements:
+            is_list = words[1] == "list" and len(words) > 4
+            elements[-1].properties.append((words[-1], words[2:4] if is_list else words[1:2]))
     return elements
 
 
