@@ -57,3 +57,11 @@ def test_shape_follows_the_options():
     assert network.first.in_features == 6 * 3 + 3 and network.first.out_features == 16
     assert len(network.residual) == 2
     assert "multiples" in network.state_dict() and "scale" in dict(network.named_parameters())
+
+
+def test_first_weights_are_drawn_from_the_generator():
+    torch.manual_seed(5)
+    expected = torch.nn.Linear(6 * 3 + 3, 16)
+    torch.manual_seed(6)
+    network = InverseMap(SMALL, torch.Generator().manual_seed(5))
+    assert torch.equal(network.first.weight, expected.weight) and torch.equal(network.first.bias, expected.bias)
