@@ -163,8 +163,9 @@ def test_without_graphics_library_one_line_names_the_remedy(monkeypatch, caplog,
     rendering.can_draw.cache_clear()
     try:
         result = formula_parameterization()
-        draw_figures(tmp_path, "map", {"volume": result.volume, "history": result.history})
+        missing = draw_figures(tmp_path, "map", {"volume": result.volume, "history": result.history})
     finally:
         rendering.can_draw.cache_clear()
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
     assert "libegl1 libgl1-mesa-dri" in caplog.text
+    assert missing == dict.fromkeys(("lines.png", "cut.png", "distortion.png"), rendering.CANNOT_DRAW)

@@ -2,10 +2,11 @@
 
 from .curves import draw_history, draw_study
 from .map import draw_cut, draw_distortion, draw_faces, draw_folds, draw_lines, draw_meeting
-from .render import can_draw
+from .render import CANNOT_DRAW, can_draw
 from .solution import draw_error, draw_errors, draw_values
 
 __all__ = [
+    "CANNOT_DRAW",
     "can_draw",
     "draw_cut",
     "draw_distortion",

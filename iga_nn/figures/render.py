@@ -21,6 +21,7 @@ log = logging.getLogger(__name__)
 LINE_WIDTH = 1.6  # pixels
 NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: what lies on a surface is seen
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
+CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
 PROBE = """
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
@@ -69,7 +70,7 @@ def can_draw() -> bool:
     except (OSError, subprocess.TimeoutExpired):
         done = False
     if not done:
-        log.warning("no figures: VTK cannot draw on this machine; remedy: %s", REMEDY)
+        log.warning("no figures: %s", CANNOT_DRAW)
     return done
 
 
