@@ -37,7 +37,7 @@ LABELS = {
     "failed": "failed",
     "stopped": "stopped",
 }
-CONTENT = {artifact.file: artifact.holds for artifact in ARTIFACTS}
+CONTENT = {artifact.file: artifact.shows for artifact in ARTIFACTS}
 VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # three sides of the cube are seen
 GREY = 190  # of 255
 EDGES_UP_TO = 3_000  # faces whose edges are drawn, too
@@ -79,7 +79,7 @@ def row(job: Job, before: int) -> dict[str, Any]:
 def _files(job: Job) -> list[dict[str, Any]]:
     """The results there are, with what they hold."""
     found = [(name, job.results / name) for name in CONTENT if (job.results / name).is_file()]
-    return [{"name": name, "size": _size(path.stat().st_size), "holds": CONTENT[name]} for name, path in found]
+    return [{"name": name, "size": _size(path.stat().st_size), "shows": CONTENT[name]} for name, path in found]
 
 
 def _size(count: int) -> str:
