@@ -42,7 +42,7 @@ from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume
 from iga_nn.options import read_corners
 from iga_nn.samples import sample
-from iga_nn.workflow.check import check_surface, check_volume
+from iga_nn.workflow.verdict import check_surface, check_volume
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices

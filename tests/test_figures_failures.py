@@ -106,7 +106,11 @@ def test_a_model_in_millimetres_ends_with_a_word_and_a_page(in_folder):
     benchmark_volume(2).transformed(430.0, [-964.0, -300.0, -964.0]).save("scan.npz")
     assert main(["solve", "poisson", "scan.npz", "--exact", "exp(x+z)*sin(y)", "--out", "out", "--quiet"]) == 4
     report, text = look(Path("out"))
-    assert set(report["not_drawn"].values()) <= {rendering.CANNOT_DRAW} and "means nothing here" in text and "The errors mean nothing" in text
+    assert (
+        set(report["not_drawn"].values()) <= {rendering.CANNOT_DRAW}
+        and "means nothing here" in text
+        and "The errors mean nothing" in text
+    )
     assert main(["solve", "poisson", "scan.npz", "--out", "default", "--quiet"]) == 0
     assert look(Path("default"))[0]["poisson"]["frame"]["length"] == pytest.approx(430.0, rel=0.1)
 

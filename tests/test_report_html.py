@@ -16,7 +16,6 @@ from iga_nn.report import html as page
 from iga_nn.report import viewer as scene
 from solve.study import benchmark_volume
 
-
 VERDICT = "det J &gt; 0: certified; one-to-one: yes"
 
 

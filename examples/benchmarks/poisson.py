@@ -28,9 +28,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from processes import calibrate, processor
 
 from iga_nn.report.document import versions
-from iga_nn.workflow.machine import calibrate, processor
 from parameterize.files import save_text
 from solve import Poisson, benchmark_volume, solve_poisson
 from solve.discretization.norms import error_norms

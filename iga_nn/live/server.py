@@ -186,7 +186,7 @@ class Page:
 
 
 def _guard(port: Callable[[], int]) -> Any:
-    """Return a guard that answers this page alone: another site's page may reach the port through the user's browser."""
+    """Return a guard that answers this page alone: a page of another site could ask through the user's browser."""
 
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
