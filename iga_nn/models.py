@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
-from parameterize.files import save_bytes
 from parameterize.surface.surface import MAX_FACES, MeshError, Surface, load_surface
 
 from .errors import InputError
+from .new_file import check_new, save_new
 from .samples import SAMPLES, obj_text, sample
 
 DATA_FOLDER = "IGA_NN_DATA"
@@ -105,38 +105,10 @@ def fetch(name: str, out: str | Path | None = None, *, force: bool = False) -> P
     """
     if name not in MODELS:
         raise InputError(f"{name}: no such model; the models are {', '.join(sorted(MODELS))}; g1 is all but conch")
-    target = obj_path(name, out)
+    target = check_new(f"{name}.obj" if out is None else out, ".obj")
     source = _in_data_folder(name) or _download(name)
     is_obj = source.suffix == ".obj"
     save_new(target, source.read_bytes() if is_obj else obj_text(load_surface(source)).encode(), force)
-    return target
-
-
-def save_new(target: Path, content: bytes, force: bool) -> None:
-    """Write a file that does not exist or has that content already; replace another one only where `force`.
-
-    Raises InputError.
-    """
-    try:
-        if not target.exists() or force:
-            save_bytes(target, content)
-        elif target.read_bytes() != content:
-            raise InputError(f"{target}: exists; --force replaces it, --out names another file")
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
-
-
-def obj_path(name: str, out: str | Path | None) -> Path:
-    """Return the OBJ file to write. Raises InputError where it cannot be one."""
-    target = Path(out) if out is not None else Path(f"{name}.obj")
-    if target.is_dir() or not target.name:
-        raise InputError(f"{target}: is a directory: name the file to write")
-    if target.suffix != ".obj":
-        raise InputError(f"{target}: surfaces are written as .obj: choose such a name with --out")
-    if not target.parent.is_dir():
-        raise InputError(
-            f"{target}: cannot be written (there is no folder {target.parent}): make it, or choose another with --out"
-        )
     return target
 
 

@@ -40,7 +40,13 @@ app.command(run_app)
 app.command(solve_app)
 
 
-Json = Annotated[bool, Parameter(name="--json")]
+Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
+Volume = Annotated[
+    Path, Parameter(help="volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.")
+]
+ObjFile = Annotated[Path | None, Parameter(help="file to write; NAME.obj in the current folder by default.")]
+Overwrite = Annotated[bool, Parameter(help="replace that file where it has other content.")]
+Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.")]
 
 
 @dataclass(frozen=True)
@@ -52,7 +58,6 @@ class OutputOptions:
         force: replace a finished result in that folder.
         vector: write plots of curves (loss history, errors over the mesh size) as PDF, too.
         quiet: show no progress.
-        as_json: print the verdict as JSON.
     """
 
     out: str | None = None
@@ -79,13 +84,9 @@ POISSON, BODY = PoissonOptions(), ElasticityOptions()
 
 @run_app.command(name="poisson")
 def run_poisson(
-    mesh: str, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING, poisson: Equation = POISSON
+    mesh: Mesh, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING, poisson: Equation = POISSON
 ) -> int:
-    """Parameterize a surface, certify the spline and solve Poisson's equation on it.
-
-    Args:
-        mesh: path of a closed surface, or the name of a sample or a model.
-    """
+    """Parameterize a surface, certify the spline and solve Poisson's equation on it."""
     from ..workflow import pipeline
 
     with _progress(output) as progress:
@@ -94,12 +95,8 @@ def run_poisson(
 
 
 @app.command(name="parameterize")
-def parameterize_mesh(mesh: str, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING) -> int:
-    """Turn a surface into a certified trivariate B-spline.
-
-    Args:
-        mesh: path of a closed surface, or the name of a sample or a model.
-    """
+def parameterize_mesh(mesh: Mesh, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING) -> int:
+    """Turn a surface into a certified trivariate B-spline."""
     from ..workflow import pipeline
 
     with _progress(output) as progress:
@@ -109,7 +106,7 @@ def parameterize_mesh(mesh: str, /, *, output: Output = OUTPUT, mapping: Mapping
 
 @solve_app.command(name="poisson")
 def solve_poisson(
-    volume: Path, /, *, device: Literal["cpu", "cuda"] = "cpu", output: Output = OUTPUT, poisson: Equation = POISSON
+    volume: Volume, /, *, device: Literal["cpu", "cuda"] = "cpu", output: Output = OUTPUT, poisson: Equation = POISSON
 ) -> int:
     """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
 
@@ -117,7 +114,6 @@ def solve_poisson(
     under --neumann or --robin.
 
     Args:
-        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
         device: where the linear system is solved.
     """
     from ..workflow import pipeline
@@ -128,14 +124,11 @@ def solve_poisson(
 
 
 @solve_app.command(name="elasticity")
-def solve_elasticity(volume: Path, /, *, output: Output = OUTPUT, body: Body = BODY) -> int:
+def solve_elasticity(volume: Volume, /, *, output: Output = OUTPUT, body: Body = BODY) -> int:
     """Solve linear elasticity on a volume.npz.
 
     A vector is three formulas separated by semicolons, in quotes: "x*y;0;sin(z)". The volume's six faces u0, u1, v0,
     v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under --traction.
-
-    Args:
-        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
     from ..workflow import pipeline
 
@@ -145,13 +138,10 @@ def solve_elasticity(volume: Path, /, *, output: Output = OUTPUT, body: Body = B
 
 
 @app.command(name="study")
-def study_volume(volume: Path, /, *, output: Output = OUTPUT, study: Study = STUDY) -> int:
+def study_volume(volume: Volume, /, *, output: Output = OUTPUT, study: Study = STUDY) -> int:
     """Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors and their rates.
 
     Results go to STEM-study in the current folder, unless --out names another.
-
-    Args:
-        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
     from ..workflow import pipeline
     from . import answer
@@ -181,7 +171,6 @@ def check(
         max_faces: refuse surfaces with more faces.
         decimate: reduce surfaces with more faces to max_faces instead.
         strict: refuse a surface that intersects itself; without this option it is a notice.
-        as_json: print the verdict as JSON.
     """
     from ..io.formats import is_volume
     from ..report import document as reports
@@ -200,33 +189,29 @@ def check(
 
 
 @app.command(name="sample")
-def write_sample(name: str, /, *, out: Path | None = None, force: bool = False) -> int:
+def write_sample(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> int:
     """Write a surface made by formula as an OBJ file.
 
     Args:
         name: one of the samples.
-        out: file to write; NAME.obj in the current folder by default.
-        force: replace that file where it has other content.
     """
-    from ..models import obj_path, save_new
+    from ..new_file import check_new, save_new
     from ..samples import obj_text, sample
 
     with input_errors():
         surface = sample(name)
-    target = obj_path(name, out)
+    target = check_new(f"{name}.obj" if out is None else out, ".obj")
     save_new(target, obj_text(surface).encode(), force)
     _print(str(target))
     return DONE
 
 
 @app.command(name="fetch")
-def fetch_model(name: str, /, *, out: Path | None = None, force: bool = False) -> int:
+def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> int:
     """Write a published model as an OBJ file; download it where it is not at hand.
 
     Args:
         name: one of the models, or g1 for all those of the set G1.
-        out: file to write; NAME.obj in the current folder by default.
-        force: replace that file where it has other content.
     """
     from ..models import fetch_all
 
@@ -237,12 +222,11 @@ def fetch_model(name: str, /, *, out: Path | None = None, force: bool = False) -
 
 @app.command(name="export")
 def export_volume(
-    volume: Path, /, *, to: str, out: Path | None = None, solution: Path | None = None, force: bool = False
+    volume: Volume, /, *, to: str, out: Path | None = None, solution: Path | None = None, force: bool = False
 ) -> int:
     """Write a volume in a format that other programs read.
 
     Args:
-        volume: volume.npz, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
         to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
             json (splinepy's).
         out: file to write; the volume's stem with the format's ending in the current folder by default.

@@ -38,6 +38,7 @@ from parameterize.files import replacing
 from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, input_errors
+from ..new_file import check_new
 from ..report import document as reports
 from . import splinepy as spline_files
 from .splinepy_gate import kind_of
@@ -160,8 +161,9 @@ def export(
     if to not in FORMATS:
         raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines")
     chosen = FORMATS[to]
-    target = Path(Path(volume).stem + chosen.ending if out is None else out)
-    _check_target(target, to)
+    target = check_new(
+        Path(volume).stem + chosen.ending if out is None else out, chosen.ending[chosen.ending.index(".") :]
+    )
     beside = target.with_name(target.stem + chosen.field_ending) if solution and chosen.write_field else target
     for file in (target, beside):
         if file.exists() and not force:
@@ -176,17 +178,6 @@ def export(
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
     return target
-
-
-def _check_target(target: Path, to: str) -> None:
-    """Raise InputError where a file of format `to` cannot be written under that name."""
-    ending = "." + FORMATS[to].ending.rpartition(".")[2]
-    if target.is_dir() or not target.name:
-        raise InputError(f"{target}: is a directory: name a file with --out")
-    if target.suffix != ending:
-        raise InputError(f"{target}: {to} files end in {ending}: choose such a name with --out")
-    if not target.parent.is_dir():
-        raise InputError(f"{target}: there is no folder {target.parent}: make it, or choose another with --out")
 
 
 def _content(volume: str | Path, solution: str | Path | None) -> Content:

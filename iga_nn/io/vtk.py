@@ -92,7 +92,7 @@ def _mark_active(mark: Callable[[Any], object], name: str, values: NDArray[Any])
 def _bernstein(
     degrees: Sequence[int], knots: Sequence[Array], field: Array, breaks: Sequence[Array], raised: Sequence[int]
 ) -> Array:
-    """Return Bernstein coefficients (s_u q_u + 1, s_v q_v + 1, ...) of degrees `raised` on the spans between `breaks`."""
+    """Return Bernstein coefficients (s_u q_u + 1, s_v q_v + 1, ...) of degrees `raised` on the spans of `breaks`."""
     for axis in range(3):
         missing = np.setdiff1d(breaks[axis], knots[axis])
         finer, insertion = insert_knots(knots[axis], degrees[axis], missing)

@@ -27,16 +27,7 @@ STAGES = {
     "edges": "5 of 6: edges fixed",
     "spline": "6 of 6: the spline",
 }
-LABELS = {
-    "checking": "being checked",
-    "refused": "refused",
-    "ready": "accepted",
-    "waiting": "waiting",
-    "running": "running",
-    "done": "done",
-    "failed": "failed",
-    "stopped": "stopped",
-}
+LABELS = {"checking": "being checked", "ready": "accepted"}  # the other states are called by their names
 CONTENT = {artifact.file: artifact.shows for artifact in ARTIFACTS}
 VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # shows three sides of the cube
 GREY = 190  # of 255
@@ -49,7 +40,7 @@ def row(job: Job, before: int) -> dict[str, Any]:
         "number": job.number,
         "name": job.name,
         "state": job.state,
-        "label": LABELS[job.state] + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
+        "label": LABELS.get(job.state, job.state) + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
         "text": job.text,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",
