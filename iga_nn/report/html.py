@@ -150,12 +150,13 @@ def _levels(section: Report) -> list[list[str]]:
 
 
 def _notices(report: Report) -> list[str]:
-    """Return the notices of the surface and of the solves, and which figures are missing for which reason."""
+    """Return why nothing was solved, the notices of the surface and of the solves, and which figures are missing."""
     missing: dict[str, list[str]] = {}
     for name, reason in report.get("not_drawn", {}).items():
         missing.setdefault(reason, []).append(name)
     undrawn = [f"{', '.join(names)} could not be drawn: {reason}" for reason, names in missing.items()]
-    return [*report["input"].get("notices", []), *reports.solved(report).get("notices", []), *undrawn]
+    refused = [f"not solved: {report['not_solved']}"] if "not_solved" in report else []
+    return [*refused, *report["input"].get("notices", []), *reports.solved(report).get("notices", []), *undrawn]
 
 
 def _figures(report: Report, folder: Path) -> list[tuple[str, str]]:
