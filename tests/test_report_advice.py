@@ -70,7 +70,7 @@ def test_advice_names_what_was_not_tried(options, wanted, absent):
 def test_advice_knows_the_most_control_points_and_an_overlap():
     assert "--control-points" not in "\n".join(advice.what_to_try(failed(control_points=[100, 100, 100])))
     overlapping = failed(bijective="certified", boundary_injective=False, boundary_meeting={"point": [1.0, 2.0, 3.0]})
-    assert "stand farther apart" in advice.what_to_try(overlapping)[0]
+    assert "are farther apart" in advice.what_to_try(overlapping)[0]
     assert advice.in_words(overlapping)[0].endswith("(1, 2, 3)")
 
 
