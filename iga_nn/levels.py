@@ -21,6 +21,11 @@ ESTIMATES = tuple(key for key in TITLES if key.startswith("error_estimate"))
 EXACT_ERRORS = tuple(key for key in TITLES if key.startswith(("l2", "h1")))  # known with an exact solution
 
 
+def capitalized(title: str) -> str:
+    """Return the title with a capital letter first; the others stay."""
+    return title[0].upper() + title[1:]
+
+
 def number(key: str, value: float | None) -> str:
     """Return the number of that key as text, a dash where it is not known."""
     if value is None:

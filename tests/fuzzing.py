@@ -38,6 +38,7 @@ import torch
 from mesh_files import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
 
 from iga_nn.errors import InputError, input_errors, one_line
+from iga_nn.io import Content
 from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume
 from iga_nn.options import read_corners
@@ -342,7 +343,7 @@ def foreign_readers():
             kind,
             suffix,
             check,
-            tuple([written(lambda path, v=v, write=write: write(path, v), suffix)] for v in volumes),
+            tuple([written(lambda path, v=v, write=write: write(path, Content(v)), suffix)] for v in volumes),
         )
 
 

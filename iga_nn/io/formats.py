@@ -40,7 +40,7 @@ from parameterize.spline.volume import BSplineVolume
 from ..errors import InputError, input_errors
 from ..new_file import check_new
 from ..report import document as reports
-from . import splinepy as spline_files
+from . import Content, splinepy, vtk
 from .splinepy_gate import kind_of
 
 if TYPE_CHECKING:
@@ -50,15 +50,6 @@ if TYPE_CHECKING:
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 _PROBLEMS = ("poisson", "elasticity")  # sections of report.json with a solution.npz
-
-
-@dataclass(frozen=True)
-class Content:
-    """What is exported: a volume, a solution on it, and the problem whose exact solution is known."""
-
-    volume: BSplineVolume
-    field: SplineField | None = None
-    problem: Problem | None = None
 
 
 @dataclass(frozen=True)
@@ -76,35 +67,16 @@ class Format:
     write_field: Callable[[Path, SplineField], None] | None = None
 
 
-def _spline_format(kind: str, ending: str, field_ending: str) -> Format:
-    """Return a format that splinepy reads and writes, under its name in `io.splinepy`."""
-    return Format(
-        ending,
-        write=lambda path, content: spline_files.WRITERS[kind](path, content.volume, content.field),
-        read=partial(spline_files.read, kind=kind),
-        field_ending=field_ending,
-        write_field=spline_files.FIELD_WRITERS[kind],
-    )
-
-
-def _write_bezier(path: Path, content: Content) -> None:
-    from .vtk import write_bezier
-
-    write_bezier(path, content.volume, content.field)
-
-
-def _write_view(path: Path, content: Content) -> None:
-    from .vtk import write_view
-
-    write_view(path, content.volume, content.field, content.problem)
-
-
 FORMATS = {
-    "gismo": _spline_format("gismo", ".xml", "_u.xml"),
-    "mfem": _spline_format("mfem", ".mesh", ".gf"),
-    "vtk": Format("_bezier.vtu", _write_bezier),
-    "view": Format("_view.vtu", _write_view),
-    "json": _spline_format("json", ".json", "_u.json"),
+    "gismo": Format(
+        ".xml", splinepy.write_gismo, partial(splinepy.read, kind="gismo"), "_u.xml", splinepy.write_gismo_field
+    ),
+    "mfem": Format(".mesh", splinepy.write_mfem, partial(splinepy.read, kind="mfem"), ".gf", splinepy.write_mfem_field),
+    "vtk": Format("_bezier.vtu", vtk.write_bezier),
+    "view": Format("_view.vtu", vtk.write_view),
+    "json": Format(
+        ".json", splinepy.write_json, partial(splinepy.read, kind="json"), "_u.json", splinepy.write_json_field
+    ),
 }
 
 

@@ -18,7 +18,6 @@ of one coordinate, or of three for displacements (`geoDim`, `dim`).
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -30,31 +29,46 @@ from parameterize.spline.bspline import apply_along, insertion_into
 from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, one_line
+from . import Content
 from .splinepy_gate import checked_text
 
 if TYPE_CHECKING:
     from solve.field import SplineField
 
-    Spline = BSplineVolume | SplineField
-
 INSTALL = "pip install 'iga-nn[interop]'"
 WEIGHTS_ALIKE = 1e-12  # relative
 
 
-def _write_gismo(path: Path, spline: Spline) -> None:
+def write_gismo(path: Path, content: Content) -> None:
+    """Write a volume as G+Smo XML."""
+    write_gismo_field(path, content.volume)
+
+
+def write_gismo_field(path: Path, spline: BSplineVolume | SplineField) -> None:
+    """Write a spline as G+Smo XML."""
     splinepy = _splinepy()
     patches = splinepy.Multipatch([_to_splinepy(spline)])
     patches.interfaces = np.full((1, 6), -1)  # no neighbours: splinepy cannot look for those of scalar splines
     splinepy.io.gismo.export(str(path), patches)
 
 
-def _write_mfem(path: Path, volume: BSplineVolume, field: SplineField | None) -> None:
-    """Write an MFEM NURBS mesh, on the knots of the solution where there is one."""
-    map_on_its_knots = volume if field is None else _on_knots_of(field, volume)
-    _splinepy().io.mfem.export(str(path), _to_splinepy(map_on_its_knots).nurbs)
+def write_json(path: Path, content: Content) -> None:
+    """Write a volume as splinepy's JSON."""
+    write_json_field(path, content.volume)
 
 
-def _write_mfem_field(path: Path, field: SplineField) -> None:
+def write_json_field(path: Path, spline: BSplineVolume | SplineField) -> None:
+    """Write a spline as splinepy's JSON."""
+    _splinepy().io.json.export(str(path), [_to_splinepy(spline)])
+
+
+def write_mfem(path: Path, content: Content) -> None:
+    """Write a volume as an MFEM NURBS mesh, on the knots of the solution where there is one."""
+    volume = content.volume if content.field is None else _on_knots_of(content.field, content.volume)
+    _splinepy().io.mfem.export(str(path), _to_splinepy(volume).nurbs)
+
+
+def write_mfem_field(path: Path, field: SplineField) -> None:
     """Write a solution as an MFEM grid function on the mesh of a volume with the same degrees and knots."""
     spline = _to_splinepy(field)
     order, _ = _splinepy().io.mfem.dof_mapping(spline)
@@ -75,23 +89,6 @@ def _on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
     for axis, (own, finer) in enumerate(zip(volume.knots, field.knots, strict=True)):
         points = apply_along(insertion_into(own, volume.degrees[axis], finer), points, axis)
     return BSplineVolume(volume.degrees, field.knots, points)
-
-
-def _write_json(path: Path, spline: Spline) -> None:
-    _splinepy().io.json.export(str(path), [_to_splinepy(spline)])
-
-
-# Writers of a volume, whose solution MFEM's alone needs, and of a solution in a file of its own
-WRITERS: dict[str, Callable[[Path, BSplineVolume, SplineField | None], None]] = {
-    "gismo": lambda path, volume, _: _write_gismo(path, volume),
-    "mfem": _write_mfem,
-    "json": lambda path, volume, _: _write_json(path, volume),
-}
-FIELD_WRITERS: dict[str, Callable[[Path, SplineField], None]] = {
-    "gismo": _write_gismo,
-    "mfem": _write_mfem_field,
-    "json": _write_json,
-}
 
 
 def read(path: Path, kind: str) -> BSplineVolume:
@@ -151,7 +148,7 @@ def _splinepy() -> Any:
     return splinepy
 
 
-def _to_splinepy(spline: Spline) -> Any:
+def _to_splinepy(spline: BSplineVolume | SplineField) -> Any:
     net = spline.control_points if isinstance(spline, BSplineVolume) else spline.coefficients
     rows = net.transpose(2, 1, 0, *range(3, net.ndim)).reshape(np.prod(net.shape[:3]), -1)  # u fastest
     return _splinepy().BSpline(list(spline.degrees), [knots.tolist() for knots in spline.knots], rows)

@@ -32,20 +32,20 @@ from parameterize.spline.volume import BSplineVolume
 from solve.forms.frame import UnitFrame
 
 from ..figures.evaluate import error_at
+from . import Content
 
 if TYPE_CHECKING:
     from solve.field import SplineField
-
-    from ..figures.evaluate import Problem
 
 SAMPLES = 3  # intervals of the view per span and direction
 BEZIER_HEXAHEDRON = 79
 
 
-def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None = None) -> None:
-    """Write the exact cells; `solution` becomes the point data `u`."""
+def write_bezier(path: Path, content: Content) -> None:
+    """Write the exact cells; a solution becomes the point data `u`."""
     import pyvista
 
+    volume, solution = content.volume, content.field
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
     breaks = [np.unique(np.concatenate([s.knots[a] for s in shown])) for a in range(3)]
     degrees = [max(s.degrees[a] for s in shown) for a in range(3)]
@@ -61,12 +61,11 @@ def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None
     _write(path, grid)
 
 
-def write_view(
-    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Problem | None = None
-) -> None:
-    """Write samples of the map, the solution and, where `problem` has an exact solution, the error."""
+def write_view(path: Path, content: Content) -> None:
+    """Write samples of the map, the solution and, where its problem has an exact solution, the error."""
     import pyvista
 
+    volume, solution, problem = content.volume, content.field, content.problem
     u, v, w = (divided_spans(knots, SAMPLES) for knots in volume.knots)
     points = volume.grid(u, v, w)  # (m_u, m_v, m_w, 3)
     jacobians = volume.grid_jacobian(u, v, w)

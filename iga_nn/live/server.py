@@ -11,11 +11,14 @@ import logging
 import webbrowser
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from aiohttp import ClientError, http_exceptions, web
 from trame.app import get_server
+from trame.ui.html import DivLayout
+from trame.widgets import client, vtk
 
 from parameterize.arrays import Array
 from parameterize.surface.surface import Surface
@@ -26,7 +29,6 @@ from ..options import MapOptions, PoissonOptions
 from ..samples import SAMPLES, sample, write_obj
 from ..workflow.output_folder import has_checkpoint
 from . import worker as job_process
-from .layout import lay_out
 from .queue import Job, Jobs
 from .state import CONTENT, MEGABYTE, colors, places, row, triangles
 from .worker import Message
@@ -55,10 +57,11 @@ class Page:
         """Serve until interrupted; `say` is told the address."""
         server = self._server
         server.state.update({"jobs": [], "current": 0, "shown": 0, "trame__title": "iga-nn"})
+        server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES)})
         server.state.client_only("shown")
         for name, act in {"start": self.jobs.start, "stop": self.jobs.stop}.items():
             server.trigger(name)(self._on_job(act))
-        lay_out(server, self._limit // MEGABYTE)
+        self._lay_out()
         server.controller.on_server_bind.add(self._bind)
 
         def ready(**_: Any) -> None:
@@ -74,6 +77,16 @@ class Page:
         finally:
             self._loop = None
             self.jobs.close()
+
+    def _lay_out(self) -> None:
+        """Give trame the page's template, style and script."""
+        here = files(__package__)
+        sheets = (files("iga_nn.report") / "page.css", here / "app.css")
+        vtk.initialize(self._server)  # its elements stand in the template, where trame does not see them
+        with DivLayout(self._server) as layout:
+            client.Style("".join(sheet.read_text(encoding="utf-8") for sheet in sheets))
+            client.Script((here / "app.js").read_text(encoding="utf-8"))
+            layout.root.add_child((here / "app.html").read_text(encoding="utf-8"))
 
     # Jobs
 

@@ -35,11 +35,6 @@ class Artifact:
     is_curve: bool = False
 
     @property
-    def heading(self) -> str:
-        """The heading of the figure on the report page."""
-        return self.shows[0].upper() + self.shows[1:]
-
-    @property
     def files(self) -> tuple[str, ...]:
         """All names the file may be written under."""
         return (self.file, self.file.replace(".png", ".pdf")) if self.is_curve else (self.file,)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from parameterize.files import save_text
 
 from ..errors import one_line
-from ..levels import TITLES, number
+from ..levels import TITLES, capitalized, number
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, figures_of
@@ -132,12 +132,8 @@ def _error_fact(level: Report, key: str) -> tuple[str, str, str]:
     """Return the relative error with the absolute one as the remark; where the solution is zero, that alone."""
     relative = level.get(f"{key}_relative")
     if relative is None:
-        return _capitalized(TITLES[key]), f"{level[key]:.3e}", "on the finest mesh"
-    return _capitalized(TITLES[f"{key}_relative"]), f"{relative:.3e}", f"absolute {level[key]:.3e}"
-
-
-def _capitalized(title: str) -> str:
-    return title[0].upper() + title[1:]
+        return capitalized(TITLES[key]), f"{level[key]:.3e}", "on the finest mesh"
+    return capitalized(TITLES[f"{key}_relative"]), f"{relative:.3e}", f"absolute {level[key]:.3e}"
 
 
 def _levels(section: Report) -> list[list[str]]:
@@ -162,7 +158,9 @@ def _notices(report: Report) -> list[str]:
 def _figures(report: Report, folder: Path) -> list[tuple[str, str]]:
     """Return heading and picture, in Base64, of the figures that belong to this report and are there."""
     there = [figure for figure in figures_of(report) if (folder / figure.file).is_file()]
-    return [(each.heading, base64.b64encode((folder / each.file).read_bytes()).decode("ascii")) for each in there]
+    return [
+        (capitalized(each.shows), base64.b64encode((folder / each.file).read_bytes()).decode("ascii")) for each in there
+    ]
 
 
 def _details(report: Report) -> dict[str, dict[str, Any]]:
