@@ -29,19 +29,19 @@ def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) ->
 
     marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    figure, (panels,) = panels_of(1, 2)
-    show_around(panels, face_patches(volume, SAMPLES), marks)
-    name_faces(figure)
-    figure.suptitle("Images of the six faces of the unit cube", fontsize=14)
-    save(figure, path)
+    _draw_around(path, face_patches(volume, SAMPLES), "Images of the six faces of the unit cube", marks)
 
 
 def draw_lines(path: Path, volume: BSplineVolume) -> None:
     """Draw lines of constant parameters, a tenth apart, on the images of the six faces, from the front and behind."""
+    _draw_around(path, face_patches(volume, SAMPLES, EVERY), "Lines of constant u, v, w, a tenth apart")
+
+
+def _draw_around(path: Path, patches: list[Patch], title: str, marks: Array | None = None) -> None:
     figure, (panels,) = panels_of(1, 2)
-    show_around(panels, face_patches(volume, SAMPLES, EVERY))
+    show_around(panels, patches, marks)
     name_faces(figure)
-    figure.suptitle("Lines of constant u, v, w, a tenth apart", fontsize=14)
+    figure.suptitle(title, fontsize=14)
     save(figure, path)
 
 
