@@ -108,6 +108,7 @@ class PoissonOptions:
     degree: int | None = None
 
     section: ClassVar[str] = "poisson"
+    components: ClassVar[int] = 1  # of the solution
 
     def problem(self) -> Poisson:
         """Return the problem of these options. Raises InputError."""
@@ -161,6 +162,7 @@ class ElasticityOptions:
     degree: int | None = None
 
     section: ClassVar[str] = "elasticity"
+    components: ClassVar[int] = 3
 
     def problem(self) -> Elasticity:
         """Return the problem of these options. Raises InputError."""

@@ -17,17 +17,9 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
+from ..figures import evaluate
 from ..figures.color_range import ColorRange, error_range, even_range
-from ..figures.evaluate import (
-    FACE_COLORS,
-    MAP,
-    all_grids,
-    distortions,
-    face_labels,
-    points_on,
-    sampled_error,
-    solution_on,
-)
+from ..figures.evaluate import distortions, points_on, solution_on
 from ..figures.render import widest_view
 
 if TYPE_CHECKING:
@@ -43,7 +35,7 @@ Scene = dict[str, Any]
 
 def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: Problem | None = None) -> Scene:
     """Return what viewer.js draws, in JSON's own types; solution and error only where they are known and finite."""
-    grids = all_grids(SAMPLES)
+    grids = evaluate.all_grids(SAMPLES)
     points = [points_on(volume, grid) for grid in grids]
     fields = [_field("distortion", "tanh(√ARAP / 2), volume 1", distortions(volume, grids), ColorRange(0.0, 1.0))]
     if solution is not None and np.all(np.isfinite(solution.coefficients)):
@@ -51,7 +43,7 @@ def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: P
         values = [solution_on(solution, grid) for grid in grids]
         fields.append(_field("solution", name, values, even_range(values)))
         if problem is not None and problem.exact is not None:
-            _, errors = sampled_error(volume, solution, problem, SAMPLES)
+            _, errors = evaluate.sampled_error(volume, solution, problem, SAMPLES)
             fields.append(_field("error", "|u − uₕ|, logarithmic", errors, error_range([errors])))
     cloud = np.concatenate([where.reshape(-1, 3) for where in points])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
@@ -65,8 +57,8 @@ def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: P
         "view": frame.tolist(),
         "half": half.tolist(),
         "places": _packed((cloud - low) / np.where(high > low, high - low, 1.0), np.uint16),
-        "colors": list(FACE_COLORS),
-        "labels": face_labels(),
+        "colors": list(evaluate.FACE_COLORS),
+        "labels": evaluate.face_labels(),
         "map": _color_map(),
         "fields": fields,
     }
@@ -81,7 +73,7 @@ def _field(name: str, title: str, patches: Sequence[Array], limits: ColorRange) 
 def _color_map() -> str:
     from matplotlib import colormaps
 
-    return _packed(colormaps[MAP](np.arange(256))[:, :3])  # (256, 3)
+    return _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3])  # (256, 3)
 
 
 def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint8) -> str:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -42,7 +42,10 @@ LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8
 
 @dataclass(frozen=True)
 class Forecast:
-    """The cost of one start. seconds: for an easy and for a hard surface. memory_mb: peak of the resident memory."""
+    """The cost of one start, the section `estimate` of report.json.
+
+    seconds: for an easy and for a hard surface. memory_mb: peak of the resident memory.
+    """
 
     seconds: tuple[float, float]
     memory_mb: float
@@ -53,10 +56,6 @@ class Forecast:
         first, last = max(1, round(low / size)), max(1, round(high / size))
         span = f"{first} to {last} {unit}s" if first < last else f"{last} {unit}{'s' * (last > 1)}"
         return f"about {span}, {self.memory_mb / 1000.0:.1f} GB of memory"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the section `estimate` of report.json."""
-        return {"seconds": list(self.seconds), "memory_mb": self.memory_mb}
 
 
 def forecast(

@@ -54,7 +54,8 @@ def run(
         raise InputError(f"problem {problem!r}: only 'poisson' can be solved")
     mapping, poisson = mapping or MapOptions(), poisson or PoissonOptions()
     equation, spline = poisson.problem(), mapping.config().spline
-    unknowns = _check_size(BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree), poisson)
+    blank = BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree)
+    unknowns = check_size(blank, max(poisson.refine), poisson.degree)
     command = command_line("run poisson", mesh, mapping, poisson, out=out)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
@@ -104,7 +105,7 @@ def solve_to(
     options, path = problem or PoissonOptions(), Path(volume)
     equation = options.problem()
     loaded = load_volume(path)
-    _check_size(loaded, options)
+    check_size(loaded, max(options.refine), options.degree, options.components)
     with input_errors():
         check_problem(loaded, equation)
         check_device(device, equation)
@@ -180,8 +181,3 @@ def _finish(
     outcome = state.finish()
     html.write(outcome.folder, outcome.report, scene)
     return outcome
-
-
-def _check_size(volume: BSplineVolume, options: ProblemOptions) -> int:
-    """Return the unknowns of the largest problem. Raises InputError where these are too many."""
-    return check_size(volume, max(options.refine), options.degree, 3 if options.section == "elasticity" else 1)

@@ -182,7 +182,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
         command=command,
         input=given.surface.summary(),
         config=asdict(result.config),
-        estimate=given.expected.as_dict(),
+        estimate=asdict(given.expected),
         seed=options.seed,
         device=result.device,
         versions=reports.versions(),
