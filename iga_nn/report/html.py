@@ -100,6 +100,8 @@ def _verdicts(report: Report) -> list[tuple[str, str, str]]:
         meaning += f" The worst place is u, v, w = {_point(quality['witness'])}."
     color = "good" if reports.is_certified(report) else "bad" if answer == "no" else "unsure"
     found = [(color, f"det J > 0: {quality['bijective']}; one-to-one: {answer}", meaning)]
+    if "not_solved" in report:
+        found.append(("bad", "The problem was not solved", report["not_solved"]))
     if not reports.is_meaningful(report):
         found.append(("bad", "The errors mean nothing", "The notices below say why."))
     if not reports.is_converged(report):
@@ -146,13 +148,12 @@ def _levels(section: Report) -> list[list[str]]:
 
 
 def _notices(report: Report) -> list[str]:
-    """Return why nothing was solved, the notices of the surface and of the solves, and which figures are missing."""
+    """Return the notices of the surface and of the solves, and which figures are missing for which reason."""
     missing: dict[str, list[str]] = {}
     for name, reason in report.get("not_drawn", {}).items():
         missing.setdefault(reason, []).append(name)
     undrawn = [f"{', '.join(names)} could not be drawn: {reason}" for reason, names in missing.items()]
-    refused = [f"not solved: {report['not_solved']}"] if "not_solved" in report else []
-    return [*refused, *report["input"].get("notices", []), *reports.solved(report).get("notices", []), *undrawn]
+    return [*report["input"].get("notices", []), *reports.solved(report).get("notices", []), *undrawn]
 
 
 def _figures(report: Report, folder: Path) -> list[tuple[str, str]]:

@@ -14,6 +14,7 @@ from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
 from ..options import ProblemOptions
+from ..report import document as reports
 from ..report import html
 from .output_folder import RunFolder
 
@@ -73,7 +74,8 @@ def reported(state: RunFolder, volume: BSplineVolume) -> Iterator[None]:
         yield
     except InputError as error:
         state.write(not_solved=one_line(error))
-        html.write(state.folder, state.report | {"seconds": state.seconds}, scene_of(state, volume))
+        known = reports.plain(state.report | {"seconds": state.seconds})
+        html.write(state.folder, known, scene_of(state, volume))
         raise
 
 
