@@ -89,7 +89,7 @@ def test_elasticity_near_beam_theory(tmp_path, capsys):
     assert found == pytest.approx(known, rel=0.02)
 
 
-def test_batch_goes_on_after_a_refused_file(formula_map, tmp_path, capsys):
+def test_batch_goes_on_after_a_refused_file(formula_map, in_folder, tmp_path, capsys):
     picture = load("batch").main(("bean", "nowhere.obj"), tmp_path)
     assert imread(picture).std() > 0.05
     rows = list(csv.DictReader((tmp_path / "batch.csv").open()))

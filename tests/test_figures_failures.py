@@ -124,7 +124,7 @@ def test_a_study_whose_numbers_mean_nothing_says_so(in_folder):
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-310, 1e-160, 1e300])
-def test_errors_of_any_size_are_drawn(size, tmp_path, monkeypatch):
+def test_errors_of_any_size_are_drawn(size, tmp_path, small_views):
     if not rendering.can_draw():
         pytest.skip(f"VTK cannot draw on this machine; remedy: {rendering.REMEDY}")
     volume = benchmark_volume(1)
