@@ -10,15 +10,21 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import iga_nn
 from iga_nn.cli.commands import main as iga_nn_main
-from iga_nn.figures import draw_errors
-from iga_nn.figures.render import can_draw
+from iga_nn.figures.color_range import error_range
+from iga_nn.figures.evaluate import SECTIONS, sampled_error
+from iga_nn.figures.render import Patch, can_draw, draw, widest_view
+from iga_nn.figures.style import PANEL, SAMPLES, color_bar, colors, panels_of, save
 from iga_nn.report.document import read
+from solve import Solution
 
 EXACT = "exp(x+z)*sin(y)"  # the paper's, in the units the models came in
 ABSENT, FAILED = "model not public", "run failed"
@@ -41,6 +47,29 @@ PAPER = {
     "conch": Published(1.468, 50.818, 0.00169, 182.38, 39.02, 221.40),
     "santa4": Published(3.936, 95.842, 0.00527, 194.23, 38.71, 232.93),
 }
+
+
+def draw_errors(
+    path: Path, volume: iga_nn.BSplineVolume, solutions: Sequence[Solution], problem: iga_nn.Poisson
+) -> None:
+    """Draw |u - u_h| on the boundary and the three mid-sections, a row per mesh, as the paper's Fig. 14 does."""
+    samples = [sampled_error(volume, solution, problem, SAMPLES) for solution in solutions]
+    limits = error_range([errors for _, errors in samples])
+    figure, rows = panels_of(len(solutions), 4)
+    for row, (points, errors), solution in zip(rows, samples, solutions, strict=True):
+        for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
+            lit = isinstance(shown, slice)
+            chosen = range(6) if isinstance(shown, slice) else (shown,)
+            patches = [Patch(points[i], colors(errors[i], limits), lit=lit) for i in chosen]
+            cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
+            panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if lit else 0.0), PANEL))
+            panel.set_title(title, fontsize=13)
+        report = solution.report
+        relative = "" if report.l2_relative is None else f"relative L2 error {report.l2_relative:.3e}, "
+        label = f"{report.dofs} unknowns, {relative}L2 error {report.l2:.3e}"
+        row[0].text(0.0, 0.0, label, transform=row[0].transAxes, fontsize=14)
+    color_bar(figure, rows, limits, r"$|u - u_h|$")
+    save(figure, path)
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""The console script and `python -m iga_nn`; the command line is imported inside, where Ctrl-C is caught already."""
+"""Runs the console script and `python -m iga_nn`; the command line is imported where Ctrl-C is caught already."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""What goes wrong through the user's input, and how it is said: in one line."""
+"""Holds the errors that the user's input causes, and puts them in one line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class InputError(ValueError):
 
 @contextmanager
 def input_errors() -> Iterator[None]:
-    """Turn ValueError and OSError into InputError: around calls that only read or check what the user gave."""
+    """Turn ValueError and OSError of the block into InputError; the block only reads or checks what the user gave."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -28,7 +28,7 @@ def expected_errors() -> tuple[type[Exception], ...]:
 
 
 def one_line(error: BaseException) -> str:
-    """Return an exception's message as one line; "path: reason" where the operating system refused."""
+    """Return the message of an exception as one line; "path: reason" where the operating system refused."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     return " ".join(str(error).split())

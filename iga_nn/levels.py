@@ -1,6 +1,8 @@
-"""The numbers of a level, one solve on one mesh: their keys in report.json and study.csv, and what they are called."""
+"""Names the numbers of a level, which is one solve on one mesh, and writes them as text."""
 
-TITLES = {  # in the order they are shown
+from __future__ import annotations
+
+TITLES = {  # keys of report.json and study.csv, in the order they are shown
     "degree": "degree",
     "elements": "elements",
     "dofs": "unknowns",
@@ -17,3 +19,19 @@ TITLES = {  # in the order they are shown
 }
 ESTIMATES = tuple(key for key in TITLES if key.startswith("error_estimate"))
 EXACT_ERRORS = tuple(key for key in TITLES if key.startswith(("l2", "h1")))  # known with an exact solution
+
+
+def capitalized(title: str) -> str:
+    """Return the title with a capital letter first; the others stay."""
+    return title[0].upper() + title[1:]
+
+
+def number(key: str, value: float | None) -> str:
+    """Return the number of that key as text, a dash where it is not known."""
+    if value is None:
+        return "–"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if key == "h":
+        return f"{value:.4g}"
+    return f"{value:.2f}" if key.startswith("rate") else f"{value:.3e}"

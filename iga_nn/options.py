@@ -1,4 +1,4 @@
-"""What a user may choose: the options of the pipeline and of the command line, and the check of their values."""
+"""Holds the options of the pipeline and of the command line, and checks their values."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     from solve import Elasticity, Poisson
     from solve.forms.frame import UnitFrame
 
-_CORNERS_BYTES = 65_536
-_LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
-_LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 MAX_CONTROL_POINTS = 100  # per direction
 MAX_STEPS_FACTOR = 100.0
 MAX_REFINE = 6
+MAX_DEGREE = 8
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
+_CORNERS_BYTES = 65_536
+_LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
+_LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 
 
 @dataclass(frozen=True)
@@ -34,16 +35,16 @@ class MapOptions:
     Attributes:
         preset: "fast", made for two CPU cores, or "paper", the paper's own settings.
         seed: equal seeds give equal volumes, bit for bit.
-        device: where the network is trained; "auto" takes CUDA where there is one.
-        control_points: per direction.
-        corners: JSON file with a list of eight, one a corner of the cube in the order (0,0,0), (0,0,1), (0,1,0), ...,
-            (1,1,1): points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
+        device: where the network is trained; "auto" takes CUDA where it is available.
+        control_points: number of control points per direction.
+        corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the
+            cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
-        resume: go on from the checkpoint in the output folder.
-        component: which connected piece of the file to take, counted from 0.
-        max_faces: refuse larger surfaces.
-        decimate: bring larger surfaces down to max_faces instead; a notice says how far they moved.
-        steps_factor: shorten (or lengthen) every stage by this factor; for a quick look.
+        resume: continue from the checkpoint in the output folder.
+        component: number of the connected component to take, counted from 0.
+        max_faces: refuse surfaces with more faces.
+        decimate: reduce surfaces with more faces to max_faces instead; a notice says how far they moved.
+        steps_factor: multiply the steps of every stage by this factor; a small one gives a quick look.
     """
 
     preset: Literal["fast", "paper"] = "fast"
@@ -58,44 +59,42 @@ class MapOptions:
     steps_factor: float = 1.0
 
     def config(self) -> Config:
-        """The configuration these options name. Raises InputError for values that cannot be run."""
+        """Return the configuration of these options. Raises InputError for values that cannot be run."""
         from parameterize.config import preset
 
         if self.seed < 0:
             raise InputError(f"seed {self.seed}: must not be negative")
         if not 0.0 < self.steps_factor <= MAX_STEPS_FACTOR:
             raise InputError(f"steps factor {self.steps_factor}: must be positive, at most {MAX_STEPS_FACTOR:g}")
-        if self.control_points > MAX_CONTROL_POINTS:
-            raise InputError(f"control points {self.control_points}: at most {MAX_CONTROL_POINTS} per direction")
         with input_errors():
-            config = preset(self.preset).scaled(self.steps_factor).with_control_points(self.control_points)
-        if self.control_points <= config.spline.degree:
-            raise InputError(
-                f"control points {self.control_points}: degree 3 needs at least {config.spline.degree + 1}"
-            )
-        return config
+            config = preset(self.preset)
+            fewest = config.spline.degree + 1
+            if not fewest <= self.control_points <= MAX_CONTROL_POINTS:
+                limits = f"at least {fewest}, at most {MAX_CONTROL_POINTS} per direction"
+                raise InputError(f"control points {self.control_points}: {limits}")
+            return config.scaled(self.steps_factor).with_control_points(self.control_points)
 
 
 @dataclass(frozen=True)
 class PoissonOptions:
     """-div(kappa grad u) + c u = f on the volume, data on its six faces, and the meshes it is solved on.
 
-    A formula knows x, y, z, in the input's units, and X, Y, Z, the same scaled to volume 1 about the middle of the
+    A formula may use x, y, z, in the input's units, and X, Y, Z, the same scaled to volume 1 about the middle of the
     volume's bounding box: X = (x - c) / V^(1/3). A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and
     so on.
 
     Attributes:
-        exact: solution as a formula; gives f and g, and errors are reported. exp(X+Z)*sin(Y) where neither f nor g is
-            given. A formula that starts with a minus is written --exact=-x.
+        exact: exact solution, a formula, from which f and g follow; errors are reported. It is exp(X+Z)*sin(Y) where
+            neither f nor g is given. A formula that starts with a minus is written --exact=-x.
         source: f, a formula.
         boundary: g, the values of u, a formula.
-        kappa: one formula, or six with commas between them for a symmetric tensor: xx,xy,xz,yy,yz,zz.
+        kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz.
         reaction: c, a formula.
-        neumann: faces with the flux kappa du/dn, each as FACE=FORMULA, or FACE alone for that of the exact solution.
-        robin: faces with kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
+        neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for that of the exact solution.
+        robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
             solution.
-        refine: each level halves every span of the map's knots that many times.
-        degree: of the trial space; the map's own by default.
+        refine: levels to solve on; level n halves every knot span of the map n times.
+        degree: degree of the trial space; that of the map by default.
     """
 
     exact: str | None = None
@@ -109,9 +108,10 @@ class PoissonOptions:
     degree: int | None = None
 
     section: ClassVar[str] = "poisson"
+    components: ClassVar[int] = 1  # of the solution
 
     def problem(self) -> Poisson:
-        """The problem these options name. Raises InputError."""
+        """Return the problem of these options. Raises InputError."""
         from solve import Poisson
 
         check_space(self.refine, self.degree)
@@ -138,18 +138,18 @@ class ElasticityOptions:
     """Linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
 
     A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
-    or X, Y, Z (scaled to volume 1 about the middle) with semicolons between them, in quotes: "x*y;0;sin(z)".
+    or X, Y, Z (scaled to volume 1 about the middle), separated by semicolons, in quotes: "x*y;0;sin(z)".
 
     Attributes:
-        exact: displacement as a vector; gives force and boundary data, and errors are reported. One that starts with
-            a minus is written --exact="-x;0;0".
+        exact: exact displacement, a vector, from which force and boundary data follow; errors are reported. One that
+            starts with a minus is written --exact="-x;0;0".
         body_force: force per volume, a vector.
-        displacement: its values on the faces without traction, a vector; zero without it and without exact.
-        traction: faces that are pulled, each as "FACE=VECTOR", or FACE alone for the traction of the exact solution.
+        displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
+        traction: faces where a traction is given, each as "FACE=VECTOR", or FACE for that of the exact solution.
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
-        refine: each level halves every span of the map's knots that many times.
-        degree: of the trial space; the map's own by default.
+        refine: levels to solve on; level n halves every knot span of the map n times.
+        degree: degree of the trial space; that of the map by default.
     """
 
     exact: str | None = None
@@ -162,9 +162,10 @@ class ElasticityOptions:
     degree: int | None = None
 
     section: ClassVar[str] = "elasticity"
+    components: ClassVar[int] = 3
 
     def problem(self) -> Elasticity:
-        """The problem these options name. Raises InputError."""
+        """Return the problem of these options. Raises InputError."""
         from solve import Elasticity
 
         check_space(self.refine, self.degree)
@@ -181,13 +182,13 @@ class ElasticityOptions:
 
 @dataclass(frozen=True)
 class StudyOptions:
-    """A known solution of Poisson's problem, and the trial spaces it is approximated in.
+    """An exact solution of Poisson's problem, and the trial spaces it is approximated in.
 
     Attributes:
         exact: the solution, a formula in x, y, z or X, Y, Z (scaled to volume 1 about the middle); exp(X+Z)*sin(Y) by
             default. One that starts with a minus is written --exact=-x.
-        degree: one or more; the map's own by default.
-        refine: levels, each halves every span of the map's knots that many times: 0 1 2, or 0..2.
+        degree: one or more degrees; that of the map by default.
+        refine: levels to solve on, 0 1 2 or 0..2; level n halves every knot span of the map n times.
     """
 
     exact: str | None = None
@@ -195,11 +196,11 @@ class StudyOptions:
     refine: tuple[str, ...] = ("0..2",)
 
     def problem(self) -> Poisson:
-        """The problem these options name. Raises InputError."""
+        """Return the problem of these options. Raises InputError."""
         return PoissonOptions(exact=self.exact).problem()
 
     def levels(self) -> list[int]:
-        """The refinement levels in order. Raises InputError, also for degrees that cannot be run."""
+        """Return the refinement levels in order. Raises InputError, also for degrees that cannot be run."""
         levels = [level for text in self.refine for level in _range(text)]
         if len(set(self.degree)) != len(self.degree):
             raise InputError(f"degree {self.degree}: give distinct degrees")
@@ -215,14 +216,18 @@ def check_space(refine: Sequence[int], degree: int | None) -> None:
     """Raise InputError for levels or a degree that cannot be run."""
     if not refine or min(refine) < 0 or len(set(refine)) != len(refine):
         raise InputError(f"refine {refine}: give distinct levels, 0 or larger")
-    if max(refine) > MAX_REFINE:
-        raise InputError(f"refine {max(refine)}: at most {MAX_REFINE}; each level has 8 times the unknowns")
-    if degree is not None and not 1 <= degree <= 8:
-        raise InputError(f"degree {degree}: must lie between 1 and 8")
+    _check_level(max(refine))
+    if degree is not None and not 1 <= degree <= MAX_DEGREE:
+        raise InputError(f"degree {degree}: must lie between 1 and {MAX_DEGREE}")
+
+
+def _check_level(level: int) -> None:
+    if level > MAX_REFINE:
+        raise InputError(f"refine {level}: at most {MAX_REFINE}; each level has 8 times the unknowns")
 
 
 def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1) -> int:
-    """The unknowns of a mesh on a volume of these knots. Raises InputError where these are too many."""
+    """Return the number of unknowns on a mesh of the volume. Raises InputError where they are too many."""
     from solve.discretization.space import trial_space
 
     dofs = components * trial_space(volume, refine, degree).dofs
@@ -232,18 +237,16 @@ def check_size(volume: BSplineVolume, refine: int, degree: int | None, component
 
 
 def _range(text: str) -> list[int]:
-    """A level, or all from the first to the last of "0..4"."""
+    """Return a level, or all from the first to the last of "0..4". Raises InputError."""
     first, dots, last = text.partition("..")
     if not (first.isdecimal() and (last.isdecimal() or not dots)):
         raise InputError(f"refine {text!r}: write levels such as 0 1 2, or a range such as 0..2")
-    low, high = int(first), int(last or first)
-    if high > MAX_REFINE:
-        raise InputError(f"refine {high}: at most {MAX_REFINE}; each level has 8 times the unknowns")
-    return list(range(low, high + 1))
+    _check_level(int(last or first))  # before the list is made
+    return list(range(int(first), int(last or first) + 1))
 
 
 def _faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
-    """FACE=TEXT and FACE entries as a table. Raises InputError for a face named twice."""
+    """Return FACE=TEXT and FACE entries as a table. Raises InputError for a face named twice."""
     found: dict[str, str | None] = {}
     for entry in entries:
         face, equals, text = entry.partition("=")
@@ -258,34 +261,34 @@ def _vector(text: str | None) -> list[str] | None:
 
 
 def read_corners(path: Path, frame: UnitFrame | None = None) -> np.ndarray[Any, Any]:
-    """Eight points (8, 3) in the surface's units or eight whole numbers (8,) from a JSON file. Raises InputError.
+    """Return eight points (8, 3) in the surface's units or eight vertex numbers (8,) from a JSON file.
 
-    frame: of the surface; where it is known, the file may hold {"XYZ": [...]}, points in scaled coordinates.
+    frame: that of the surface; where it is known, the file may hold {"XYZ": [...]}, points in scaled coordinates.
+    Raises InputError.
     """
     import numpy as np
 
     try:
         with path.open(encoding="utf-8") as stream:
             given = json.loads(stream.read(_CORNERS_BYTES))
-        is_scaled = frame is not None and isinstance(given, dict) and list(given) == ["XYZ"]
-        if is_scaled:
-            given = given["XYZ"]
-        rows = np.array(given, dtype=np.float64)
-        if any(isinstance(number, bool) for number in np.array(given, dtype=object).flat):
+        scaled = frame if isinstance(given, dict) and list(given) == ["XYZ"] else None
+        rows = np.array(given["XYZ"] if scaled else given, dtype=object)
+        if any(isinstance(number, bool) for number in rows.flat):
             raise TypeError
+        rows = np.array(rows.tolist(), dtype=np.float64)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (ValueError, TypeError, OverflowError, RecursionError):
         expected = 'a JSON list of eight points or of eight vertex numbers, or {"XYZ": eight points}'
         raise InputError(f"{path}: corners must be {expected}") from None
-    if rows.shape not in ((8, 3), (8,)) or not np.all(np.abs(rows) <= _LARGEST_COORDINATE):  # refuses NaN, too
+    if rows.shape not in ((8, 3), (8,)) or not np.all(np.abs(rows) <= _LARGEST_COORDINATE):  # also refuses NaN
         raise InputError(
             f"{path}: corners must be eight points of three finite coordinates or eight vertex numbers, "
             f"found an array of shape {rows.shape}"
         )
     if rows.shape == (8, 3):
-        return frame.to_units(rows) if frame is not None and is_scaled else rows
-    if is_scaled:
+        return scaled.to_units(rows) if scaled else rows
+    if scaled:
         raise InputError(f"{path}: XYZ must hold eight points of three coordinates; vertex numbers stand in a list")
     if np.any(rows != np.rint(rows)) or np.abs(rows).max() > _LARGEST_WHOLE:
         raise InputError(f"{path}: vertex numbers must be whole and at most {_LARGEST_WHOLE}")

@@ -1,4 +1,4 @@
-"""Small closed surfaces made by formula, for the demo and the tests: no files, the same numbers every time."""
+"""Makes small closed surfaces by formula, for the demo and the tests: the same numbers every time."""
 
 from __future__ import annotations
 
@@ -13,23 +13,15 @@ from parameterize.surface.surface import Surface, surface_from_arrays
 
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
-SAMPLES = {
-    "bean": "an ellipsoid bent around a circle, with a dent inside the bend",
-    "bumpy_ball": "a ball with rounded bumps",
-    "cube": "a cube of side 1, its faces cut into triangles",
-    "ellipsoid": "an ellipsoid with half axes 1.5, 1 and 0.7",
-    "seashell": "a conch-like shell: a pointed spire of spiral whorls and a flared lip",
-}
-
 
 def sample(name: str) -> Surface:
-    """The surface of that name (1 500 to 4 000 vertices), through the same gate as a file.
+    """Return the surface of that name (1 500 to 4 000 vertices), checked like one from a file.
 
     Raises ValueError naming the samples for any other name.
     """
     if name not in SAMPLES:
         raise ValueError(f"no sample {name!r}: choose one of {', '.join(SAMPLES)}")
-    vertices, faces = MAKERS[name]()
+    vertices, faces = SAMPLES[name]()
     return surface_from_arrays(vertices, faces, name)
 
 
@@ -39,8 +31,8 @@ def write_obj(surface: Surface, path: str | Path) -> None:
 
 
 def obj_text(surface: Surface) -> str:
-    """A surface as OBJ, user's units, every digit of its coordinates."""
-    # trimesh's exporter writes a fixed number of decimals and so loses digits, of small surfaces all of them
+    """Return a surface as OBJ in the user's units, with every digit of its coordinates."""
+    # trimesh writes a fixed number of decimals, which loses digits, of small surfaces all of them
     rows = [f"# {surface.name}: {len(surface.vertices)} vertices, {len(surface.faces)} faces"]
     rows += [f"v {x!r} {y!r} {z!r}" for x, y, z in surface.vertices.tolist()]
     rows += [f"f {a} {b} {c}" for a, b, c in (surface.faces + 1).tolist()]
@@ -48,7 +40,7 @@ def obj_text(surface: Surface) -> str:
 
 
 def ball(count: int) -> tuple[Array, IntArray]:
-    """Evenly spread points (count, 3) of the unit sphere (Fibonacci lattice) and their Delaunay triangles."""
+    """Return evenly spread points (count, 3) of the unit sphere (Fibonacci lattice) and their Delaunay triangles."""
     k = np.arange(count)
     z = 1.0 - (2.0 * k + 1.0) / count
     radius = np.sqrt(1.0 - z**2)
@@ -57,7 +49,7 @@ def ball(count: int) -> tuple[Array, IntArray]:
 
 
 def outward_hull(points: Array) -> IntArray:
-    """Triangles (m, 3) of the convex hull of points (n, 3) around the origin, wound outward."""
+    """Return the triangles (m, 3) of the convex hull of points (n, 3) around the origin, oriented outward."""
     from scipy.spatial import ConvexHull
 
     faces = ConvexHull(points).simplices.astype(np.int64)
@@ -68,11 +60,13 @@ def outward_hull(points: Array) -> IntArray:
 
 
 def _ellipsoid() -> tuple[Array, IntArray]:
+    """Return an ellipsoid with half axes 1.5, 1 and 0.7."""
     points, faces = ball(2500)
     return points * [1.5, 1.0, 0.7], faces
 
 
 def _bumpy_ball() -> tuple[Array, IntArray]:
+    """Return a ball with rounded bumps."""
     points, faces = ball(3000)
     x, y, z = 4.5 * points.T
     radius = 1.0 + 0.13 * (np.sin(x) * np.sin(y + 0.5) + np.sin(y) * np.sin(z + 1.0) + np.sin(z) * np.sin(x + 1.5))
@@ -80,6 +74,7 @@ def _bumpy_ball() -> tuple[Array, IntArray]:
 
 
 def _bean() -> tuple[Array, IntArray]:
+    """Return an ellipsoid bent around a circle, with a dent inside the bend."""
     points, faces = ball(2500)
     x, y, z = (points * [1.9, 0.75, 0.65]).T
     x, y = x * (1.0 + 0.08 * points[:, 0]), y * (1.0 + 0.12 * points[:, 0])
@@ -90,6 +85,7 @@ def _bean() -> tuple[Array, IntArray]:
 
 
 def _cube() -> tuple[Array, IntArray]:
+    """Return a cube of side 1, its faces cut into triangles."""
     n = 16
     grid = np.stack(np.meshgrid(*[np.arange(n + 1)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
@@ -108,9 +104,9 @@ def _cube() -> tuple[Array, IntArray]:
 
 
 def _seashell() -> tuple[Array, IntArray]:
-    """A body of revolution whose radius swells along a spiral that widens from the apex; the last whorl has a lip.
+    """Return a conch-like shell: a pointed spire of spiral whorls and a flared lip.
 
-    Around the axis the radius is a function of angle and height: the surface cannot meet itself.
+    The radius around the axis is a function of angle and height, so the surface cannot meet itself.
     """
     points, faces = ball(4000)
     way = (1.0 - points[:, 2]) / 2.0  # 0 at the apex, 1 at the end of the canal
@@ -129,7 +125,7 @@ def _smooth_step(x: Array) -> Array:
     return inside**2 * (3.0 - 2.0 * inside)
 
 
-MAKERS: dict[str, Callable[[], tuple[Array, IntArray]]] = {
+SAMPLES: dict[str, Callable[[], tuple[Array, IntArray]]] = {
     "bean": _bean,
     "bumpy_ball": _bumpy_ball,
     "cube": _cube,

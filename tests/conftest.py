@@ -79,7 +79,16 @@ def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 
 @pytest.fixture
-def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Path:
+def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let VTK draw a tenth of the pixels: without a graphics card they are what a figure costs."""
+    for module in ("map", "solution", "style"):
+        monkeypatch.setattr(f"iga_nn.figures.{module}.PANEL", (300, 233))
+
+
+@pytest.fixture
+def in_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, small_views: None
+) -> Path:
     """Make an empty current folder; what VTK draws, at seconds a figure, is drawn for tests marked `pictures` only."""
     if request.node.get_closest_marker("pictures") is None:
         monkeypatch.setattr("iga_nn.figures.can_draw", lambda: False)

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from mesh_files import CUBE, QUADS, TRIANGLES, ball, binary_stl, joined, obj, ply
 from shapes import ball as round_surface
-from test_surface import ACCEPTED, REFUSED
+from surface_files import ACCEPTED, REFUSED
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,8 @@ from small_run import small_surface, tiny_config
 
 from iga_nn.cli.commands import main as command
 from iga_nn.options import MapOptions
-from iga_nn.workflow import pipeline
-from iga_nn.workflow.check import check_volume
-from iga_nn.workflow.output_folder import has_checkpoint
+from iga_nn.workflow.output_folder import RunFolder, has_checkpoint
+from iga_nn.workflow.verdict import check_volume
 
 FORK = multiprocessing.get_context("fork")
 
@@ -77,7 +76,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     torch.set_num_threads(1)
-    pipeline._draw = lambda *_: None  # the figures come after the volume and cost most of so short a run
+    RunFolder.draw = lambda *_, **__: None  # the figures come after the volume and cost most of so short a run
     MapOptions.config = lambda _: tiny_config()
     surface = small_surface()
     rng, differing = np.random.default_rng(options.seed), 0

@@ -10,16 +10,21 @@ from parameterize.surface.surface import surface_from_arrays
 STEPS = (6, 4, 8, 4, 8)
 
 
-def tiny_config():
-    config = preset("fast")
+def shortened(config):
+    """The same way with a small network, few samples and few steps: one start, two rounds."""
     return replace(
         config,
         starts=1,
         network=NetworkConfig(width=16, modules=1, frequencies=3),
         train=replace(config.train, cell=0.2, triangles=200),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
-        spline=replace(config.spline, control_points=6, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2),
+        spline=replace(config.spline, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2),
     )
+
+
+def tiny_config():
+    config = shortened(preset("fast"))
+    return replace(config, spline=replace(config.spline, control_points=6))
 
 
 def small_surface(stretch=2.0):

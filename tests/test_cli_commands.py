@@ -68,7 +68,7 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
     assert set(report["versions"]) == {"python", "numpy", "scipy", "torch", "iga-nn"}
     out, err = capsys.readouterr()
     assert "certified" in out and "deep/result" in out
-    assert "S(2)" in err and "folded 0  left 0:01 + spline" in err
+    assert "S(2)" in err and "0 folds, 0:01 left, then the spline fit" in err
 
 
 def test_json_is_the_verdict_alone(formula_training, in_folder, capsys):
@@ -308,7 +308,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["check", "missing.obj"], "missing.obj"),
         (["sample", "teapot"], "seashell"),
         (["sample", "bean", "--out", "no/such/folder/bean.obj"], "bean.obj"),
-        (["sample", "bean", "--out", "bean.stl"], "written as .obj"),
+        (["sample", "bean", "--out", "bean.stl"], "files end in .obj"),
         (["sample", "bean", "--out", ""], "name the file"),
         (["fetch", "teapot"], "conch"),
         (["nonsense"], "nonsense"),
@@ -432,7 +432,7 @@ def test_an_interrupted_run_is_not_started_over_unasked(formula_training, in_fol
     Path("cube/checkpoint").mkdir(parents=True)
     Path("cube/checkpoint/training.safetensors").touch()
     assert main(["parameterize", "cube"]) == 2
-    assert "--resume goes on from it, --force starts anew" in one_line(capsys.readouterr().err)
+    assert "--resume continues it, --force starts anew" in one_line(capsys.readouterr().err)
     assert Path("cube/checkpoint/training.safetensors").exists()
     assert main(["parameterize", "cube", "--force"]) == 0
 
@@ -459,7 +459,7 @@ def test_interruption_is_130_and_names_the_way_on(formula_training, in_folder, c
     Path("cube/checkpoint/training.safetensors").touch()
     assert main(["parameterize", "cube", "--resume"]) == 130
     err = capsys.readouterr().err
-    assert "no checkpoint" not in err and "--resume goes on" in one_line(err)
+    assert "no checkpoint" not in err and "--resume continues" in one_line(err)
     assert not Path("cube/report.json").exists()  # not finished: the next run may use the folder
 
 

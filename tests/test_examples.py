@@ -10,6 +10,7 @@ import pytest
 from conftest import formula_parameterization
 from example_files import EXAMPLES, load, shown
 from matplotlib.image import imread
+from small_run import shortened
 
 import iga_nn
 from iga_nn.cli.commands import main
@@ -31,7 +32,7 @@ def formula_map(formula_training, monkeypatch):
 
 
 def test_first_run(capsys, tmp_path):
-    config = iga_nn.preset("fast").scaled(0.005).with_control_points(8)
+    config = shortened(iga_nn.preset("fast")).with_control_points(8)
     picture = load("first_run").main("ellipsoid", config, levels=2, out=tmp_path)
     out = capsys.readouterr().out
     assert "ARAP" in out and "L2 rate" in out
@@ -88,7 +89,7 @@ def test_elasticity_near_beam_theory(tmp_path, capsys):
     assert found == pytest.approx(known, rel=0.02)
 
 
-def test_batch_goes_on_after_a_refused_file(formula_map, tmp_path, capsys):
+def test_batch_goes_on_after_a_refused_file(formula_map, in_folder, tmp_path, capsys):
     picture = load("batch").main(("bean", "nowhere.obj"), tmp_path)
     assert imread(picture).std() > 0.05
     rows = list(csv.DictReader((tmp_path / "batch.csv").open()))

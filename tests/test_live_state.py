@@ -54,7 +54,7 @@ def test_results_are_offered_with_what_they_hold(tmp_path):
     job.results.mkdir()
     (job.results / "volume.npz").write_bytes(b"x" * 3_000_000)
     (job.results / "secret.txt").write_text("x")
-    assert row(job, 0)["files"] == [{"name": "volume.npz", "size": "2.9 MB", "holds": "the spline volume"}]
+    assert row(job, 0)["files"] == [{"name": "volume.npz", "size": "2.9 MB", "shows": "the spline volume"}]
 
 
 def test_a_waiting_job_knows_its_place(tmp_path):

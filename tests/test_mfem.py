@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from volumes import spans_at
 
+from iga_nn.io import Content
 from iga_nn.io.splinepy import write_mfem
 from parameterize.spline.volume import FACE_NAMES
 from solve import Poisson, benchmark_volume, solve_poisson
@@ -37,7 +38,7 @@ class MfemPoisson:
 
     def __init__(self, volume, folder):
         self.volume = volume
-        write_mfem(folder / "volume.mesh", volume)
+        write_mfem(folder / "volume.mesh", Content(volume))
         self.mesh = mfem.Mesh(str(folder / "volume.mesh"), 1, 0)
         self.space = mfem.FiniteElementSpace(self.mesh, self.mesh.GetNodes().OwnFEC())
         self.form, self.load = mfem.BilinearForm(self.space), mfem.LinearForm(self.space)

@@ -12,6 +12,7 @@ import pytest
 
 from iga_nn import models as data
 from iga_nn.cli.commands import main
+from iga_nn.errors import InputError
 from iga_nn.models import MODELS, Model, fetch, fetch_all, resolve
 from iga_nn.samples import sample, write_obj
 from parameterize.surface.surface import MeshError
@@ -81,7 +82,7 @@ def test_the_set_g1_is_fetched_model_by_model(data_folder):
     paths = [str(path) for path in fetch_all("g1")]
     assert paths == sorted(f"{name}.obj" for name in MODELS if name != "conch")
     assert all(Path(path).is_file() for path in paths) and not Path("conch.obj").exists()
-    with pytest.raises(MeshError, match="leave --out out"):
+    with pytest.raises(InputError, match="leave --out out"):
         list(fetch_all("g1", "all.obj"))
 
 
@@ -99,7 +100,7 @@ def test_fetch_copies_from_the_data_folder(data_folder):
     assert path.read_bytes() == (data_folder / "conch.obj").read_bytes()
     assert fetch("conch", data_folder / "conch.obj").is_file()  # onto itself
     path.write_text("mine\n")
-    with pytest.raises(MeshError, match=r"conch\.obj: exists; --force"):
+    with pytest.raises(InputError, match=r"conch\.obj: exists; --force"):
         fetch("conch")
     assert fetch("conch", force=True).read_bytes() == (data_folder / "conch.obj").read_bytes()
 
@@ -132,7 +133,7 @@ def test_fetch_without_a_network_says_where_to_put_the_file(monkeypatch):
 
     monkeypatch.setattr(pooch, "retrieve", retrieve)
     with pytest.raises(
-        MeshError,
+        InputError,
         match=r"bunny: cannot be downloaded from https://\S+/G1/bunny.mesh \(no connection\): put bunny.mesh into",
     ):
         fetch("bunny")
@@ -174,7 +175,7 @@ def test_fetch_downloads_once_and_then_needs_no_network(repository, an_empty_fol
     content = (an_empty_folder / "published.obj").read_bytes()
     model = Model("some/repository/HEAD/conch.obj", hashlib.sha256(content).hexdigest())
     monkeypatch.setitem(MODELS, "conch", model)
-    with pytest.raises(MeshError, match=r"conch: cannot be downloaded from http://127\.0\.0\.1:\d+/\S+ \(404"):
+    with pytest.raises(InputError, match=r"conch: cannot be downloaded from http://127\.0\.0\.1:\d+/\S+ \(404"):
         fetch("conch")
     repository.content["/" + model.path] = content
     assert main(["fetch", "conch"]) == 0
@@ -193,17 +194,17 @@ def test_a_download_with_another_checksum_is_refused(an_empty_folder, monkeypatc
 
     monkeypatch.setattr(pooch.HTTPDownloader, "__call__", serve)
     monkeypatch.setattr(pooch, "os_cache", lambda name: an_empty_folder / "cache")
-    with pytest.raises(MeshError, match="cannot be downloaded .* hash"):
+    with pytest.raises(InputError, match="cannot be downloaded .* hash"):
         fetch("conch")
 
 
 def test_fetch_refuses_unknown_models_and_bad_targets(an_empty_folder, data_folder):
     write_obj(sample("cube"), data_folder / "conch.obj")
-    with pytest.raises(MeshError, match="santa4: no such model; the models are bimba, "):
+    with pytest.raises(InputError, match="santa4: no such model; the models are bimba, "):
         fetch("santa4")
-    with pytest.raises(MeshError, match="is a directory: name the file to write"):
+    with pytest.raises(InputError, match="is a directory: name the file to write"):
         fetch("conch", an_empty_folder)
-    with pytest.raises(MeshError, match="cannot be written .* --out"):
+    with pytest.raises(InputError, match="cannot be written .* --out"):
         fetch("conch", an_empty_folder / "absent" / "conch.obj")
 
 

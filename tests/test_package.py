@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -51,6 +52,8 @@ def test_every_public_name_is_there():
         assert getattr(iga_nn, name) is not None
     with pytest.raises(AttributeError, match="teapot"):
         _ = iga_nn.teapot
+    stub = Path(iga_nn.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    assert sorted(iga_nn.__all__) == sorted(re.findall(r"(?: as |^)(\w+)(?:$| = )", stub, flags=re.MULTILINE))
 
 
 @pytest.mark.parametrize("name", ["solve", "parameterize"])

@@ -7,21 +7,25 @@ import shlex
 from pathlib import Path
 
 import pytest
+from small_run import shortened
 
 import iga_nn
 from iga_nn.cli.commands import main
+from iga_nn.options import MapOptions
 
 ROOT = Path(iga_nn.__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TRAINS = ("run", "parameterize")
 SHORT = {"--steps-factor": "0.005", "--control-points": "8"}
+CONFIG = MapOptions.config
 
 
 def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
 
 
-def test_commands_run(in_folder):
+def test_commands_run(in_folder, monkeypatch):
+    monkeypatch.setattr(MapOptions, "config", lambda options: shortened(CONFIG(options)))
     commands = [shlex.split(line) for block in blocks("sh") for line in block.splitlines()]
     assert len(commands) >= 8
     for program, *arguments in commands:
@@ -39,7 +43,7 @@ def test_commands_run(in_folder):
 
 def test_python_runs(in_folder, monkeypatch, capsys):
     full = iga_nn.preset
-    monkeypatch.setattr(iga_nn, "preset", lambda name: full(name).scaled(0.005).with_control_points(8))
+    monkeypatch.setattr(iga_nn, "preset", lambda name: shortened(full(name)).with_control_points(8))
     (block,) = blocks("python")
     exec(compile(block, "README.md", "exec"), {})  # noqa: S102 our own text
     out = capsys.readouterr().out

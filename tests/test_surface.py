@@ -14,7 +14,6 @@ import pytest
 import trimesh
 from mesh_files import (
     CUBE,
-    MIXED,
     QUADS,
     TETRAHEDRON,
     TRIANGLES,
@@ -22,12 +21,10 @@ from mesh_files import (
     binary_stl,
     flagged_ply,
     joined,
-    medit,
     obj,
     off,
-    ply,
-    text_stl,
 )
+from surface_files import ACCEPTED, REFUSED
 
 from parameterize.surface.inside import deepest_point
 from parameterize.surface.readers.common import BYTES_AT_LEAST
@@ -52,54 +49,6 @@ def is_unit_cube(surface):
     return True
 
 
-ACCEPTED = {
-    "quads.obj": (obj(), "6 polygons cut into 12 triangles"),
-    "triangles.obj": (obj(faces=TRIANGLES), None),
-    "bom.obj": (b"\xef\xbb\xbf" + obj().encode(), "byte order mark"),
-    "crlf.obj": (obj().replace("\n", "\r\n"), "6 polygons"),
-    "cr.obj": (obj().replace("\n", "\r"), "6 polygons"),
-    "continued.obj": (obj().replace("f 1 3", "f 1 \\\n3"), "6 polygons"),
-    "negative.obj": (obj(faces=[[i - 9 for i in quad] for quad in QUADS]), "negative (relative) vertex numbers"),
-    "seams.obj": (obj(CUBE[np.ravel(QUADS)], np.arange(24).reshape(6, 4)), "welded 16 duplicate vertices"),
-    "texture.obj": (obj().replace("f 1 3", "vt 0 0\nvn 0 0 1\nf 1/1/1 3//1"), "6 polygons"),
-    "ends.obj": (obj().replace("f 1 3", "# C:\\\ng C:\\\nf 1 \\ \n3", 1), "6 polygons"),
-    "colours.obj": (obj().replace("v 0.0 0.0 0.0", "v 0.0 0.0 0.0 0.5 0.5 0.5"), "6 polygons"),
-    "groups.obj": (obj().replace("f 1", "o cube\ng side\nusemtl grey\nf 1", 1) + "l 1 2\n", "6 polygons"),
-    "mixed.obj": (obj(faces=MIXED), "9 polygons cut into 12 triangles"),
-    "unused.obj": ("v 5 5 5\n" + obj(faces=np.array(QUADS) + 1), "dropped 1 vertices that no face uses"),
-    "degenerate.obj": (obj() + "f 1 1 2\n", "dropped 1 degenerate faces"),
-    "inverted.obj": (obj(faces=[q[::-1] for q in QUADS]), "inverted orientation flipped"),
-    "winding.obj": (obj(faces=[QUADS[0][::-1], *QUADS[1:]]), "inconsistent winding: 2 faces flipped"),
-    "packed.obj.gz": (gzip.compress(obj().encode()), "unpacked from .gz"),
-    "binary.stl": (binary_stl(), "welded 28 duplicate vertices"),
-    "solid.stl": (binary_stl(header=b"solid but binary"), "although it starts with 'solid'"),
-    "text.stl": (text_stl(), "welded 28"),
-    "names.stl": ("; comment\n" + text_stl().replace("cube", "facet normal vertex 1"), "welded 28"),
-    "cr.stl": (b"\xef\xbb\xbf" + text_stl().replace("\n", "\r").encode(), "welded 28"),
-    "UPPER.STL": (text_stl().upper(), "welded 28"),
-    "packed.stl.gz": (gzip.compress(binary_stl()), "unpacked from .gz"),
-    "text.ply": (ply(), None),
-    "crlf.ply": (ply().replace(b"\n", b"\r\n"), None),
-    "binary.ply": (ply(binary=True), None),
-    "quads.ply": (ply(faces=QUADS), "6 polygons cut"),
-    "mixed.ply": (ply(faces=MIXED, binary=True), "9 polygons cut into 12 triangles"),
-    "index.ply": (ply(faces=MIXED).replace(b"vertex_indices", b"vertex_index"), "9 polygons cut"),
-    "flags.ply": (flagged_ply(), None),
-    "binary_flags.ply": (flagged_ply(QUADS, binary=True), "6 polygons cut into 12 triangles"),
-    "lines.ply": (b"\xef\xbb\xbf" + ply().replace(b"\n3", b"\n\n3").replace(b"\n", b"\r"), None),
-    "quads.off": (off(), "6 polygons cut"),
-    "colours.off": (off().replace("OFF", "COFF").replace("\n4 ", " 1 0 0 1 # red\n4 "), "6 polygons cut"),
-    "one_word.off": ("\ufeff# a cube\n" + off().replace("OFF\n", "off"), "6 polygons cut"),
-    "surface.mesh": (medit(), None),
-    "lines.mesh": (
-        "# a cube\n" + medit("MeshVersionFormatted\n2\nDimension\n3").replace("Vertices\n", "Vertices "),
-        None,
-    ),
-    "more.mesh": ("\ufeff" + medit(more="RequiredTriangles\n2\n1\n2\nNormals 1\n0 0 1\nRequiredEdges 1\n1"), None),
-    "comments.off": (off().replace("OFF\n", "OFF\n# a cube\n\n").replace("\n", "\r\n"), "6 polygons cut"),
-}
-
-
 @pytest.mark.parametrize("name", ACCEPTED)
 def test_accepts_and_says_so(name, tmp_path):
     content, notice = ACCEPTED[name]
@@ -110,97 +59,6 @@ def test_accepts_and_says_so(name, tmp_path):
         assert surface.notices == ()
     else:
         assert any(notice in line for line in surface.notices), surface.notices
-
-
-HOLE = obj(faces=QUADS[1:])
-NOT_A_NUMBER = CUBE.copy()
-NOT_A_NUMBER[3, 1] = np.nan
-REFUSED = {
-    "empty.obj": ("", "the file is empty"),
-    "blank.stl": (" \n\n", "the file is empty"),
-    "garbage.obj": ("hello world\nthis is text\n", "0 vertices and 0 faces"),
-    "binary.obj": (b"\x00\x01\x02" * 100, "binary data"),
-    "garbage.stl": (bytes(range(256)), "must have"),
-    "short.stl": (b"abc", "3 bytes, the header alone takes 84"),
-    "garbage.ply": ("hello\n", "no header"),
-    "garbage.off": ("hello\n", "first word must be OFF"),
-    "garbage.mesh": ("hello\n", "MeshVersionFormatted"),
-    "garbage.msh": ("hello\n", "$MeshFormat"),
-    "garbage.vtu": ("hello\n", "VTKFile"),
-    "unknown.step": ("ISO-10303-21;", "unknown format"),
-    "bare": ("x", "unknown format"),
-    "word.obj": (obj().replace("v 0.0 0.0 0.0", "v 0.0 zero 0.0"), "line 1: a vertex needs three numbers"),
-    "decimal_comma.obj": (obj().replace("v 0.0 0.0 0.0", "v 0,0 0,0 0,0"), "line 1: a vertex"),
-    "face_word.obj": (obj() + "f 1 two 3\n", "line 15: a face needs vertex numbers"),
-    "two_corners.obj": (obj() + "f 1 2\n", "line 15: a face has 2 corners"),
-    "corners.obj": (obj() + "f" + " 1 2 3" * 100 + "\n", "a face has 300 corners, more than 256"),
-    "short_row.ply": (ply().replace(b"\n3 0 2 3\n", b"\n36\n"), "line 18: no face as the header promises"),
-    "pair.ply": (ply(faces=[*QUADS, [0, 1]], binary=True), "a face has 2 corners, expected at least 3"),
-    "zero.obj": (obj() + "f 0 1 2\n", "vertex number 0"),
-    "nan.obj": (obj(NOT_A_NUMBER), "1 vertices with NaN or infinite coordinates, the first is vertex 3"),
-    "infinite.obj": (obj().replace("v 0.0 0.0 0.0", "v 1e999 0 0"), "1 vertices with NaN or infinite"),
-    "nan.stl": (binary_stl(NOT_A_NUMBER), "with NaN or infinite"),
-    "nan.ply": (ply(NOT_A_NUMBER, binary=True), "with NaN or infinite"),
-    "range.obj": (obj() + "f 1 2 99\n", "1 vertex numbers out of range, the first is 98"),
-    "below.obj": (obj() + "f 1 2 -20\n", "1 vertex numbers out of range, the first is -12"),
-    "range.off": (off(faces=[*QUADS, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
-    "binary.off": ("OFF BINARY\n", "binary OFF is not supported: save it as text"),
-    "pair.off": (off(faces=[*QUADS, [0, 1]]), "line 17: a face has 2 corners"),
-    "corner.off": (off().replace("4 0 2 3 1", "4 0 2 -3 1"), "1 vertex numbers out of range, the first is -3"),
-    "line.obj": (obj().replace("f 1 3", "f 1 \\\n3", 1) + "f 1 two 3\n", "line 16: a face needs vertex numbers"),
-    "flat.mesh": ("MeshVersionFormatted 2\nDimension 2\n", "not of dimension 3"),
-    "short.mesh": (medit().replace(" 0\nTetra", "\nTetra"), "promises 12 Triangles, 48 numbers, 47 follow"),
-    "range.ply": (ply(faces=[*TRIANGLES, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
-    "few.obj": (obj(faces=QUADS[:1]), "2 faces, a closed surface needs at least 4"),
-    "cut.stl": (binary_stl()[:-20], "must have 684 bytes, this one has 664"),
-    "long.stl": (binary_stl() + b"abc", "must have 684 bytes, this one has 687"),
-    "cut_text.stl": (text_stl()[:-100], "truncated or damaged"),
-    "cut.ply": (ply()[:-40], "at least 20 rows, where 15 follow"),
-    "cut_binary.ply": (ply(binary=True)[:-30], "truncated or damaged"),
-    "cut.off": (off()[:-30], "rows follow"),
-    "points.ply": (ply(faces=np.empty((0, 3), int)), "8 vertices and 0 faces, a surface needs both"),
-    "strips.ply": (ply().replace(b"element face", b"element tristrips"), "triangle strips"),
-    "billion.ply": (ply(counts=(10**9, 12)), "at least 1000000012 rows"),
-    "billion_binary.ply": (ply(counts=(8, 500_000), binary=True), "at least 500096 bytes"),
-    "billion.off": (off(counts=(10**9, 6)), "promises 1000000000 vertices"),
-    "billion.stl": (binary_stl()[:80] + struct.pack("<I", 10**9), "must have 50000000084 bytes"),
-    "word_count.off": (off().replace("8 6 0", "8 many 0"), "count 'many'"),
-    "many.mesh": ("MeshVersionFormatted 2\nDimension 3\nVertices\n1000000000\n0 0 0 0\nEnd\n", "promises 1000000000"),
-    "many.msh": (
-        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1000000000\n$EndNodes\n$Elements\n0\n$EndElements\n",
-        "damaged node rows",
-    ),
-    "high.msh": (
-        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1 1 1\n3 1 0 1\n9999999999\n0 0 0\n$EndNodes\n",
-        "node numbers of the .msh must be 1 to 10000000",
-    ),
-    "old.msh": ("$MeshFormat\n4 0 8\n$EndMeshFormat\n", "Gmsh format '4' is not supported"),
-    "cut.msh": (
-        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 8 1 8\n",
-        "section $Nodes of the .msh is missing or cut off",
-    ),
-    "many.vtu": (
-        '<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="1000000000" NumberOfCells="1">'
-        '<Points><DataArray type="Float64" NumberOfComponents="3">0 0 0</DataArray>'
-        "</Points></Piece></UnstructuredGrid></VTKFile>",
-        "cannot reshape array of size 3 into shape (1000000000,3)",
-    ),
-    "pieces.vtu": (
-        '<VTKFile type="UnstructuredGrid"><UnstructuredGrid>'
-        + 2 * '<Piece NumberOfPoints="4" NumberOfCells="1"></Piece>'
-        + "</UnstructuredGrid></VTKFile>",
-        "holds 2 pieces: merge them",
-    ),
-    "entities.vtu": (
-        '<!DOCTYPE a [<!ENTITY b "c">]><VTKFile type="UnstructuredGrid">&b;</VTKFile>',
-        "declares a document type",
-    ),
-    "open.obj": (HOLE, "open surface: 1 boundary loop (4 edges)"),
-    "two_holes.obj": (obj(faces=QUADS[2:]), "open surface: 2 boundary loops (8 edges)"),
-    "fin.obj": (obj() + "v 2 2 2\nf 1 2 9\n", "1 non-manifold edges"),
-    "not_gz.obj.gz": (b"plain text", "not a whole .gz"),
-    "cut.obj.gz": (gzip.compress(obj().encode())[:-10], "not a whole .gz"),
-}
 
 
 @pytest.mark.parametrize("name", REFUSED)

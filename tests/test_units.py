@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from shapes import ball
+from small_run import shortened
 
 import iga_nn
 from parameterize.surface.surface import surface_from_arrays
@@ -20,7 +21,7 @@ def surface(factor, shift):
 
 def figures(given):
     """Verdict, one-to-one, ARAP at volume 1, and the relative errors of the default problem."""
-    config = iga_nn.preset("fast").scaled(0.02).with_control_points(8)
+    config = shortened(iga_nn.preset("fast")).with_control_points(8)
     result = iga_nn.parameterize(given, config, seed=3, device="cpu")
     report = iga_nn.solve(result.volume, iga_nn.Poisson(), refine=0).report
     arap = result.quality.arap.unit_volume

@@ -15,8 +15,7 @@ import torch
 import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.report import document as report
-from iga_nn.workflow import machine
-from iga_nn.workflow.cost_estimate import Forecast, forecast
+from iga_nn.workflow.cost_estimate import Forecast, available_memory_mb, forecast
 from parameterize.config import preset
 
 CPU = torch.device("cpu")
@@ -103,4 +102,4 @@ def test_too_little_memory_is_a_warning_even_when_quiet(formula_training, in_fol
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="read from /proc/meminfo")
 def test_free_memory_is_below_all_memory():
     whole = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e6
-    assert 0.0 < machine.available_memory_mb() < whole
+    assert 0.0 < available_memory_mb() < whole

@@ -29,7 +29,6 @@ from iga_nn.errors import InputError, one_line
 from iga_nn.models import DATA_FOLDER
 from iga_nn.options import MapOptions
 from iga_nn.report import document as reports
-from iga_nn.workflow.machine import calibrate, processor
 from parameterize.files import save_text
 from solve.forms.problem import DEFAULT_EXACT
 
@@ -257,7 +256,7 @@ def run_model(name: str, options: Options) -> Row:
     try:
         surface = iga_nn.load_surface(_file(name, options.models))
         run = iga_nn.parameterize  # loads torch
-        t_cal, threads = calibrate(min(1.0, options.mapping.steps_factor))
+        t_cal, threads = processes.calibrate(min(1.0, options.mapping.steps_factor))
         start = time.perf_counter()
         result = run(surface, options.mapping.config(), seed=options.mapping.seed, device=options.mapping.device)
         seconds = time.perf_counter() - start
@@ -429,7 +428,8 @@ def _machine(options: Options) -> str:
     mapping = options.mapping
     versions = ", ".join(f"{name} {number}" for name, number in reports.versions().items())
     return (
-        f"{processor()}, {processes.cores()} cores, {options.jobs} at a time with {options.threads} threads each; "
+        f"{processes.processor()}, {processes.cores()} cores, "
+        f"{options.jobs} at a time with {options.threads} threads each; "
         f"{versions}; preset {mapping.preset}, seed {mapping.seed}."
     )
 

@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -154,3 +155,34 @@ def as_markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table in Markdown."""
     lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def calibrate(share: float = 1.0, threads: int | None = None) -> tuple[float, int]:
+    """Return t_cal, the wall seconds of 1e12 operations in float32 products (8192, 512) @ (512, 512), and the threads.
+
+    share: the part of these operations that is measured, for quick looks. threads: as many as torch takes by default.
+    """
+    import torch
+
+    usual = torch.get_num_threads()
+    torch.set_num_threads(threads or usual)
+    left, right = torch.ones(8192, 512), torch.full((512, 512), 1.0 / 512.0)
+    operations = 2 * 8192 * 512 * 512  # of one product
+    repeats = max(1, round(share * 1e12 / operations))
+    product = left @ right  # starts the threads
+    start = time.perf_counter()
+    for _ in range(repeats):
+        torch.mm(left, right, out=product)
+    seconds = time.perf_counter() - start
+    torch.set_num_threads(usual)
+    return seconds * 1e12 / (repeats * operations), threads or usual
+
+
+def processor() -> str:
+    """Return the model of the CPU."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.processor() or platform.machine())

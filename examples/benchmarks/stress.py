@@ -31,7 +31,6 @@ from iga_nn.options import MapOptions
 from iga_nn.report import document as reports
 from iga_nn.report.advice import span_places
 from iga_nn.samples import write_obj
-from iga_nn.workflow.machine import calibrate, processor
 from parameterize.arrays import Array
 from parameterize.files import replacing, save_text
 from parameterize.surface.surface import Surface
@@ -197,7 +196,7 @@ def run_surface(number: int, options: Options) -> Row:
         surface = hard_shape(number)
         row = replace(row, faces=len(surface.faces))
         run = iga_nn.parameterize  # loads torch
-        t_cal, _ = calibrate(min(1.0, options.mapping.steps_factor), threads=1)
+        t_cal, _ = processes.calibrate(min(1.0, options.mapping.steps_factor), threads=1)
         start = time.perf_counter()
         result = run(surface, options.mapping.config(), seed=options.mapping.seed, device="cpu")
         row = replace(row, seconds=time.perf_counter() - start, t_cal=t_cal)
@@ -286,7 +285,7 @@ def as_text(rows: Sequence[Row], options: Options) -> str:
         parts.append("These are not the default settings: a quick look, no measurement.")
     versions = ", ".join(f"{name} {number}" for name, number in reports.versions().items())
     parts.append(
-        f"{processor()}, {processes.cores()} cores, {options.jobs} at a time with one thread each; "
+        f"{processes.processor()}, {processes.cores()} cores, {options.jobs} at a time with one thread each; "
         f"{versions}; {options.settings}."
     )
     return "\n\n".join(parts) + "\n"

@@ -1,4 +1,4 @@
-"""What a command says on stdout when it is done, and the exit code that goes with it."""
+"""Returns what a command prints when it is done, and the exit code that goes with it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..report import document as reports
 from ..workflow.output_folder import Outcome
 from .exit_codes import DONE, NOT_CERTIFIED, NOT_SOLVED
 
-SHOWN_ERRORS = ("l2_relative", "l2", *ESTIMATES)  # of a level
+SHOWN_ERRORS = ("l2_relative", "l2", *ESTIMATES)
 
 
 def exit_code(report: reports.Report) -> int:
@@ -34,20 +34,34 @@ def verdict_as_json(outcome: Outcome) -> str:
 def verdict_in_words(outcome: Outcome) -> str:
     """Return the verdict of a finished run for a reader, one fact a line, followed by what to try."""
     verdict = reports.verdict(outcome.report, outcome.folder)
-    lines = [f"det J > 0        {verdict['bijective']}", f"one-to-one       {reports.one_to_one(outcome.report)}"]
+    lines = _proved(outcome.report)
     for scale, arap in verdict.get("arap", {}).items():
         rms = verdict["boundary_rms"][scale]
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
     for level in verdict.get("levels", []):
         errors = [f"{TITLES[key]} {level[key]:.3e}, " for key in SHOWN_ERRORS if level.get(key) is not None]
-        end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANS NOTHING")
+        end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANINGLESS")
         lines.append(f"{level['dofs']:>8} unknowns {''.join(errors)}{level['iterations']} iterations{end}")
     lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")
     return "\n".join([*lines, *advice.in_words(outcome.report)])
 
 
+def _proved(report: reports.Report) -> list[str]:
+    """Return the two verdicts on a map: on the sign of det J, and on whether it is one-to-one."""
+    return [
+        f"det J > 0        {report['parameterization']['bijective']}",
+        f"one-to-one       {reports.one_to_one(report)}",
+    ]
+
+
+def volume_in_words(facts: reports.Report) -> str:
+    """Return the facts that `check` found out about a volume, the verdicts first."""
+    others = {key: value for key, value in facts.items() if key not in ("bijective", "boundary_injective")}
+    return "\n".join([*_proved({"parameterization": facts}), facts_in_words(others)])
+
+
 def facts_in_words(facts: dict[str, Any]) -> str:
-    """Return the facts that `check` found, one a line."""
+    """Return the facts that `check` found out, one a line."""
     return "\n".join(f"{key + ':':16s} {_text(value)}" for key, value in facts.items())
 
 

@@ -1,4 +1,4 @@
-"""The command line `iga-nn`: commands and their arguments; nothing is computed here.
+"""The commands of `iga-nn` and their arguments; nothing is computed here.
 
 A command imports what it runs when it runs: `--help` and `--version` load neither numpy nor the packages below.
 """
@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -20,6 +21,8 @@ from ..version import __version__
 from .exit_codes import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
 
 if TYPE_CHECKING:
+    from parameterize.progress import ProgressCallback
+
     from ..workflow.output_folder import Outcome
 
 FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--body-force", "--displacement")
@@ -31,25 +34,30 @@ app = App(
     suppress_keyboard_interrupt=False,
     default_parameter=Parameter(negative=(), consume_multiple=True),
 )
-run_app = App(name="run", help="A surface, all the way to a solved problem.")
-solve_app = App(name="solve", help="A problem on a volume.")
+run_app = App(name="run", help="Parameterize a surface and solve a problem on its volume.")
+solve_app = App(name="solve", help="Solve a problem on a volume.")
 app.command(run_app)
 app.command(solve_app)
 
 
-Json = Annotated[bool, Parameter(name="--json")]
+Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
+Volume = Annotated[
+    Path, Parameter(help="volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.")
+]
+ObjFile = Annotated[Path | None, Parameter(help="file to write; NAME.obj in the current folder by default.")]
+Overwrite = Annotated[bool, Parameter(help="replace that file where it has other content.")]
+Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.")]
 
 
 @dataclass(frozen=True)
 class OutputOptions:
-    """Where the results go, and what is said about them.
+    """Where the results go, and what is printed.
 
     Args:
         out: output folder; the input's stem in the current folder by default.
         force: replace a finished result in that folder.
-        vector: the plots of curves (loss history, errors over the mesh size) as PDF, too.
-        quiet: no progress.
-        as_json: the verdict as JSON on stdout.
+        vector: write plots of curves (loss history, errors over the mesh size) as PDF, too.
+        quiet: show no progress.
     """
 
     out: str | None = None
@@ -58,6 +66,11 @@ class OutputOptions:
     quiet: bool = False
     as_json: Json = False
 
+    @property
+    def folder(self) -> dict[str, Any]:
+        """What the pipeline takes of these options."""
+        return {"out": self.out, "force": self.force, "vector": self.vector}
+
 
 Output = Annotated[OutputOptions, Parameter(name="*")]
 Mapping = Annotated[MapOptions, Parameter(name="*")]
@@ -65,61 +78,35 @@ Equation = Annotated[PoissonOptions, Parameter(name="*")]
 Body = Annotated[ElasticityOptions, Parameter(name="*")]
 Study = Annotated[StudyOptions, Parameter(name="*")]
 
-NO_OUTPUT, NO_MAPPING, NO_POISSON, NO_BODY = OutputOptions(), MapOptions(), PoissonOptions(), ElasticityOptions()
-NO_STUDY = StudyOptions()
+OUTPUT, MAPPING, STUDY = OutputOptions(), MapOptions(), StudyOptions()
+POISSON, BODY = PoissonOptions(), ElasticityOptions()
 
 
 @run_app.command(name="poisson")
 def run_poisson(
-    mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapping = NO_MAPPING, poisson: Equation = NO_POISSON
+    mesh: Mesh, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING, poisson: Equation = POISSON
 ) -> int:
-    """Parameterize a surface, certify the spline and solve Poisson's equation on it.
-
-    Args:
-        mesh: path of a closed surface, or the name of a sample or a model.
-    """
+    """Parameterize a surface, certify the spline and solve Poisson's equation on it."""
     from ..workflow import pipeline
-    from .progress import progress_line
 
-    with progress_line(output.quiet) as progress:
-        outcome = pipeline.run(
-            "poisson",
-            mesh,
-            output.out,
-            mapping=mapping,
-            poisson=poisson,
-            force=output.force,
-            vector=output.vector,
-            progress=progress,
-        )
-    return _tell(outcome, output)
+    with _progress(output) as progress:
+        outcome = pipeline.run("poisson", mesh, mapping=mapping, poisson=poisson, progress=progress, **output.folder)
+    return _finish(outcome, output)
 
 
 @app.command(name="parameterize")
-def parameterize_mesh(mesh: str, /, *, output: Output = NO_OUTPUT, mapping: Mapping = NO_MAPPING) -> int:
-    """Turn a surface into a certified trivariate B-spline.
-
-    Args:
-        mesh: path of a closed surface, or the name of a sample or a model.
-    """
+def parameterize_mesh(mesh: Mesh, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING) -> int:
+    """Turn a surface into a certified trivariate B-spline."""
     from ..workflow import pipeline
-    from .progress import progress_line
 
-    with progress_line(output.quiet) as progress:
-        outcome = pipeline.parameterize_to(
-            mesh, output.out, mapping=mapping, force=output.force, vector=output.vector, progress=progress
-        )
-    return _tell(outcome, output)
+    with _progress(output) as progress:
+        outcome = pipeline.parameterize_to(mesh, mapping=mapping, progress=progress, **output.folder)
+    return _finish(outcome, output)
 
 
 @solve_app.command(name="poisson")
 def solve_poisson(
-    volume: Path,
-    /,
-    *,
-    device: Literal["cpu", "cuda"] = "cpu",
-    output: Output = NO_OUTPUT,
-    poisson: Equation = NO_POISSON,
+    volume: Volume, /, *, device: Literal["cpu", "cuda"] = "cpu", output: Output = OUTPUT, poisson: Equation = POISSON
 ) -> int:
     """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
 
@@ -127,57 +114,41 @@ def solve_poisson(
     under --neumann or --robin.
 
     Args:
-        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
         device: where the linear system is solved.
     """
     from ..workflow import pipeline
-    from .progress import progress_line
 
-    with progress_line(output.quiet):
-        outcome = pipeline.solve_to(
-            volume, output.out, problem=poisson, force=output.force, vector=output.vector, device=device
-        )
-    return _tell(outcome, output)
+    with _progress(output):
+        outcome = pipeline.solve_to(volume, problem=poisson, device=device, **output.folder)
+    return _finish(outcome, output)
 
 
 @solve_app.command(name="elasticity")
-def solve_elasticity(volume: Path, /, *, output: Output = NO_OUTPUT, body: Body = NO_BODY) -> int:
+def solve_elasticity(volume: Volume, /, *, output: Output = OUTPUT, body: Body = BODY) -> int:
     """Solve linear elasticity on a volume.npz.
 
-    A vector is three formulas with semicolons between them, in quotes: "x*y;0;sin(z)". The volume's six
-    faces u0, u1, v0, v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under
-    --traction.
-
-    Args:
-        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
+    A vector is three formulas separated by semicolons, in quotes: "x*y;0;sin(z)". The volume's six faces u0, u1, v0,
+    v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under --traction.
     """
     from ..workflow import pipeline
-    from .progress import progress_line
 
-    with progress_line(output.quiet):
-        outcome = pipeline.solve_to(volume, output.out, problem=body, force=output.force, vector=output.vector)
-    return _tell(outcome, output)
+    with _progress(output):
+        outcome = pipeline.solve_to(volume, problem=body, **output.folder)
+    return _finish(outcome, output)
 
 
 @app.command(name="study")
-def study_volume(volume: Path, /, *, output: Output = NO_OUTPUT, study: Study = NO_STUDY) -> int:
-    """Solve on finer and finer meshes of a volume.npz: table, CSV and plot of the errors and their rates.
+def study_volume(volume: Volume, /, *, output: Output = OUTPUT, study: Study = STUDY) -> int:
+    """Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors and their rates.
 
     Results go to STEM-study in the current folder, unless --out names another.
-
-    Args:
-        volume: volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
     """
     from ..workflow import pipeline
     from . import answer
-    from .progress import progress_line
 
-    with progress_line(output.quiet):
-        outcome, table = pipeline.study_to(volume, output.out, options=study, force=output.force, vector=output.vector)
-    if output.as_json:
-        _say(answer.as_json(outcome.report["study"]))
-    else:
-        _say(f"{table}\nresults in {outcome.folder}")
+    with _progress(output):
+        outcome, table = pipeline.study_to(volume, options=study, **output.folder)
+    _print(answer.as_json(outcome.report["study"]) if output.as_json else f"{table}\nresults in {outcome.folder}")
     return answer.exit_code(outcome.report)
 
 
@@ -192,92 +163,80 @@ def check(
     strict: bool = False,
     as_json: Json = False,
 ) -> int:
-    """Say whether a surface is accepted, or whether a volume is certified; writes nothing.
+    """Say whether a surface is accepted, or whether a volume is certified; write nothing.
 
     Args:
-        path: surface, sample's or model's name, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
-        component: which connected piece of the file to take, counted from 0.
-        max_faces: refuse larger surfaces.
-        decimate: bring larger surfaces down to max_faces instead.
-        strict: refuse a surface that intersects itself; without this it is a notice.
-        as_json: the verdict as JSON on stdout.
+        path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
+        component: number of the connected component to take, counted from 0.
+        max_faces: refuse surfaces with more faces.
+        decimate: reduce surfaces with more faces to max_faces instead.
+        strict: refuse a surface that intersects itself; without this option it is a notice.
     """
     from ..io.formats import is_volume
     from ..report import document as reports
-    from ..workflow.check import check_surface, check_volume
+    from ..workflow.verdict import check_surface, check_volume
     from . import answer
 
-    as_volume = is_volume(path)
-    if as_volume and (component is not None or max_faces != MapOptions.max_faces or decimate or strict):
+    if not is_volume(path):
+        facts = check_surface(path, component, max_faces, decimate, strict)
+        _print(answer.as_json(facts) if as_json else "accepted\n" + answer.facts_in_words(facts))
+        return DONE
+    if component is not None or max_faces != MapOptions.max_faces or decimate or strict:
         raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")
-    facts = check_volume(path) if as_volume else check_surface(path, component, max_faces, decimate, strict)
-    if as_json:
-        _say(answer.as_json(facts))
-    else:
-        _say(("" if as_volume else "accepted\n") + answer.facts_in_words(facts))
-    return DONE if not as_volume or reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
+    facts = check_volume(path)
+    _print(answer.as_json(facts) if as_json else answer.volume_in_words(facts))
+    return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
 
 
 @app.command(name="sample")
-def write_sample(name: str, /, *, out: Path | None = None, force: bool = False) -> int:
+def write_sample(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> int:
     """Write a surface made by formula as an OBJ file.
 
     Args:
         name: one of the samples.
-        out: file to write; NAME.obj in the current folder by default.
-        force: replace that file where it exists with other content.
     """
-    from ..models import obj_path, save_new
+    from ..new_file import check_new, save_new
     from ..samples import obj_text, sample
 
     with input_errors():
         surface = sample(name)
-    target = obj_path(name, out)
+    target = check_new(f"{name}.obj" if out is None else out, ".obj")
     save_new(target, obj_text(surface).encode(), force)
-    _say(str(target))
+    _print(str(target))
     return DONE
 
 
 @app.command(name="fetch")
-def fetch_model(name: str, /, *, out: Path | None = None, force: bool = False) -> int:
-    """Write a published model as an OBJ file, downloading it where it is not at hand.
+def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> int:
+    """Write a published model as an OBJ file; download it where it is not at hand.
 
     Args:
         name: one of the models, or g1 for all those of the set G1.
-        out: file to write; NAME.obj in the current folder by default.
-        force: replace that file where it exists with other content.
     """
     from ..models import fetch_all
 
     for path in fetch_all(name, out, force=force):
-        _say(str(path))
+        _print(str(path))
     return DONE
 
 
 @app.command(name="export")
 def export_volume(
-    volume: Path,
-    /,
-    *,
-    to: str,
-    out: Path | None = None,
-    solution: Path | None = None,
-    force: bool = False,
+    volume: Volume, /, *, to: str, out: Path | None = None, solution: Path | None = None, force: bool = False
 ) -> int:
     """Write a volume in a format that other programs read.
 
     Args:
-        volume: volume.npz, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.
         to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
             json (splinepy's).
         out: file to write; the volume's stem with the format's ending in the current folder by default.
-        solution: solution.npz to go with it: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
+        solution: solution.npz to export, too: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
             NAME_u.json).
         force: replace that file where it exists.
     """
     from ..io.formats import export
 
-    _say(str(export(volume, to, out, solution=solution, force=force)))
+    _print(str(export(volume, to, out, solution=solution, force=force)))
     return DONE
 
 
@@ -287,10 +246,10 @@ def serve_page(
     port: int = 8080,
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
     max_upload: int = 64,
-    mapping: Mapping = NO_MAPPING,
-    poisson: Equation = NO_POISSON,
+    mapping: Mapping = MAPPING,
+    poisson: Equation = POISSON,
 ) -> int:
-    """Serve a page to this computer's browser: drop a surface, watch it become a volume, take the files.
+    """Serve a page to this computer's browser: drop a surface, watch it become a volume, download the files.
 
     Args:
         port: of 127.0.0.1; 0 takes a free one.
@@ -299,7 +258,7 @@ def serve_page(
     """
     from ..live.app import serve
 
-    serve(_say, port=port, open_browser=open_browser, max_upload=max_upload, mapping=mapping, poisson=poisson)
+    serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=mapping, poisson=poisson)
     return DONE
 
 
@@ -307,7 +266,7 @@ def main(argv: list[str]) -> int:
     """Run one command and return its exit code; only an internal error shows a traceback."""
     try:
         code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
-    except KeyboardInterrupt as error:  # with the way on, where there is one
+    except KeyboardInterrupt as error:  # its message says how to continue, where that is possible
         print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
     except CycloptsError as error:
@@ -320,24 +279,31 @@ def main(argv: list[str]) -> int:
 
 
 def _minus_hint(argv: list[str]) -> str:
-    """The remedy where a formula was taken for an option."""
+    """Return the remedy where a formula was taken for an option."""
     for option, value in pairwise(argv):
         if option in FORMULAS and value.startswith("-"):
             return f" A formula that starts with a minus is written {option}={value}"
     return ""
 
 
-def _say(text: str) -> None:
+def _progress(output: OutputOptions) -> AbstractContextManager[ProgressCallback | None]:
+    """Return the context in which progress is shown."""
+    from .progress import shown_progress
+
+    return shown_progress(output.quiet)
+
+
+def _finish(outcome: Outcome, output: OutputOptions) -> int:
+    """Print the verdict and return the exit code."""
+    from . import answer
+
+    _print(answer.verdict_as_json(outcome) if output.as_json else answer.verdict_in_words(outcome))
+    return answer.exit_code(outcome.report)
+
+
+def _print(text: str) -> None:
     """Print to stdout; a reader that has gone, such as `head`, is no error."""
     try:
         print(text, flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush at exit
-
-
-def _tell(outcome: Outcome, output: OutputOptions) -> int:
-    """Say the verdict and return the exit code."""
-    from . import answer
-
-    _say(answer.verdict_as_json(outcome) if output.as_json else answer.verdict_in_words(outcome))
-    return answer.exit_code(outcome.report)

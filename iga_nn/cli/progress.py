@@ -1,4 +1,4 @@
-"""What a user sees while a command runs: one progress line and the log, both on stderr."""
+"""Shows a running command on stderr: the progress of the training, and the log above it."""
 
 from __future__ import annotations
 
@@ -10,47 +10,65 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.live import Live
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bar
+from rich.table import Column
 from rich.text import Text
 
 from ..workflow import LOGGERS
 
 if TYPE_CHECKING:
-    from parameterize.progress import Progress
+    from parameterize.progress import Progress, ProgressCallback
 
-PLAIN_INTERVAL = 10.0  # seconds between lines where the output is not a terminal
+PLAIN_INTERVAL = 10.0  # seconds between two lines where the output is not a terminal
 
 
-class ProgressLine:
-    """Shows the latest state of a training run: in place on a terminal, else a line now and then and at each stage."""
+class PlainLines:
+    """Prints a line at each new stage and every ten seconds."""
 
-    def __init__(self, console: Console, live: Live | None) -> None:
-        self._console, self._live = console, live
+    def __init__(self, console: Console) -> None:
+        self._console = console
         self._stage, self._printed = "", -PLAIN_INTERVAL
 
     def __call__(self, progress: Progress) -> None:
         """Take the state after one step."""
-        if self._live is not None:
-            self._live.update(Text(describe(progress)))
-            return
         now = time.monotonic()
         if progress.stage != self._stage or now - self._printed >= PLAIN_INTERVAL:
-            self._console.print(Text(describe(progress)), soft_wrap=True)
+            line = f"{progress.stage:8s} step {progress.step}/{progress.steps}, {describe(progress)}"
+            self._console.print(Text(line), soft_wrap=True)
             self._stage, self._printed = progress.stage, now
 
 
+class TerminalBar:
+    """Updates one bar: the steps of the stage, the time elapsed in all stages and the time left."""
+
+    def __init__(self, bar: Bar) -> None:
+        self._bar = bar
+        self._task = bar.add_task("", total=None, state="", visible=False)
+
+    def __call__(self, progress: Progress) -> None:
+        """Take the state after one step."""
+        self._bar.update(
+            self._task,
+            description=progress.stage,
+            completed=progress.step,
+            total=progress.steps,
+            state=describe(progress),
+            visible=True,
+        )
+
+
 def describe(progress: Progress) -> str:
-    """Stage, step, loss, folded samples and time left, as one line; how long the spline takes shows when it is on."""
+    """Return folds, time left and loss as text; how long the spline fit takes is known only when it runs."""
     minutes, seconds = divmod(round(max(0.0, progress.seconds_left)), 60)
-    left = f"{minutes}:{seconds:02d}"
-    return (
-        f"{progress.stage:8s} step {progress.step}/{progress.steps}  loss {progress.loss:.3e}  "
-        f"folded {progress.folded}  " + (f"at most {left}" if progress.stage == "spline" else f"left {left} + spline")
-    )
+    left = f"{minutes}:{seconds:02d} left"
+    folds = f"{progress.folded} fold{'s' * (progress.folded != 1)}"
+    when = f"at most {left}" if progress.stage == "spline" else f"{left}, then the spline fit"
+    return f"{folds}, {when}, loss {progress.loss:.3e}"
 
 
 class _ConsoleHandler(logging.Handler):
-    """Log records as single lines above the progress line; the same warning once."""
+    """Prints log records as single lines above the bar; the same warning once."""
 
     def __init__(self, console: Console) -> None:
         super().__init__()
@@ -68,8 +86,8 @@ class _ConsoleHandler(logging.Handler):
 
 
 @contextmanager
-def progress_line(quiet: bool) -> Iterator[ProgressLine | None]:
-    """Show progress and the packages' log on stderr while the block runs; warnings alone where `quiet`."""
+def shown_progress(quiet: bool) -> Iterator[ProgressCallback | None]:
+    """Show the progress and the log of the packages on stderr while the block runs; only warnings where `quiet`."""
     console = Console(file=sys.stderr, highlight=False)
     handler = _ConsoleHandler(console)
     loggers = [logging.getLogger(name) for name in LOGGERS]
@@ -78,14 +96,16 @@ def progress_line(quiet: bool) -> Iterator[ProgressLine | None]:
         logger.addHandler(handler)
         logger.setLevel(logging.WARNING if quiet else logging.INFO)
         logger.propagate = False
+    state = TextColumn("{task.fields[state]}", table_column=Column(ratio=1, no_wrap=True))  # is cut off, not the others
+    columns = TextColumn("{task.description:8s}"), BarColumn(10), MofNCompleteColumn(), TimeElapsedColumn(), state
     try:
         if quiet:
             yield None
         elif console.is_terminal:
-            with Live(console=console, transient=True, refresh_per_second=4) as live:
-                yield ProgressLine(console, live)
+            with Bar(*columns, console=console, transient=True, expand=True, refresh_per_second=4) as bar:
+                yield TerminalBar(bar)
         else:
-            yield ProgressLine(console, None)
+            yield PlainLines(console)
     finally:
         for logger, (level, propagate) in zip(loggers, before, strict=True):
             logger.removeHandler(handler)

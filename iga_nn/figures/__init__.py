@@ -1,16 +1,16 @@
-"""Figures of maps and solutions. All values are those of the spline itself, sampled: VTK only draws them."""
+"""Draws figures of maps and solutions. All values are samples of the spline itself; VTK only draws them."""
 
 from .curves import draw_history, draw_study
 from .map import draw_cut, draw_distortion, draw_faces, draw_folds, draw_lines, draw_meeting
-from .render import can_draw
-from .solution import draw_error, draw_errors, draw_values
+from .render import CANNOT_DRAW, can_draw
+from .solution import draw_error, draw_values
 
 __all__ = [
+    "CANNOT_DRAW",
     "can_draw",
     "draw_cut",
     "draw_distortion",
     "draw_error",
-    "draw_errors",
     "draw_faces",
     "draw_folds",
     "draw_history",

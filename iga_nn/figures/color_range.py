@@ -1,4 +1,4 @@
-"""ColorRange: which values the ends of a colour bar stand for, also of fields that are constant, zero or tiny."""
+"""Chooses the values at the ends of a colour bar, also for fields that are constant, zero or tiny."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 
 from parameterize.arrays import Array
 
-DECADES = 1e-4  # of a logarithmic range: its lower end over the smallest of the meshes' largest values
-SMALLEST = 1e-200  # values below which a colour bar has no ticks of its own
-ROUNDING = 1e-14  # share of the values within which they count as one
+DECADES = 1e-4  # lower end of a logarithmic range over the largest error of the best mesh
+SMALLEST = 1e-200  # smaller fields have no ticks on their colour bar
+ROUNDING = 1e-14  # values whose relative difference is smaller count as one
 
 
 @dataclass(frozen=True)
 class ColorRange:
     """Limits of a colour scale.
 
-    remark: what the colour bar says in place of ticks where the field has one value, such as "0 everywhere".
+    remark: stands in place of ticks where the field has one value, such as "0 everywhere".
     """
 
     low: float
@@ -28,27 +28,27 @@ class ColorRange:
     remark: str = ""
 
     def norm(self) -> Any:
-        """The range as matplotlib takes it: values to 0..1; a new one each time, for colour bars change theirs."""
+        """Return the range as a new object of matplotlib, which maps values to 0..1; colour bars change theirs."""
         from matplotlib.colors import LogNorm, Normalize
 
         kind = LogNorm if self.logarithmic else Normalize
         return kind(self.low, self.high, clip=True)
 
     def shares(self, values: Array) -> Array:
-        """Where values lie in the range, 0..1; half-way where the field has one value."""
+        """Return the places of values in the range, 0..1; 0.5 where the field has one value."""
         if self.remark:
             return np.full(np.shape(values), 0.5)
         return np.asarray(self.norm()(np.ravel(values))).reshape(np.shape(values))
 
     @property
     def labels(self) -> tuple[str, str]:
-        """What stands at the two ends of a legend."""
+        """The texts at the two ends of a legend."""
         form = "{:.1e}" if self.logarithmic else "{:.3g}"
         return (self.remark, "") if self.remark else (form.format(self.low), form.format(self.high))
 
 
 def even_range(values: Sequence[Array]) -> ColorRange:
-    """From the lowest to the highest of all values."""
+    """Return the range from the lowest to the highest of all values."""
     low, high = min(float(patch.min()) for patch in values), max(float(patch.max()) for patch in values)
     size = max(abs(low), abs(high))
     if size < SMALLEST:
@@ -59,7 +59,7 @@ def even_range(values: Sequence[Array]) -> ColorRange:
 
 
 def error_range(meshes: Sequence[Sequence[Array]]) -> ColorRange:
-    """Logarithmic, from the largest error of all meshes to four decades below that of the best one that has any."""
+    """Return a logarithmic range: from four decades below the largest error of the best mesh to that of the worst."""
     tops = [max(float(error.max()) for error in errors) for errors in meshes]
     if max(tops) < SMALLEST:
         return ColorRange(0.0, 1.0, remark=_smaller(max(tops)))

@@ -1,4 +1,4 @@
-"""Figures of curves: the loss over the steps, the errors over the mesh size."""
+"""Draws curves: the loss over the steps, the errors over the mesh size."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ TERMS = {  # of the loss, as parameterize names them
     "star": "faces seen from inside",
     "surface": "spline's boundary",
 }
-STAGES = {"S(2)": "round cuboid S(2)", "S(1)": "sharper one S(1)"}  # the others speak for themselves
+STAGES = {"S(2)": "round cuboid S(2)", "S(1)": "sharper cuboid S(1)"}  # the other names need no explanation
 
 
 def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
-    """Loss and its unweighted terms over the steps, folded samples below; the stages marked."""
+    """Draw the loss and its unweighted terms over the steps, the folded samples below, and mark the stages."""
     terms = [name for name in history if name not in ("stage", "step", "loss", "folded")]
     steps = np.arange(len(history["loss"]))
     figure, (upper, lower) = blank(2, 1, (11, 6), sharex=True, height_ratios=(4, 1))
@@ -59,7 +59,7 @@ def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
 
 
 def draw_study(path: Path, study: Study) -> None:
-    """L2 and H1 errors over the mesh size, a curve a degree, with the slopes that smooth solutions have."""
+    """Draw L2 and H1 errors over the mesh size, a curve per degree, with the slopes of smooth solutions."""
     figure, panels = blank(1, 2, (11, 5))
     for panel, (title, name, lost) in zip(panels, (("L2", "l2", 0), ("H1 seminorm", "h1_seminorm", 1)), strict=True):
         for (degree, levels), color in zip(study.items(), FACE_COLORS * 2, strict=False):

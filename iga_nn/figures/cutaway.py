@@ -1,4 +1,4 @@
-"""The volume cut open: the images of the cube's faces and mid-sections without those of one of its eight parts."""
+"""Cuts the volume open: images of the cube's faces and mid-sections without those of one of its eight octants."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from parameterize.spline.volume import AXES, BSplineVolume
 from .evaluate import FACE_COLORS, face_grid, points_on, section_grid
 from .render import Patch, View, widest_view
 
-Octant = tuple[int, int, int]  # the corner of the cube it holds: a side of u, of v and of w
+Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
 
-INSIDE = "#e9e6df"  # of the sections, set off from the faces' colours
-TILT = 0.45  # radians: more than one side is seen
+INSIDE = "#e9e6df"  # colour of the sections, unlike those of the faces
+TILT = 0.45  # radians: shows more than one side
 
 
 def face_patches(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patch]:
-    """The images of the six faces, each in its colour. samples: a direction. every: as in Patch."""
+    """Return the images of the six faces, each in its colour. samples: per direction. every: as in Patch."""
     return [_patch(points_on(volume, face_grid(face, samples)), color, every) for face, color in enumerate(FACE_COLORS)]
 
 
 def section_patches(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patch]:
-    """The images of u = 1/2, v = 1/2 and w = 1/2, in one colour."""
+    """Return the images of u = 1/2, v = 1/2 and w = 1/2, in one colour."""
     return [_patch(points_on(volume, section_grid(axis, samples)), INSIDE, every) for axis in range(3)]
 
 
 def best_cut(faces: Sequence[Array]) -> tuple[Octant, View]:
-    """Which of the eight parts to leave out, and from where to look, so that most of the cut is seen.
+    """Return the octant to leave out and the view that together show most of the cut.
 
-    faces: points (m, m, 3) on the six faces, m odd. An octant is closed: as much of its cut planes as of its outside,
-    counted with sign, is turned to the viewer. The latter is known from the faces alone.
+    faces: points (m, m, 3) on the six faces, m odd. The boundary of an octant is closed, so the area of its cut planes
+    that faces the viewer is, with sign, that of its outer faces turned away; these are known from the faces alone.
     """
     view = widest_view(np.concatenate([points.reshape(-1, 3) for points in faces]), tilt=TILT)
     choices = [(octant, side) for octant in product((0, 1), (0, 1), (0, 1)) for side in (view, view.turned())]
@@ -42,9 +42,9 @@ def best_cut(faces: Sequence[Array]) -> tuple[Octant, View]:
 
 
 def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
-    """What is seen of nine patches, the six faces and the three sections, where an octant is left out.
+    """Return what is seen of nine patches, the six faces and the three sections, when an octant is left out.
 
-    Three faces stay whole, of three the quarter in the octant is left out, of the sections this quarter is all.
+    Three faces stay whole, three lose their quarter in the octant, and of each section only this quarter is seen.
     """
     shown = [patches[2 * axis + 1 - octant[axis]] for axis in range(3)]
     for axis in range(3):
@@ -56,7 +56,7 @@ def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
 
 
 def octant_label(octant: Octant) -> str:
-    """Such as "u < 1/2, v > 1/2, w < 1/2"."""
+    """Return the octant in words, such as "u < 1/2, v > 1/2, w < 1/2"."""
     return ", ".join(f"{axis} {'<>'[side]} 1/2" for axis, side in zip(AXES, octant, strict=True))
 
 
@@ -67,7 +67,7 @@ def _patch(points: Array, color: str, every: int) -> Patch:
 
 
 def _sides(axis: int, octant: Octant) -> tuple[int, int]:
-    """The octant's sides in the two directions of a patch across an axis."""
+    """Return the octant's sides in the two directions of a patch normal to an axis."""
     first, second = (side for a, side in enumerate(octant) if a != axis)
     return first, second
 
@@ -83,7 +83,7 @@ def _quarter(patch: Patch, sides: tuple[int, int]) -> Patch:
 
 
 def _outside(faces: Sequence[Array], octant: Octant) -> Array:
-    """Vector area (3,) of the octant's three outer faces, outward."""
+    """Return the vector area (3,) of the octant's three outer faces, outward."""
     total = np.zeros(3)
     for axis, side in enumerate(octant):
         points = faces[2 * axis + side]

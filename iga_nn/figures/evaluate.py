@@ -1,4 +1,4 @@
-"""What pictures show: points of a volume on the cube's faces and sections, and the values there."""
+"""Evaluates what figures show: points of a volume on the cube's faces and sections, and the values there."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ if TYPE_CHECKING:
 
     Problem = Poisson | Elasticity
 
-Grid = tuple[Array, Array, Array]  # parameters of a tensor grid, one direction with a single value
+Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 
 SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
-MAP = "viridis"  # of colours; perceptually uniform
-FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # distinct for the colour-blind, too
+MAP = "viridis"  # colour map; perceptually uniform
+FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # also distinct for the colour-blind
 
 
 def face_grid(face: int, samples: int) -> Grid:
-    """Parameters of samples x samples points on a face of the cube, in the order of FACE_NAMES."""
+    """Return the parameters of samples x samples points on a face of the cube, numbered as in FACE_NAMES."""
     return _grid(face // 2, float(face % 2), samples)
 
 
 def section_grid(axis: int, samples: int) -> Grid:
-    """The same on the section through the middle of the cube, across an axis."""
+    """Return the same on the section through the middle of the cube that is normal to an axis."""
     return _grid(axis, 0.5, samples)
 
 
 def face_window(parameter: ArrayLike, half: float, samples: int) -> Grid:
-    """Parameters of the part of a face around a point (3,) on the cube's boundary, `half` to every side."""
+    """Return the parameters of the part of a face within `half` of a point (3,) on the cube's boundary."""
     place = np.asarray(parameter, dtype=np.float64)
     axis = int(np.abs(place - 0.5).argmax())
     low, high = np.clip(place - half, 0.0, 1.0), np.clip(place + half, 0.0, 1.0)
@@ -45,7 +45,7 @@ def face_window(parameter: ArrayLike, half: float, samples: int) -> Grid:
 
 
 def all_grids(samples: int) -> list[Grid]:
-    """The six faces, then the three mid-sections."""
+    """Return the grids of the six faces, then those of the three mid-sections."""
     return [face_grid(face, samples) for face in range(6)] + [section_grid(axis, samples) for axis in range(3)]
 
 
@@ -55,29 +55,24 @@ def _grid(axis: int, value: float, samples: int) -> Grid:
 
 
 def points_on(volume: BSplineVolume, grid: Grid) -> Array:
-    """Points (samples, samples, 3) of a grid of faces or sections."""
+    """Return the points (samples, samples, 3) of a grid on a face or section."""
     return _flat(volume.grid(*grid))
 
 
 def distortions(volume: BSplineVolume, grids: Sequence[Grid]) -> list[Array]:
-    """tanh(sqrt(ARAP) / 2), as the paper colours it, of the volume scaled to volume 1: (samples, samples) each."""
+    """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1: (samples, samples) for each grid."""
     length = UnitFrame.of(volume).length
     return [np.tanh(np.sqrt(_flat(arap(volume.grid_jacobian(*grid) / length))) / 2.0) for grid in grids]
 
 
 def solution_on(solution: Solution, grid: Grid) -> Array:
-    """u_h, of vectors the length: (samples, samples)."""
+    """Return u_h, or the length of a vector u_h: (samples, samples)."""
     values = _flat(solution.grid(*grid))
     return values if values.ndim == 2 else np.asarray(np.linalg.norm(values, axis=-1))
 
 
-def error_on(solution: Solution, problem: Problem, grid: Grid, points: Array) -> Array:
-    """|u - u_h|, of vectors the length, where the images of a grid are `points`: (samples, samples)."""
-    return error_at(_flat(solution.grid(*grid)), problem, points)
-
-
 def error_at(found: Array, problem: Problem, points: Array) -> Array:
-    """|u - u_h| at points (..., 3), u_h being `found` (...) or, for vectors, of which the length is taken, (..., 3)."""
+    """Return |u - u_h| at points (..., 3). found: u_h there, (...), or vectors (..., 3)."""
     exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
     if found.ndim < points.ndim:
         return np.abs(found - exact)
@@ -87,19 +82,20 @@ def error_at(found: Array, problem: Problem, points: Array) -> Array:
 def sampled_error(
     volume: BSplineVolume, solution: Solution, problem: Problem, samples: int
 ) -> tuple[list[Array], list[Array]]:
-    """Points (samples, samples, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
+    """Return points (samples, samples, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
     problem = problem.on(volume)
     grids = all_grids(samples)
     points = [points_on(volume, grid) for grid in grids]
-    return points, [error_on(solution, problem, grid, where) for grid, where in zip(grids, points, strict=True)]
+    found = [_flat(solution.grid(*grid)) for grid in grids]
+    return points, [error_at(values, problem, where) for values, where in zip(found, points, strict=True)]
 
 
 def face_labels() -> list[str]:
-    """What the six colours stand for."""
+    """Return what the six colours stand for, such as "u0: u = 0"."""
     return [f"{name}: {name[0]} = {name[1]}" for name in FACE_NAMES]
 
 
 def _flat(values: Array) -> Array:
-    """A grid's values without the direction that has a single parameter."""
+    """Return the values of a grid without the direction that has a single parameter."""
     axis = next(a for a in range(3) if values.shape[a] == 1)
     return np.asarray(values.squeeze(axis))

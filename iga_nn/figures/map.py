@@ -1,4 +1,4 @@
-"""Figures of a map: faces, parameter lines, cut, distortion, and where it is not proved or meets itself."""
+"""Draws a map: faces, parameter lines, cut, distortion, and where it is not proved or meets itself."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ from .style import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, sav
 
 EVERY = 14  # samples between two parameter lines: a tenth of the cube
 DISTORTION = "tanh(√ARAP / 2), at volume 1"
-SHARES = ColorRange(0.0, 1.0)  # of the distortion as it is coloured
-WINDOW = 0.15  # of the cube, to every side of a meeting place
+SHARES = ColorRange(0.0, 1.0)  # of the distortion
+WINDOW = 0.15  # of the cube, on every side of a meeting place
 MEETING_COLORS = ("#4477aa", "#ee6677")
 
 
 def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) -> None:
-    """The images of the six faces of the cube, each in its colour, from the front and from behind.
+    """Draw the images of the six faces of the cube, each in its colour, from the front and from behind.
 
-    marks: points (k, 3) shown as black balls, such as the corners that were given (the paper's Fig. 13).
+    marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    figure, (panels,) = panels_of(1, 2)
-    show_around(panels, face_patches(volume, SAMPLES), marks)
-    name_faces(figure)
-    figure.suptitle("Images of the six faces of the unit cube", fontsize=14)
-    save(figure, path)
+    _draw_around(path, face_patches(volume, SAMPLES), "Images of the six faces of the unit cube", marks)
 
 
 def draw_lines(path: Path, volume: BSplineVolume) -> None:
-    """Lines of constant parameters, a tenth apart, on the images of the six faces, from the front and from behind."""
+    """Draw lines of constant parameters, a tenth apart, on the images of the six faces, from the front and behind."""
+    _draw_around(path, face_patches(volume, SAMPLES, EVERY), "Lines of constant u, v, w, a tenth apart")
+
+
+def _draw_around(path: Path, patches: list[Patch], title: str, marks: Array | None = None) -> None:
     figure, (panels,) = panels_of(1, 2)
-    show_around(panels, face_patches(volume, SAMPLES, EVERY))
+    show_around(panels, patches, marks)
     name_faces(figure)
-    figure.suptitle("Lines of constant u, v, w, a tenth apart", fontsize=14)
+    figure.suptitle(title, fontsize=14)
     save(figure, path)
 
 
 def draw_cut(path: Path, volume: BSplineVolume) -> None:
-    """The volume without an eighth of the cube (the paper's Fig. 9): parameter lines inside, and the distortion there.
+    """Draw the volume without one octant of the cube (the paper's Fig. 9): parameter lines, and the distortion.
 
-    The eighth and the side it is seen from are those that show most of the cut.
+    The octant and the view are those that show most of the cut.
     """
     faces = face_patches(volume, SAMPLES, EVERY)
     octant, view = best_cut([patch.points for patch in faces])
@@ -62,12 +62,12 @@ def draw_cut(path: Path, volume: BSplineVolume) -> None:
         panel.imshow(draw(without_octant(patches, octant), view, PANEL))
     name_faces(figure)
     color_bar(figure, panels, SHARES, DISTORTION)
-    figure.suptitle(f"Cut open: the part {octant_label(octant)} is left out", fontsize=14)
+    figure.suptitle(f"Cut open: the octant {octant_label(octant)} is left out", fontsize=14)
     save(figure, path)
 
 
 def draw_distortion(path: Path, volume: BSplineVolume) -> None:
-    """tanh(sqrt(ARAP) / 2), as the paper colours it, on the images of u = 1/2, v = 1/2 and w = 1/2; at volume 1."""
+    """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2."""
     figure, (panels,) = panels_of(1, 3)
     grids = [section_grid(axis, SAMPLES) for axis in range(3)]
     for axis, (panel, values) in enumerate(zip(panels, distortions(volume, grids), strict=True)):
@@ -81,7 +81,7 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
 
 
 def draw_folds(path: Path, volume: BSplineVolume, places: Array) -> None:
-    """The boundary as of glass, with black balls at places (k, 3) inside: the spans where det J > 0 is not proved."""
+    """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J > 0 is not proved."""
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, _glass(volume), places)
     figure.suptitle(f"det J > 0 is not proved on {len(places)} spans: black balls", fontsize=14)
@@ -89,7 +89,7 @@ def draw_folds(path: Path, volume: BSplineVolume, places: Array) -> None:
 
 
 def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
-    """The place where the boundary meets itself: in the whole, and the two parts that meet there, from two sides."""
+    """Draw the place where the boundary meets itself: on the whole boundary, and the two parts there from two sides."""
     from matplotlib.colors import to_rgb
 
     mark = np.array([meeting.point])
@@ -100,13 +100,13 @@ def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
     figure, (panels,) = panels_of(1, 3)
     glass = _glass(volume)
     panels[0].imshow(draw(glass, view_of(glass), PANEL, mark))
-    panels[0].set_title("the whole", fontsize=13)
+    panels[0].set_title("whole boundary", fontsize=13)
     show_around(panels[1:], parts, mark)
-    figure.suptitle("The boundary meets itself: black ball; the two parts near it", fontsize=14)
+    figure.suptitle("The boundary meets itself at the black ball; the two parts near it", fontsize=14)
     save(figure, path)
 
 
 def _glass(volume: BSplineVolume) -> list[Patch]:
-    """The six faces, seen through."""
+    """Return the six faces as transparent patches."""
     points = [points_on(volume, face_grid(face, SAMPLES)) for face in range(6)]
     return [Patch(p, np.full(p.shape, 0.6), opacity=0.25) for p in points]

@@ -1,4 +1,4 @@
-"""Pictures of surface patches by VTK, off screen, where this machine can draw at all."""
+"""Draws surface patches by VTK, off screen, where this machine can draw."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from parameterize.arrays import Array
 log = logging.getLogger(__name__)
 
 LINE_WIDTH = 1.6  # pixels
-NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: what lies on a surface is seen
+NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: keeps them before a surface
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
+CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
 PROBE = """
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
@@ -34,9 +35,9 @@ raise SystemExit(0 if image.std() > 1.0 else 1)
 class Patch:
     """A surface patch given by samples on a tensor grid.
 
-    points: (m, n, 3). colors: (m, n, 3) red, green, blue in 0..1, shown as they are where `lit` is false.
-    every: a parameter line is drawn every so many samples, in both directions; 0 for none.
-    opacity: below 1 what lies behind is seen, too.
+    points: (m, n, 3). colors: (m, n, 3) red, green, blue in 0..1, shown without shading where `lit` is false.
+    every: samples from one parameter line to the next in both directions; 0 draws none.
+    opacity: below 1 the patch is transparent.
     """
 
     points: Array
@@ -48,20 +49,20 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Orthonormal directions of a camera: what is to the right, what is up, and where the viewer stands."""
+    """Orthonormal directions of a camera: to the right, up, and towards the viewer."""
 
     right: Array
     up: Array
     towards: Array
 
     def turned(self) -> View:
-        """The same scene from behind."""
+        """Return the view from behind."""
         return View(-self.right, self.up, -self.towards)
 
 
 @cache
 def can_draw() -> bool:
-    """Whether VTK can draw here. Asked in a child process: without a graphics library it does not fail, it crashes."""
+    """Return whether VTK can draw here, tried in a child process: without a graphics library it crashes."""
     _without_display()
     probe = [sys.executable, "-P", "-c", PROBE]
     try:
@@ -69,20 +70,20 @@ def can_draw() -> bool:
     except (OSError, subprocess.TimeoutExpired):
         done = False
     if not done:
-        log.warning("no figures: VTK cannot draw on this machine; remedy: %s", REMEDY)
+        log.warning("no figures: %s", CANNOT_DRAW)
     return done
 
 
 def _without_display() -> None:
-    """Where there is no X server, let VTK take EGL at once instead of trying X first and complaining."""
+    """Without an X server, let VTK use EGL at once instead of trying X first and warning."""
     if sys.platform == "linux" and not os.environ.get("DISPLAY"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
 def widest_view(points: Array, tilt: float = 0.0) -> View:
-    """The view that shows most of a point cloud (k, 3): along its thinnest principal axis, the longest one horizontal.
+    """Return the view that shows most of a point cloud (k, 3), along its thinnest axis with the longest one horizontal.
 
-    tilt: radians the viewer is moved up and sideways, so that a solid shows more than one side.
+    tilt: radians that the viewer is moved up and sideways, so that a solid shows more than one side.
     """
     centred = points - points.mean(axis=0)
     _, _, axes = np.linalg.svd(centred.T @ centred)
@@ -99,7 +100,7 @@ def widest_view(points: Array, tilt: float = 0.0) -> View:
 def draw(
     patches: Sequence[Patch], view: View, pixels: tuple[int, int], marks: Array | None = None
 ) -> NDArray[np.uint8]:
-    """Picture (height, width, 3) of the patches, parallel projection, framed to fill `pixels` = (width, height).
+    """Return a picture (height, width, 3) of the patches in parallel projection that fills `pixels` = (width, height).
 
     marks: points (k, 3), drawn as black balls.
     """
@@ -142,7 +143,7 @@ def _mesh(patch: Patch) -> Any:
 
 
 def _add_lines(plotter: Any, patches: Sequence[Patch], shift: Array) -> None:
-    """The patches' parameter lines, moved by `shift`."""
+    """Draw the parameter lines of the patches, moved by `shift`."""
     import pyvista
 
     drawn = [row for patch in patches if patch.every for row in _parameter_lines(patch)]
@@ -155,12 +156,12 @@ def _add_lines(plotter: Any, patches: Sequence[Patch], shift: Array) -> None:
 
 
 def _parameter_lines(patch: Patch) -> list[Array]:
-    """Lines (k, 3) of constant first, then of constant second parameter."""
+    """Return the lines (k, 3) of constant first parameter, then those of constant second parameter."""
     return [*patch.points[:: patch.every], *patch.points.transpose(1, 0, 2)[:: patch.every]]
 
 
 def _aim(plotter: Any, points: Array, view: View, pixels: tuple[int, int]) -> None:
-    """Place the camera so that the whole cloud is seen, with a margin of 4 %."""
+    """Place the camera so that it shows the whole cloud with a margin of 4 %."""
     frame = np.stack([view.right, view.up, view.towards], axis=1)  # (3, 3), columns
     low, high = (points @ frame).min(axis=0), (points @ frame).max(axis=0)
     width, height, _ = high - low

@@ -1,12 +1,9 @@
-"""Figures of a solution: its values on the boundary, its error on the boundary and on the mid-sections."""
+"""Draws a solution: its values on the boundary, its error on the boundary and on the mid-sections."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from parameterize.spline.volume import BSplineVolume
 
@@ -23,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
-    """|u - u_h| on the boundary and on the three mid-sections, logarithmic colours; the error norms beside it."""
+    """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms."""
     points, errors = sampled_error(volume, solution, problem, SAMPLES)
     limits = error_range([errors])
     figure, rows = panels_of(2, 3)
@@ -42,7 +39,7 @@ def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: P
 def draw_values(
     path: Path, volume: BSplineVolume, solution: Solution, title: str, *, exaggerate: float | None = None
 ) -> None:
-    """u_h on the boundary, of vectors the length, from the front and from behind.
+    """Draw u_h, or the length of a vector u_h, on the boundary, from the front and from behind.
 
     exaggerate: draw the body displaced by that many times u_h, a vector.
     """
@@ -56,30 +53,6 @@ def draw_values(
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, [Patch(p, colors(v, limits)) for p, v in zip(points, values, strict=True)])
     color_bar(figure, panels, limits, title)
-    save(figure, path)
-
-
-def draw_errors(path: Path, volume: BSplineVolume, solutions: Sequence[Solution], problem: Problem) -> None:
-    """|u - u_h| of several meshes in one range of colours, a row a mesh: the boundary and the three mid-sections.
-
-    The layout of the paper's Fig. 14, with the L2 error marked.
-    """
-    samples = [sampled_error(volume, solution, problem, SAMPLES) for solution in solutions]
-    limits = error_range([errors for _, errors in samples])
-    figure, rows = panels_of(len(solutions), 4)
-    for row, (points, errors), solution in zip(rows, samples, solutions, strict=True):
-        for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
-            lit = isinstance(shown, slice)
-            chosen = range(6) if isinstance(shown, slice) else (shown,)
-            patches = [Patch(points[i], colors(errors[i], limits), lit=lit) for i in chosen]
-            cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
-            panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if lit else 0.0), PANEL))
-            panel.set_title(title, fontsize=13)
-        report = solution.report
-        relative = "" if report.l2_relative is None else f"relative L2 error {report.l2_relative:.3e}, "
-        label = f"{report.dofs} unknowns, {relative}L2 error {report.l2:.3e}"
-        row[0].text(0.0, 0.0, label, transform=row[0].transAxes, fontsize=14)
-    color_bar(figure, rows, limits, r"$|u - u_h|$")
     save(figure, path)
 
 

@@ -1,4 +1,4 @@
-"""What the figures share: matplotlib's blank page, rendered views on it, colours, the file."""
+"""Holds what the figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .render import Patch, View, draw, widest_view
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SAMPLES = 141  # a direction and patch
+SAMPLES = 141  # per direction of a patch
 PANEL = (900, 700)  # pixels of one view
 
 
 def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
-    """A figure of its own, outside pyplot: nothing to close, no window system asked."""
+    """Return a figure and its axes outside pyplot: it need not be closed and asks for no window system."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -34,7 +34,7 @@ def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> 
 
 
 def panels_of(rows: int, columns: int) -> tuple[Figure, Any]:
-    """A figure of empty panels for rendered views, axes (rows, columns)."""
+    """Return a figure of empty panels for rendered views, and its axes (rows, columns)."""
     figure, axes = blank(rows, columns, (4.6 * columns, 3.8 * rows + 0.8), squeeze=False)
     for panel in axes.flat:
         panel.set_axis_off()
@@ -42,7 +42,7 @@ def panels_of(rows: int, columns: int) -> tuple[Figure, Any]:
 
 
 def show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -> None:
-    """The same patches from the front and from behind."""
+    """Draw the same patches from the front and from behind on two panels."""
     view = view_of(patches)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
         panel.imshow(draw(patches, direction, PANEL, marks))
@@ -50,12 +50,12 @@ def show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -
 
 
 def view_of(patches: list[Patch]) -> View:
-    """From where the patches are widest, a little from above."""
+    """Return the view that shows most of the patches, a little from above."""
     return widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
 
 
 def name_faces(figure: Figure) -> None:
-    """The six colours below the panels."""
+    """Write below the panels what the six colours stand for."""
     from matplotlib.patches import Patch as Swatch
 
     swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
@@ -71,14 +71,14 @@ def name_faces(figure: Figure) -> None:
 
 
 def colors(values: Array, limits: ColorRange) -> Array:
-    """Red, green, blue (m, n, 3) of values (m, n)."""
+    """Return red, green, blue (m, n, 3) of values (m, n)."""
     from matplotlib import colormaps
 
     return np.asarray(colormaps[MAP](limits.shares(values)))[..., :3]
 
 
 def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:
-    """One for all the panels, at their right; of a field with one value it has that colour and says the value."""
+    """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap
@@ -91,12 +91,12 @@ def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> No
 
 
 def positive(values: NDArray[Any]) -> Array:
-    """What a logarithmic axis can show; the rest is left out."""
+    """Return the values that a logarithmic axis can show, NaN for the others."""
     numbers = np.asarray(values, dtype=np.float64)
     return np.where(numbers > 0.0, numbers, np.nan)
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write it, PNG or PDF by the ending, under a temporary name, then rename it."""
+    """Write the figure as PNG or PDF, by the ending of the path; atomic."""
     with replacing(path) as temporary:
         figure.savefig(temporary)

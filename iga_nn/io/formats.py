@@ -1,4 +1,4 @@
-"""Volumes in the files of other programs: which formats there are, what they are called, where a solution goes.
+"""Reads and writes volumes in the files of other programs: the table of formats, and where a solution goes.
 
 Our own files are NumPy archives without pickles. volume.npz holds, in the units of the input,
 
@@ -7,7 +7,7 @@ Our own files are NumPy archives without pickles. volume.npz holds, in the units
 `degrees` (3,), open knot vectors `knots_u`, `knots_v`, `knots_w` of n + degree + 1 numbers from 0 to 1, and
 `control_points` (n_u, n_v, n_w, 3). solution.npz holds u_h in the same way, on knots of its own: `coefficients`
 (m_u, m_v, m_w), of displacements (m_u, m_v, m_w, 3). boundary.npz holds the surface's `vertices` (n, 3), their
-`parameters` (n, 3) on the cube's faces and the triangles `faces` (m, 3). Whatever knows splines can read them:
+`parameters` (n, 3) on the cube's faces and the triangles `faces` (m, 3). Any program that knows splines can read them:
 
 >>> import numpy as np
 >>> from scipy.interpolate import NdBSpline
@@ -19,10 +19,9 @@ Our own files are NumPy archives without pickles. volume.npz holds, in the units
 >>> np.allclose(map_by_scipy([0.1, 0.5, 0.9]), benchmark_volume(2)([[0.1, 0.5, 0.9]]), atol=1e-14)
 True
 
-A solution, a number or a displacement of three, goes with its volume into every foreign format: `vtk` and `view` hold
-it as the point data `u`; of the others it becomes a second file beside the volume's. `io.splinepy` explains G+Smo XML,
-MFEM meshes and splinepy's JSON, which are read, too; `io.vtk` those for ParaView.
-IGES and STEP know no trivariate splines, so they are not among them.
+A solution, scalar or a displacement, is exported with its volume into every format: `vtk` and `view` hold it as the
+point data `u`, the others as a second file beside the volume's. `io.splinepy` explains G+Smo XML, MFEM meshes and
+splinepy's JSON, which are also read; `io.vtk` those for ParaView. IGES and STEP have no trivariate splines.
 """
 
 from __future__ import annotations
@@ -39,8 +38,9 @@ from parameterize.files import replacing
 from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, input_errors
+from ..new_file import check_new
 from ..report import document as reports
-from . import splinepy as spline_files
+from . import Content, splinepy, vtk
 from .splinepy_gate import kind_of
 
 if TYPE_CHECKING:
@@ -53,19 +53,11 @@ _PROBLEMS = ("poisson", "elasticity")  # sections of report.json with a solution
 
 
 @dataclass(frozen=True)
-class Content:
-    """What is exported: a volume, a solution on it, and the problem whose exact solution is known."""
-
-    volume: BSplineVolume
-    field: SplineField | None = None
-    problem: Problem | None = None
-
-
-@dataclass(frozen=True)
 class Format:
-    """A format of another program. ending: of its files, after the volume's stem. read: None where it is written only.
+    """A format of another program. ending: of its files, after the volume's stem. write: puts the content into a file.
 
-    field_ending, write_field: for a solution that goes into a file of its own, beside the volume's.
+    read: None where the format is only written. field_ending, write_field: of the second file, beside the volume's,
+    that takes the solution; None where `write` takes it.
     """
 
     ending: str
@@ -75,76 +67,39 @@ class Format:
     write_field: Callable[[Path, SplineField], None] | None = None
 
 
-def _write_mfem(path: Path, content: Content) -> None:
-    volume = content.volume
-    if content.field is not None:
-        with input_errors():
-            volume = spline_files.on_knots_of(content.field, volume)
-    spline_files.write_mfem(path, volume)
-
-
-def _write_bezier(path: Path, content: Content) -> None:
-    from .vtk import write_bezier
-
-    write_bezier(path, content.volume, content.field)
-
-
-def _write_view(path: Path, content: Content) -> None:
-    from .vtk import write_view
-
-    write_view(path, content.volume, content.field, content.problem)
-
-
 FORMATS = {
     "gismo": Format(
-        ending=".xml",
-        write=lambda path, content: spline_files.write_gismo(path, content.volume),
-        read=partial(spline_files.read, kind="gismo"),
-        field_ending="_u.xml",
-        write_field=spline_files.write_gismo,
+        ".xml", splinepy.write_gismo, partial(splinepy.read, kind="gismo"), "_u.xml", splinepy.write_gismo_field
     ),
-    "mfem": Format(
-        ending=".mesh",
-        write=_write_mfem,
-        read=partial(spline_files.read, kind="mfem"),
-        field_ending=".gf",
-        write_field=spline_files.write_mfem_field,
-    ),
-    "vtk": Format(ending="_bezier.vtu", write=_write_bezier),
-    "view": Format(ending="_view.vtu", write=_write_view),
+    "mfem": Format(".mesh", splinepy.write_mfem, partial(splinepy.read, kind="mfem"), ".gf", splinepy.write_mfem_field),
+    "vtk": Format("_bezier.vtu", vtk.write_bezier),
+    "view": Format("_view.vtu", vtk.write_view),
     "json": Format(
-        ending=".json",
-        write=lambda path, content: spline_files.write_json(path, content.volume),
-        read=partial(spline_files.read, kind="json"),
-        field_ending="_u.json",
-        write_field=spline_files.write_json,
+        ".json", splinepy.write_json, partial(splinepy.read, kind="json"), "_u.json", splinepy.write_json_field
     ),
 }
 
 
 def is_volume(path: str | Path) -> bool:
-    """Whether a file is a volume (rather than a surface) by its beginning, or by the ending .npz.
+    """Return whether a file is a volume (rather than a surface), by its ending .npz or by its beginning.
 
-    Other programs' files begin alike (glTF as JSON, 3MF as a ZIP archive): with an ending not read here, it is none.
+    Files of other programs begin alike (glTF as JSON, 3MF as a ZIP archive), so the ending must be one that is read
+    here, for a volume or for a surface; a volume may be in a .zip, too.
     """
+    from parameterize.surface.readers.file import FORMATS as SURFACES
+
     source = Path(path)
+    endings = ("", ".zip", *(one.ending for one in FORMATS.values() if one.read), *SURFACES)
     return source.suffix == ".npz" or (
-        _may_hold_a_volume(source.suffix.lower()) and source.is_file() and kind_of(source) is not None
+        source.suffix.lower() in endings and source.is_file() and kind_of(source) is not None
     )
 
 
-def _may_hold_a_volume(ending: str) -> bool:
-    """Whether a file of that ending is read here: a .zip, or a surface's name, may hold a volume, too."""
-    from parameterize.surface.readers.file import FORMATS as SURFACES
-
-    return ending in ("", ".zip", *(one.ending for one in FORMATS.values() if one.read), *SURFACES)
-
-
 def load_volume(path: str | Path) -> BSplineVolume:
-    """Read volume.npz, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON: told apart by how the file begins.
+    """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh or splinepy JSON, told apart by their beginnings.
 
-    Raises InputError in one line where the file is none of them, damaged, rational or of several patches, and where
-    splinepy is needed and missing.
+    Raises InputError where the file is none of them, damaged, rational or of several patches, and where splinepy is
+    needed and missing.
     """
     source = Path(path)
     if source.is_dir():
@@ -168,18 +123,19 @@ def export(
     solution: str | Path | None = None,
     force: bool = False,
 ) -> Path:
-    """Write a volume's file in another format and return the path written; atomic.
+    """Write the volume of a file in another format and return the path written; atomic.
 
-    out: default is the volume's stem with the format's ending, in the current folder.
+    out: by default the volume's stem with the format's ending, in the current folder.
     solution: solution.npz of a solve on this volume. The view shows its error where the report.json beside it knows
     the exact solution; with G+Smo, MFEM and splinepy's JSON it is a file of its own, NAME_u.xml, NAME.gf, NAME_u.json.
     Raises InputError where a file cannot be read or written, exists (unless `force`), or a package is missing.
     """
     if to not in FORMATS:
-        raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP know no trivariate splines")
+        raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines")
     chosen = FORMATS[to]
-    target = Path(Path(volume).stem + chosen.ending if out is None else out)
-    _check_target(target, to)
+    target = check_new(
+        Path(volume).stem + chosen.ending if out is None else out, chosen.ending[chosen.ending.index(".") :]
+    )
     beside = target.with_name(target.stem + chosen.field_ending) if solution and chosen.write_field else target
     for file in (target, beside):
         if file.exists() and not force:
@@ -196,19 +152,8 @@ def export(
     return target
 
 
-def _check_target(target: Path, to: str) -> None:
-    """Raise InputError where a file of format `to` cannot be written under that name."""
-    ending = "." + FORMATS[to].ending.rpartition(".")[2]
-    if target.is_dir() or not target.name:
-        raise InputError(f"{target}: is a directory: name a file with --out")
-    if target.suffix != ending:
-        raise InputError(f"{target}: {to} files end in {ending}: choose such a name with --out")
-    if not target.parent.is_dir():
-        raise InputError(f"{target}: there is no folder {target.parent}: make it, or choose another with --out")
-
-
 def _content(volume: str | Path, solution: str | Path | None) -> Content:
-    """Read a volume, and a solution with what the report beside it says. Raises InputError."""
+    """Read a volume, and a solution with the problem that the report beside it names. Raises InputError."""
     loaded = load_volume(volume)
     if solution is None:
         return Content(loaded)
@@ -218,13 +163,13 @@ def _content(volume: str | Path, solution: str | Path | None) -> Content:
 
 
 def _section_beside(solution: Path) -> tuple[str, dict[str, Any]] | None:
-    """What the report beside solution.npz says of it, with the section's name; None where it says nothing."""
+    """Return name and section of the problem in the report beside solution.npz, None where there is none."""
     report = reports.read(solution.parent) or {}
     return next(((name, report[name]) for name in _PROBLEMS if isinstance(report.get(name), dict)), None)
 
 
 def _load_solution(path: Path, volume: BSplineVolume, section: tuple[str, dict[str, Any]] | None) -> SplineField:
-    """A solution on that volume: every knot of the map is one of its own, and its report's h is that of its mesh."""
+    """Return the solution after checks that it belongs to the volume: by its knots, and by the h of its report."""
     from solve.discretization.space import TrialSpace, longest_edge
     from solve.field import SplineField
 
@@ -243,7 +188,7 @@ def _load_solution(path: Path, volume: BSplineVolume, section: tuple[str, dict[s
 
 
 def _mesh_size(section: dict[str, Any], field: SplineField) -> float | None:
-    """The finest level's h; None where the section is not the field's, or was edited."""
+    """Return h of the finest level, None where the section is not the field's or was edited."""
     try:
         finest = section["levels"][-1]
         return float(finest["h"]) if finest["dofs"] == field.coefficients.size else None
@@ -252,7 +197,7 @@ def _mesh_size(section: dict[str, Any], field: SplineField) -> float | None:
 
 
 def _problem(name: str, section: dict[str, Any]) -> Problem | None:
-    """A problem with the exact solution that the section of that name knows."""
+    """Return a problem with the exact solution of that section, None where it has none."""
     exact = section.get("exact")
     if not isinstance(exact, str):
         return None

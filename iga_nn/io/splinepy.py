@@ -1,14 +1,14 @@
-"""Spline files of other programs, read and written through splinepy: G+Smo XML, MFEM NURBS meshes, splinepy JSON.
+"""Reads and writes spline files of other programs through splinepy: G+Smo XML, MFEM NURBS meshes, splinepy JSON.
 
-Each holds F(u, v, w) = sum P_ijk N_i(u) N_j(v) N_k(w) exactly: degrees, knot vectors, control points, every digit of a
-double. All three count the control points with u fastest (volume.npz: w fastest), and knots run from 0 to 1.
+Each holds F(u, v, w) = sum P_ijk N_i(u) N_j(v) N_k(w) exactly: degrees, knot vectors, control points with every digit
+of a double. All three count the control points with u fastest (volume.npz: w fastest), and knots run from 0 to 1.
 
 - G+Smo: a `MultiPatch` of one `TensorBSpline3` geometry with id 100. The sides 1 to 6 are u0, u1, v0, v1, w0, w1.
 - MFEM: "MFEM NURBS mesh v1.0", one patch, weights 1. The control points stand in MFEM's order of a patch: 8 vertices,
   12 edges, 6 faces, then the inside. Elements are the non-empty knot spans, u fastest, each with the reference
   coordinates (0, 1)^3 of its span. Boundary attributes 1 to 6 are w0, w1, v0, u1, v1, u0. With a solution the map is
   written on the solution's knots, and the solution's coefficients in the same order in a grid function beside it: one
-  a row, of displacements three (VDim: 3, Ordering: 1).
+  per row, three for displacements (VDim: 3, Ordering: 1).
 - JSON: splinepy's own list of splines, here one `BSpline`.
 
 A solution u_h(u, v, w) has a file of its own in G+Smo's and splinepy's formats, on its own degrees and knots: a spline
@@ -29,6 +29,7 @@ from parameterize.spline.bspline import apply_along, insertion_into
 from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, one_line
+from . import Content
 from .splinepy_gate import checked_text
 
 if TYPE_CHECKING:
@@ -38,16 +39,32 @@ INSTALL = "pip install 'iga-nn[interop]'"
 WEIGHTS_ALIKE = 1e-12  # relative
 
 
-def write_gismo(path: Path, spline: BSplineVolume | SplineField) -> None:
-    """Write G+Smo XML: a volume, or a solution alone."""
+def write_gismo(path: Path, content: Content) -> None:
+    """Write a volume as G+Smo XML."""
+    write_gismo_field(path, content.volume)
+
+
+def write_gismo_field(path: Path, spline: BSplineVolume | SplineField) -> None:
+    """Write a spline as G+Smo XML."""
     splinepy = _splinepy()
     patches = splinepy.Multipatch([_to_splinepy(spline)])
     patches.interfaces = np.full((1, 6), -1)  # no neighbours: splinepy cannot look for those of scalar splines
     splinepy.io.gismo.export(str(path), patches)
 
 
-def write_mfem(path: Path, volume: BSplineVolume) -> None:
-    """Write an MFEM NURBS mesh."""
+def write_json(path: Path, content: Content) -> None:
+    """Write a volume as splinepy's JSON."""
+    write_json_field(path, content.volume)
+
+
+def write_json_field(path: Path, spline: BSplineVolume | SplineField) -> None:
+    """Write a spline as splinepy's JSON."""
+    _splinepy().io.json.export(str(path), [_to_splinepy(spline)])
+
+
+def write_mfem(path: Path, content: Content) -> None:
+    """Write a volume as an MFEM NURBS mesh, on the knots of the solution where there is one."""
+    volume = content.volume if content.field is None else _on_knots_of(content.field, content.volume)
     _splinepy().io.mfem.export(str(path), _to_splinepy(volume).nurbs)
 
 
@@ -61,11 +78,11 @@ def write_mfem_field(path: Path, field: SplineField) -> None:
     path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
 
 
-def on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
-    """The same map with the knots of a solution on it inserted. Raises ValueError where the degrees differ."""
+def _on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
+    """Return the same map with the knots of a solution on it inserted. Raises InputError where the degrees differ."""
     if field.degrees != volume.degrees:
-        raise ValueError(
-            f"an MFEM mesh carries a solution of its own degrees {volume.degrees}, this one has {field.degrees}: "
+        raise InputError(
+            f"an MFEM mesh takes only solutions of its own degrees {volume.degrees}, this one has {field.degrees}: "
             "export it --to vtk"
         )
     points = volume.control_points
@@ -74,13 +91,8 @@ def on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
     return BSplineVolume(volume.degrees, field.knots, points)
 
 
-def write_json(path: Path, spline: BSplineVolume | SplineField) -> None:
-    """Write splinepy's JSON: a volume, or a solution alone."""
-    _splinepy().io.json.export(str(path), [_to_splinepy(spline)])
-
-
 def read(path: Path, kind: str) -> BSplineVolume:
-    """The one trivariate spline of a file; its knots are brought to run from 0 to 1, the map stays.
+    """Return the one trivariate spline of a file, its knots scaled to run from 0 to 1; the map stays.
 
     kind: "gismo", "mfem" or "json". Raises InputError where splinepy is missing, OSError, and ValueError where the
     file does not hold one trivariate B-spline: several patches, weights that differ, damaged content.
@@ -127,7 +139,7 @@ def _spanning(knots: Array) -> Array:
 
 
 def _splinepy() -> Any:
-    """The package splinepy. Raises InputError with the way to install it."""
+    """Return the package splinepy. Raises InputError with the way to install it."""
     try:
         import splinepy
     except ImportError:

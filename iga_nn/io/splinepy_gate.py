@@ -1,7 +1,7 @@
-"""What a foreign spline file must be before splinepy reads it: its kind by content, its size, one trivariate patch.
+"""Checks a spline file before splinepy reads it: its kind by content, its size, that it is one trivariate patch.
 
-splinepy checks degrees, knots and numbers of control points against each other, but trusts a file's counts, resolves
-XML entities, evaluates MFEM's rows as Python literals and takes one numbering of a patch's edges for granted.
+splinepy checks degrees, knots and numbers of control points against each other, but trusts the counts in a file,
+resolves XML entities, evaluates MFEM's rows as Python literals and assumes one numbering of a patch's edges.
 Each function raises ValueError with the reason.
 """
 
@@ -21,7 +21,7 @@ _EDGES = ["0 0 1", "0 3 2", "0 4 5", "0 7 6", "1 0 3", "1 1 2", "1 4 7", "1 5 6"
 
 
 def kind_of(path: Path) -> str | None:
-    """What a file is by its beginning: "gismo", "mfem", "json", "npz", or None. Raises OSError."""
+    """Return what a file is by its beginning: "gismo", "mfem", "json", "npz", or None. Raises OSError."""
     with path.open("rb") as stream:
         head = stream.read(4096).lstrip(b"\xef\xbb\xbf \t\r\n")
     if head.startswith(b"<") and re.search(rb"<xml\b", head):
@@ -31,7 +31,7 @@ def kind_of(path: Path) -> str | None:
 
 
 def checked_text(path: Path, kind: str) -> str:
-    """The file's text, reduced to what splinepy should see of it."""
+    """Return the text of the file, reduced to what splinepy should see of it."""
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise ValueError(f"has {size} bytes, more than {MAX_BYTES}")
@@ -43,9 +43,9 @@ def checked_text(path: Path, kind: str) -> str:
 
 
 def _check_gismo(text: str) -> str:
-    """The one geometry alone: the topology of a MultiPatch with one patch says nothing."""
+    """Return the one geometry without the topology, which says nothing of one patch."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ValueError("declares a document type: entities are not expanded here, take the declaration out")
+        raise ValueError("declares a document type: entities are not expanded here, remove the declaration")
     try:
         root = ElementTree.fromstring(text)  # noqa: S314 - entities, the danger, are refused above
     except ElementTree.ParseError as error:
@@ -63,14 +63,14 @@ def _check_gismo(text: str) -> str:
 
 
 def _check_mfem(text: str) -> str:
-    """Knot vectors, weights and control points alone, under the plain headings that splinepy knows."""
+    """Return knot vectors, weights and control points only, under the plain headings that splinepy knows."""
     sections = _mfem_sections(text)
     if "patches" in sections:
         raise ValueError("lists its patches; save it with MFEM's Mesh.Print, which writes knotvectors and weights")
     elements = sections.get("elements", [])
     _check_one(elements[1:])
     if elements[1].split(maxsplit=1)[1:] != [_CUBE] or sections.get("edges", [])[1:] != _EDGES:
-        raise ValueError("numbers the vertices or edges of its patch otherwise than MFEM's own cube-nurbs.mesh")
+        raise ValueError("numbers the vertices or edges of its patch differently from MFEM's own cube-nurbs.mesh")
     if sections.get("VDim") != ["3"] or sections.get("Ordering", [])[:1] != ["1"]:
         raise ValueError("must hold control points of 3 coordinates (VDim: 3), one a row (Ordering: 1)")
     kept = ["MFEM NURBS mesh v1.0", "knotvectors", *sections.get("knotvectors", [])]
@@ -79,7 +79,7 @@ def _check_mfem(text: str) -> str:
 
 
 def _mfem_sections(text: str) -> dict[str, list[str]]:
-    """The rows below each heading; what stands behind a heading's colon is the first of them."""
+    """Return the rows below each heading; the text behind a heading's colon is the first of them."""
     sections: dict[str, list[str]] = {}
     rows: list[str] = []
     for line in map(str.strip, text.splitlines()):
@@ -112,7 +112,7 @@ def _check_json(text: str) -> str:
 
 def _check_one(patches: Sequence[object]) -> None:
     if len(patches) != 1:
-        raise ValueError(f"holds {len(patches)} patches; a volume is one, save the one you mean alone")
+        raise ValueError(f"holds {len(patches)} patches; a volume is one: save the one you mean in a file of its own")
 
 
 _CHECKS: dict[str, Callable[[str], str]] = {"gismo": _check_gismo, "mfem": _check_mfem, "json": _check_json}

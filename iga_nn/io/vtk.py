@@ -1,7 +1,7 @@
-"""A volume for ParaView and VTK, as exact Bezier cells or as samples on linear cells.
+"""Writes a volume for ParaView and VTK, as exact Bezier cells or as samples on linear cells.
 
 Exact (`_bezier.vtu`): every knot span is a VTK_BEZIER_HEXAHEDRON (cell type 79) that holds the Bernstein coefficients
-of F; neighbours share the points between them. The order of a cell's points is `vtkHigherOrderHexahedron`'s: corners,
+of F; neighbours share the points between them. A cell's points are in the order of `vtkHigherOrderHexahedron`: corners,
 edges, faces, inside. The cells count u fastest. The degrees of each cell (HigherOrderDegrees) and the weights of the
 points (RationalWeights, all 1) are active attributes: readers take them for the shape functions. Point data are
 Bernstein coefficients, too. Where a solution has a higher degree or more knots than the map, both are written in the
@@ -32,20 +32,20 @@ from parameterize.spline.volume import BSplineVolume
 from solve.forms.frame import UnitFrame
 
 from ..figures.evaluate import error_at
+from . import Content
 
 if TYPE_CHECKING:
     from solve.field import SplineField
 
-    from ..figures.evaluate import Problem
-
-SAMPLES = 3  # intervals of the view a span and direction
+SAMPLES = 3  # intervals of the view per span and direction
 BEZIER_HEXAHEDRON = 79
 
 
-def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None = None) -> None:
-    """Write the exact cells; `solution` becomes the point data `u`."""
+def write_bezier(path: Path, content: Content) -> None:
+    """Write the exact cells; a solution becomes the point data `u`."""
     import pyvista
 
+    volume, solution = content.volume, content.field
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
     breaks = [np.unique(np.concatenate([s.knots[a] for s in shown])) for a in range(3)]
     degrees = [max(s.degrees[a] for s in shown) for a in range(3)]
@@ -61,12 +61,11 @@ def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None
     _write(path, grid)
 
 
-def write_view(
-    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Problem | None = None
-) -> None:
-    """Write samples of the map and of what is known on it; `problem` knows the exact solution."""
+def write_view(path: Path, content: Content) -> None:
+    """Write samples of the map, the solution and, where its problem has an exact solution, the error."""
     import pyvista
 
+    volume, solution, problem = content.volume, content.field, content.problem
     u, v, w = (divided_spans(knots, SAMPLES) for knots in volume.knots)
     points = volume.grid(u, v, w)  # (m_u, m_v, m_w, 3)
     jacobians = volume.grid_jacobian(u, v, w)
@@ -92,7 +91,7 @@ def _mark_active(mark: Callable[[Any], object], name: str, values: NDArray[Any])
 def _bernstein(
     degrees: Sequence[int], knots: Sequence[Array], field: Array, breaks: Sequence[Array], raised: Sequence[int]
 ) -> Array:
-    """Bernstein coefficients of degrees `raised` on the spans between `breaks`: (s_u q_u + 1, s_v q_v + 1, ...)."""
+    """Return Bernstein coefficients (s_u q_u + 1, s_v q_v + 1, ...) of degrees `raised` on the spans of `breaks`."""
     for axis in range(3):
         missing = np.setdiff1d(breaks[axis], knots[axis])
         finer, insertion = insert_knots(knots[axis], degrees[axis], missing)
@@ -102,7 +101,7 @@ def _bernstein(
 
 
 def _span_matrix(knots: Array, degree: int, raised: int) -> csr_array:
-    """From B-spline to Bernstein coefficients of degree `raised`, the one between two spans once: (s q + 1, n)."""
+    """Return the matrix (s q + 1, n) from B-spline to Bernstein coefficients of degree q; neighbours share one."""
     first, weights = extraction(knots, degree)
     blocks = elevation(degree, raised) @ weights  # (s, q + 1, degree + 1)
     rows = np.arange(len(first))[:, None] * raised + np.arange(raised + 1)
@@ -114,7 +113,7 @@ def _span_matrix(knots: Array, degree: int, raised: int) -> csr_array:
 
 
 def _cells(spans: Sequence[int], degrees: Sequence[int]) -> NDArray[np.int64]:
-    """Numbers of the points of every Bezier cell in VTK's order, cells and nodes in it with u fastest: (s, nodes)."""
+    """Return the numbers (s, nodes) of the points of every Bezier cell in VTK's order; cells count u fastest."""
     from vtkmodules.vtkCommonDataModel import vtkHigherOrderHexahedron
 
     shape = [s * q + 1 for s, q in zip(spans, degrees, strict=True)]
@@ -127,7 +126,7 @@ def _cells(spans: Sequence[int], degrees: Sequence[int]) -> NDArray[np.int64]:
 
 
 def _write(path: Path, grid: Any) -> None:
-    """Write through a string: on a full disk VTK's own writing fails with a page of its log and no reason."""
+    """Write the grid through a string: on a full disk VTK's own writing fails with a long log and no reason."""
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
     writer = vtkXMLUnstructuredGridWriter()

@@ -8,7 +8,7 @@ async function post(address, body) {
 
 // A file over the limit is only announced, so that the server says the same as of any other refused one.
 function upload(file) {
-  const limit = Number(document.getElementById("file").dataset.limit);
+  const limit = Number(document.getElementById("file").dataset.limit) * 2 ** 20;
   post(`upload?name=${encodeURIComponent(file.name)}&size=${file.size}`, file.size > limit ? null : file);
 }
 

@@ -1,4 +1,4 @@
-"""The live page, `iga-nn app`: its options, and the look whether the packages it needs are there."""
+"""Checks the options of the live page, `iga-nn app`, and that its packages are installed; then serves it."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def serve(
     mapping: MapOptions,
     poisson: PoissonOptions,
 ) -> None:
-    """Serve the page until interrupted; max_upload in megabytes; the address is told to `say`.
+    """Serve the page until interrupted. say: is told the address. max_upload: in megabytes.
 
-    Raises InputError for options that cannot be run, without trame, and where the port is taken.
+    Raises InputError for options that cannot be run, where trame is missing and where the port is taken.
     """
     mapping.config()
     poisson.problem()
     if mapping.resume or mapping.corners:
-        raise InputError("resume and corners belong to one surface: leave them out here")
+        raise InputError("--resume and --corners belong to one surface: leave them out here")
     if not 0 <= port <= 65_535:
         raise InputError(f"port {port}: must lie between 0, for any free one, and 65535")
     if max_upload < 1:

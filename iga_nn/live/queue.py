@@ -1,6 +1,6 @@
-"""The jobs of the live page: surfaces that were dropped, checked one by one, run one at a time, the others in a queue.
+"""Keeps the jobs of the live page: surfaces are checked one by one, run one at a time, and wait in a queue.
 
-A job's states: checking -> refused | ready -> waiting -> running -> done | failed | stopped, the last of which may be
+A job's states are checking -> refused | ready -> waiting -> running -> done | failed | stopped. A stopped job may be
 started again.
 """
 
@@ -29,10 +29,10 @@ NAME_LENGTH = 80
 
 @dataclass(eq=False)
 class Job:
-    """A surface's file in a folder of its own, and what became of it.
+    """A surface's file in a folder of its own, and its state.
 
-    text: why it was refused or failed. mapped: the surface's vertices (n, 3) as the training takes them to the cube.
-    losses: of the training, as they were told. log: the run's lines.
+    text: why it was refused or failed. mapped: where the training maps the surface's vertices, (n, 3) in the cube.
+    losses: those of the training that were reported. log: the lines of the run.
     """
 
     number: int
@@ -50,12 +50,12 @@ class Job:
 
     @property
     def path(self) -> Path:
-        """The surface's file."""
+        """Path of the surface's file."""
         return self.folder / self.name
 
     @property
     def results(self) -> Path:
-        """The folder a run leaves its files in."""
+        """The output folder of the run."""
         return self.folder / default_folder(self.name)
 
 
@@ -66,8 +66,8 @@ Run = Callable[[Job], Iterator[Message]]
 class Jobs:
     """All jobs, in the order they came.
 
-    check: reads a surface or raises MeshError. run: yields what a job does. changed: called after every change, from
-    whichever thread made it.
+    check: reads a surface or raises MeshError. run: yields the messages of a job. changed: is called after every
+    change, from the thread that made it.
     """
 
     def __init__(self, root: Path, check: Check, run: Run, changed: Callable[[Job], None]) -> None:
@@ -75,13 +75,13 @@ class Jobs:
         self._jobs: list[Job] = []
         self._queue: list[Job] = []  # waiting and running
         self._lock = Lock()
-        self._gate, self._runner = ThreadPoolExecutor(1), ThreadPoolExecutor(1)
+        self._checker, self._runner = ThreadPoolExecutor(1), ThreadPoolExecutor(1)
 
     def __iter__(self) -> Iterator[Job]:
         return iter(tuple(self._jobs))
 
     def find(self, number: int) -> Job | None:
-        """The job of that number."""
+        """Return the job of that number, None where there is none."""
         return next((job for job in self if job.number == number), None)
 
     def before(self, job: Job) -> int:
@@ -90,7 +90,7 @@ class Jobs:
             return self._queue.index(job) if job in self._queue else 0
 
     def add(self, name: str) -> Job:
-        """A new job with an empty folder: write its file, then let it be checked."""
+        """Return a new job with an empty folder; write its file, then call `check`."""
         with self._lock:
             number = len(self._jobs) + 1
             job = Job(number, safe_name(name), self._root / str(number))
@@ -100,16 +100,16 @@ class Jobs:
         return job
 
     def refuse(self, job: Job, text: str) -> None:
-        """The job is not taken, for a reason of one line."""
+        """Refuse a job. text: the reason, in one line."""
         job.state, job.text = "refused", text
         self._changed(job)
 
     def check(self, job: Job) -> None:
-        """Send the job through the gate, after those before it."""
-        self._gate.submit(self._pass, job)
+        """Have the job's surface checked, after those before it."""
+        self._checker.submit(self._check_now, job)
 
     def start(self, job: Job) -> None:
-        """Put an accepted or a stopped job into the queue; anything else stays as it is."""
+        """Put an accepted or a stopped job into the queue; any other stays as it is."""
         with self._lock:
             if job.state not in ("ready", "stopped"):
                 return
@@ -120,7 +120,7 @@ class Jobs:
         self._changed(job)
 
     def stop(self, job: Job) -> None:
-        """Stop a running job, or take a waiting one out of the queue."""
+        """Stop a running job, or remove a waiting one from the queue."""
         with self._lock:
             if job.turn is None or job not in self._queue:
                 return
@@ -131,13 +131,13 @@ class Jobs:
         self._changed(job)
 
     def close(self) -> None:
-        """Stop everything and wait for it."""
+        """Stop all jobs and wait until they have ended."""
         for job in self:
             self.stop(job)
-        self._gate.shutdown(cancel_futures=True)
+        self._checker.shutdown(cancel_futures=True)
         self._runner.shutdown(cancel_futures=True)
 
-    def _pass(self, job: Job) -> None:
+    def _check_now(self, job: Job) -> None:
         try:
             job.surface = self._check(job.path)
         except (MeshError, OSError) as error:
@@ -176,6 +176,6 @@ class Jobs:
 
 
 def safe_name(given: str) -> str:
-    """A file's name without folders, of plain characters, its ending kept."""
+    """Return a file's name without folders and unusual characters; its ending stays."""
     last = re.split(r"[/\\]", given)[-1]
     return re.sub(r"[^\w.+ -]", "_", last)[-NAME_LENGTH:].lstrip(". -") or "surface"

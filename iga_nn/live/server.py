@@ -1,7 +1,7 @@
-"""The live page's server: trame's, for this computer's browser alone; surfaces come in, jobs run, files go out.
+"""Serves the live page through trame to this computer's browser alone: takes surfaces, runs jobs, gives out files.
 
-All open tabs share the list of jobs; which one a tab shows is its own affair. Pictures are drawn by the browser, so
-that the server needs no graphics library for them.
+All open tabs share the list of jobs; each tab chooses which one it shows. The browser draws the pictures, so the server
+needs no graphics library for them.
 """
 
 from __future__ import annotations
@@ -11,11 +11,14 @@ import logging
 import webbrowser
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from aiohttp import ClientError, http_exceptions, web
 from trame.app import get_server
+from trame.ui.html import DivLayout
+from trame.widgets import client, vtk
 
 from parameterize.arrays import Array
 from parameterize.surface.surface import Surface
@@ -26,7 +29,6 @@ from ..options import MapOptions, PoissonOptions
 from ..samples import SAMPLES, sample, write_obj
 from ..workflow.output_folder import has_checkpoint
 from . import worker as job_process
-from .layout import lay_out
 from .queue import Job, Jobs
 from .state import CONTENT, MEGABYTE, colors, places, row, triangles
 from .worker import Message
@@ -41,7 +43,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Page:
-    """One running page: its trame server, its routes, its jobs."""
+    """One running page: its trame server, its routes, its jobs. max_upload: megabytes a file may have."""
 
     def __init__(self, root: Path, max_upload: int, mapping: MapOptions, poisson: PoissonOptions) -> None:
         self._server: Any = get_server("iga-nn", client_type="vue3")
@@ -52,13 +54,14 @@ class Page:
         logging.getLogger("aiohttp.server").addFilter(_not_the_clients)
 
     def run(self, say: Callable[[str], None], port: int, open_browser: bool) -> None:
-        """Serve until interrupted."""
+        """Serve until interrupted; `say` is told the address."""
         server = self._server
         server.state.update({"jobs": [], "current": 0, "shown": 0, "trame__title": "iga-nn"})
+        server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES)})
         server.state.client_only("shown")
         for name, act in {"start": self.jobs.start, "stop": self.jobs.stop}.items():
             server.trigger(name)(self._on_job(act))
-        lay_out(server, self._limit)
+        self._lay_out()
         server.controller.on_server_bind.add(self._bind)
 
         def ready(**_: Any) -> None:
@@ -74,6 +77,16 @@ class Page:
         finally:
             self._loop = None
             self.jobs.close()
+
+    def _lay_out(self) -> None:
+        """Give trame the page's template, style and script."""
+        here = files(__package__)
+        sheets = (files("iga_nn.report") / "page.css", here / "app.css")
+        vtk.initialize(self._server)  # its elements stand in the template, where trame does not see them
+        with DivLayout(self._server) as layout:
+            client.Style("".join(sheet.read_text(encoding="utf-8") for sheet in sheets))
+            client.Script((here / "app.js").read_text(encoding="utf-8"))
+            layout.root.add_child((here / "app.html").read_text(encoding="utf-8"))
 
     # Jobs
 
@@ -93,7 +106,7 @@ class Page:
         return on_number
 
     def _tell(self, job: Job) -> None:
-        """From any thread: show the change in every tab."""
+        """Show a change in every tab; may be called from any thread."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._show, job)
 
@@ -105,7 +118,7 @@ class Page:
             self._draw(state, changed)
 
     def _draw(self, state: Any, job: Job) -> None:
-        """Send the surface, and where the training takes it, when there is something new."""
+        """Send the surface, or where the training maps it, when there is something new."""
         if job.surface is None:
             return
         points = job.surface.unit_vertices if job.mapped is None else job.mapped
@@ -120,7 +133,7 @@ class Page:
     # Routes
 
     def _bind(self, served: Any) -> None:
-        """Add our routes and guards to the web server before it listens."""
+        """Add the routes and guards to the web server before it listens."""
         served.config["host"] = HOST  # whatever trame's own variables and arguments say
         app: web.Application = served.app
         app.middlewares.append(_guard(lambda: self._server.port))
@@ -135,11 +148,11 @@ class Page:
         )
 
     async def _session(self, request: web.Request) -> web.Response:
-        """Where trame's client asks for the address of its web socket."""
+        """Tell trame's client the address of its web socket."""
         return web.json_response({"sessionURL": f"ws://{request.host}/ws"})
 
     async def _upload(self, request: web.Request) -> web.Response:
-        """Take a file as the body; the answer is the job's number, refused or not."""
+        """Take a file as the body and answer with the number of its job, whether it is refused or not."""
         job = self.jobs.add(request.query.get("name", ""))
         announced = request.query.get("size", "")
         size = int(announced) if announced.isdecimal() else 0
@@ -147,7 +160,7 @@ class Page:
             if size <= self._limit:
                 size = await self._keep(request, job.path)
         except (OSError, ClientError) as error:
-            self.jobs.refuse(job, f"{job.name}: did not arrive whole ({one_line(error)}): try again")
+            self.jobs.refuse(job, f"{job.name}: the upload was incomplete ({one_line(error)}): try again")
             return web.Response(text=str(job.number))
         if size > self._limit:
             limit = self._limit // MEGABYTE
@@ -157,7 +170,7 @@ class Page:
         return web.Response(text=str(job.number))
 
     async def _keep(self, request: web.Request, path: Path) -> int:
-        """Write the body to a file, up to the limit; the bytes seen."""
+        """Write the body to a file, up to the limit, and return how many bytes came."""
         size = 0
         with path.open("wb") as stream:
             async for part in request.content.iter_chunked(MEGABYTE):
@@ -177,7 +190,7 @@ class Page:
         return web.Response(text=str(job.number))
 
     async def _file(self, request: web.Request) -> web.FileResponse:
-        """A result of a job; nothing but the names in CONTENT."""
+        """Give out a result of a job; only names in CONTENT are."""
         number, name = request.match_info["number"], request.match_info["name"]
         job = self.jobs.find(int(number)) if number.isdecimal() else None
         if job is None or name not in CONTENT or not (job.results / name).is_file():
@@ -186,7 +199,7 @@ class Page:
 
 
 def _guard(port: Callable[[], int]) -> Any:
-    """Answer this page alone: another site's page may reach this port through the user's browser."""
+    """Return a guard that answers this page alone: a page of another site could ask through the user's browser."""
 
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -202,7 +215,7 @@ def _guard(port: Callable[[], int]) -> Any:
 
 
 def _not_the_clients(record: logging.LogRecord) -> bool:
-    """Whether an error is the server's own: one that was no HTTP at all is answered with 400, and not worth a line."""
+    """Return whether an error is the server's own; a request that is not HTTP is answered with 400 and not logged."""
     return not (record.exc_info and isinstance(record.exc_info[1], http_exceptions.HttpProcessingError))
 
 

@@ -1,4 +1,4 @@
-"""What the live page shows of a job, as the browser takes it: plain values, and arrays for vtk.js."""
+"""Turns a job into what the browser shows of it: plain values, and arrays for vtk.js."""
 
 from __future__ import annotations
 
@@ -25,31 +25,22 @@ STAGES = {
     "cube": "3 of 6: to a cube",
     "corners": "4 of 6: corners fixed",
     "edges": "5 of 6: edges fixed",
-    "spline": "6 of 6: the spline itself",
+    "spline": "6 of 6: the spline",
 }
-LABELS = {
-    "checking": "being checked",
-    "refused": "refused",
-    "ready": "accepted",
-    "waiting": "waiting",
-    "running": "running",
-    "done": "done",
-    "failed": "failed",
-    "stopped": "stopped",
-}
-CONTENT = {artifact.file: artifact.holds for artifact in ARTIFACTS}
-VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # three sides of the cube are seen
+LABELS = {"checking": "being checked", "ready": "accepted"}  # the other states are called by their names
+CONTENT = {artifact.file: artifact.shows for artifact in ARTIFACTS}
+VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # shows three sides of the cube
 GREY = 190  # of 255
-EDGES_UP_TO = 3_000  # faces whose edges are drawn, too
+EDGES_UP_TO = 3_000  # edges are drawn on surfaces of at most so many faces
 
 
 def row(job: Job, before: int) -> dict[str, Any]:
-    """What the page says of a job, in JSON's own types."""
+    """Return what the page shows of a job, in JSON's own types. before: jobs ahead of it in the queue."""
     said: dict[str, Any] = {
         "number": job.number,
         "name": job.name,
         "state": job.state,
-        "label": LABELS[job.state] + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
+        "label": LABELS.get(job.state, job.state) + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
         "text": job.text,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",
@@ -68,8 +59,8 @@ def row(job: Job, before: int) -> dict[str, Any]:
         said["facts"] = [
             ["Stage", STAGES.get(now.stage, now.stage), f"step {now.step} of {now.steps}"],
             ["Time left", f"{minutes}:{seconds:02d}", "at most" if now.stage == "spline" else "until the spline"],
-            ["Loss", f"{now.loss:.2e}", "what the training lowers"],
-            ["Folded samples", f"{now.folded:,}", "0 is wanted"],
+            ["Loss", f"{now.loss:.2e}", "minimised by the training"],
+            ["Folded samples", f"{now.folded:,}", "0 is the aim"],
         ]
         said["share"] = now.step / max(now.steps, 1)
         said["curve"] = _curve(job.losses)
@@ -77,9 +68,9 @@ def row(job: Job, before: int) -> dict[str, Any]:
 
 
 def _files(job: Job) -> list[dict[str, Any]]:
-    """The results there are, with what they hold."""
+    """Return the result files that exist, their sizes and what they show."""
     found = [(name, job.results / name) for name in CONTENT if (job.results / name).is_file()]
-    return [{"name": name, "size": _size(path.stat().st_size), "holds": CONTENT[name]} for name, path in found]
+    return [{"name": name, "size": _size(path.stat().st_size), "shows": CONTENT[name]} for name, path in found]
 
 
 def _size(count: int) -> str:
@@ -87,7 +78,7 @@ def _size(count: int) -> str:
 
 
 def _curve(losses: list[float]) -> str:
-    """Points of a polyline in a box of 100 x 100: the logarithm of the loss over the steps told."""
+    """Return the points of a polyline in a box of 100 x 100: the logarithm of the losses over their steps."""
     logs = np.log10(np.maximum(losses, 1e-300))
     if len(logs) < 2 or not math.isfinite(float(np.ptp(logs))):
         return ""
@@ -97,17 +88,17 @@ def _curve(losses: list[float]) -> str:
 
 
 def triangles(surface: Surface) -> dict[str, str]:
-    """The surface's triangles as VTK lists cells: the number of corners before each."""
+    """Return the surface's triangles as VTK lists cells: the number of corners before each."""
     return _packed(np.insert(surface.faces, 0, 3, axis=1).astype(np.uint32))
 
 
 def places(points: Array) -> dict[str, str]:
-    """Points (n, 3), turned so that the browser's camera, which looks along the third axis, sees them well."""
+    """Return points (n, 3) rotated for the browser's camera, which looks along the third axis."""
     return _packed((points @ VIEW.T).astype(np.float32))
 
 
 def colors(points: Array, surface: Surface, *, mapped: bool) -> dict[str, str]:
-    """Red, green, blue of the triangles: of the cube's face each is nearest to; grey before the training."""
+    """Return red, green and blue (m, 3) of the triangles: of the cube's face each is nearest to; grey if not mapped."""
     if not mapped:
         return _packed(np.full(surface.faces.shape, GREY, dtype=np.uint8))
     away = points[surface.faces].mean(axis=1) - 0.5  # (m, 3), from the cube's centre

@@ -1,6 +1,6 @@
-"""One job in a process of its own: the pipeline's run, followed step by step through a pipe, stopped at any time.
+"""Runs one job in a process of its own, follows it through a pipe and can stop it at any time.
 
-A process, so that a stop works during every step, and so that what the job loads and holds goes with it.
+It is a process so that a stop works during every step, and so that its memory is freed when it ends.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from ..errors import expected_errors, one_line
 from ..options import MapOptions, PoissonOptions
 from ..workflow import LOGGERS, pipeline
 
-INTERVAL = 0.4  # seconds between two steps that are told
-SHARE = 0.05  # of the job's time, at most, goes into telling them
+INTERVAL = 0.4  # seconds, at least, between two steps that are reported
+SHARE = 0.05  # of the job's time, at most, that reporting takes
 GRACE = 3.0  # seconds a job has to stop by itself, leaving a checkpoint
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The training after one step; mapped: where it takes the surface's vertices and those added to them, (n, 3)."""
+    """The training after one step. mapped: where it maps the surface's vertices and those added to them, (n, 3)."""
 
     progress: Progress
     mapped: Array | None
@@ -47,7 +47,7 @@ class Line:
 
 @dataclass(frozen=True)
 class End:
-    """How the job ended; text: why, where it failed."""
+    """How the job ended. text: why it failed."""
 
     state: Literal["done", "failed", "stopped"]
     text: str = ""
@@ -57,7 +57,7 @@ Message = Step | Line | End
 
 
 def run(folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions, stop: Event) -> Iterator[Message]:
-    """Run the surface `name` that lies in `folder`, results beside it; what happens as it happens, an End last."""
+    """Run the surface `name` in `folder`, which also takes the results; yield messages as they come, an End last."""
     spawn = multiprocessing.get_context("spawn")  # a copy of a process with threads may hang
     receiver, sender = spawn.Pipe(duplex=False)
     halt = spawn.Event()
@@ -75,7 +75,7 @@ def run(folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions, s
 def _follow(
     receiver: Connection, halt: SharedEvent, stop: Event, process: multiprocessing.process.BaseProcess
 ) -> Iterator[Message]:
-    """Yield messages up to the End, which is added where the process exits without one."""
+    """Yield messages up to the End; where the process exits without one, add it."""
     patience = float("inf")
     while True:
         if stop.is_set() and not halt.is_set():
@@ -90,7 +90,7 @@ def _follow(
         except (EOFError, OSError):
             process.join()
             code = process.exitcode
-            yield End("stopped") if stop.is_set() else End("failed", f"the job's process ended with code {code}")
+            yield End("stopped") if stop.is_set() else End("failed", f"the job's process exited with code {code}")
             return
         yield message
         if isinstance(message, End):
@@ -100,8 +100,8 @@ def _follow(
 def _work(
     sender: Connection, halt: SharedEvent, folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions
 ) -> None:
-    """In the child: run in the job's folder, so that messages and the command name the file as the user does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is the parent's affair
+    """Run the job in the child process, in the job's folder: messages then name the file as the user does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C in the terminal
     os.chdir(folder)
     teller = _Teller(sender, halt)
     for logger in map(logging.getLogger, LOGGERS):
@@ -124,7 +124,7 @@ def _work(
 
 
 class _Teller(logging.Handler):
-    """Sends the log's lines, and steps now and then; interrupts the training where a stop is asked for."""
+    """Sends the lines of the log and some of the steps; interrupts the training when a stop is asked for."""
 
     def __init__(self, sender: Connection, halt: SharedEvent) -> None:
         super().__init__()
@@ -135,7 +135,7 @@ class _Teller(logging.Handler):
         self._sender.send(Line(record.getMessage()))
 
     def step(self, progress: Progress) -> None:
-        """Take the state after a step of the training."""
+        """Report the state after a step of the training."""
         if self._halt.is_set():
             raise KeyboardInterrupt
         start = time.monotonic()

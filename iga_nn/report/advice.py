@@ -1,4 +1,4 @@
-"""What a user of a map that is not certified needs to know: where, and what to try."""
+"""Says where a map is not certified, and what to try."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ SHOWN = 5  # places
 
 
 def span_parameters(volume: BSplineVolume, spans: NDArray[np.int64]) -> Array:
-    """Middles (k, 3) of spans (k, 3) in the cube."""
+    """Return the midpoints (k, 3), in the cube, of knot spans numbered by (k, 3)."""
     breaks = [breakpoints(knots) for knots in volume.knots]
     middles = [0.5 * (b[spans[:, axis]] + b[spans[:, axis] + 1]) for axis, b in enumerate(breaks)]
     return np.stack(middles, axis=1)
 
 
 def span_places(volume: BSplineVolume, spans: NDArray[np.int64]) -> Array:
-    """Images (k, 3) of the middles of spans (k, 3), in the volume's units."""
+    """Return the images (k, 3) of the midpoints of spans (k, 3), in the volume's units."""
     return volume(span_parameters(volume, spans)) if len(spans) else np.empty((0, 3))
 
 
 def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
-    """An entry of the section `parameterization`: how many spans lack a proof, and a few of them, evenly picked.
+    """Return an entry of the section `parameterization`: how many spans are not proved, and the places of a few.
 
     The first place is the worst fold found, where there is one.
     """
@@ -51,7 +51,7 @@ def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
 
 
 def what_to_try(report: Report, options: MapOptions | None = None) -> list[str]:
-    """Remedies for a report of a map that is not certified, the most promising first; none for one that is.
+    """Return remedies for a map that is not certified, the most promising first; none for a certified one.
 
     options: those the map was made with, where they are known.
     """
@@ -61,9 +61,9 @@ def what_to_try(report: Report, options: MapOptions | None = None) -> list[str]:
     if options is not None and options.steps_factor < 1.0:
         remedies.append("the whole training: leave out --steps-factor")
     if crossing := report.get("input", {}).get("self_intersections", {}).get("pairs", 0):
-        remedies.append(f"a surface that does not cross itself, as {crossing} pairs of its faces do (`iga-nn check`)")
+        remedies.append(f"a surface that does not intersect itself: {crossing} pairs of its faces do (`iga-nn check`)")
     if quality["bijective"] == "certified":  # then the boundary meets itself, without a fold
-        remedies.append("a surface whose parts stand farther apart there, or more faces around that gap")
+        remedies.append("a surface whose parts are farther apart there, or more faces around that gap")
     more = min(max(quality["control_points"]) + 10, MAX_CONTROL_POINTS)
     if more > max(quality["control_points"]):
         remedies.append(f"more control points: --control-points {more}")
@@ -76,7 +76,7 @@ def what_to_try(report: Report, options: MapOptions | None = None) -> list[str]:
 
 
 def in_words(report: Report) -> list[str]:
-    """The places and the remedies, one a line; none for a certified map."""
+    """Return the places and the remedies, one a line; none for a certified map."""
     quality, lines = report["parameterization"], []
     if found := quality.get("unproved"):
         places = ", ".join(map(in_brackets, found["places"]))

@@ -1,4 +1,4 @@
-"""report.json: assembled from results, written whole or not at all."""
+"""Writes, reads and judges report.json."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Report = dict[str, Any]
 
 
 def versions() -> dict[str, str]:
-    """Versions of what decides the numbers, as far as it is installed: a saved volume is solved without torch."""
+    """Return the versions of the packages that decide the numbers, without those that are not installed."""
     found = {"python": platform.python_version()}
     for name in ("numpy", "scipy", "torch"):
         with suppress(PackageNotFoundError):
@@ -34,7 +34,7 @@ def versions() -> dict[str, str]:
 
 
 def plain(value: Any) -> Any:
-    """The same content in JSON's own types: arrays become lists; what is not a finite number becomes null."""
+    """Return the same content in JSON's own types: arrays become lists, numbers that are not finite become null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -56,7 +56,7 @@ def write(folder: Path, report: Mapping[str, Any]) -> None:
 
 
 def read(folder: Path) -> Report | None:
-    """The report in a folder, or None where there is none or it is not one of ours."""
+    """Return the report in a folder, None where there is none of this schema."""
     try:
         report = json.loads((folder / REPORT).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -65,29 +65,29 @@ def read(folder: Path) -> Report | None:
 
 
 def is_finished(report: Report | None) -> bool:
-    """Whether the run that wrote this report came to its end."""
+    """Return whether the run that wrote this report has ended."""
     return report is not None and "total" in (report.get("seconds") or {})
 
 
 def is_certified(report: Report) -> bool:
-    """Whether det J was proved positive on the whole cube, and the boundary was not found to meet itself."""
+    """Return whether det J > 0 is proved on the whole cube and the boundary was not found to meet itself."""
     section = report["parameterization"]
     return section["bijective"] == "certified" and section.get("boundary_injective") is not False
 
 
 def is_converged(report: Report) -> bool:
-    """Whether every solve converged; True where nothing was solved."""
+    """Return whether every solve converged; True where nothing was solved."""
     return all(level["converged"] for level in solved(report).get("levels", []))
 
 
 def is_meaningful(report: Report) -> bool:
-    """Whether the finest solve's numbers mean something; True where nothing was solved."""
+    """Return whether the numbers of the finest solve mean something; True where nothing was solved."""
     levels = solved(report).get("levels", [])
     return not levels or levels[-1].get("meaningful", True) is not False
 
 
 def solved(report: Report) -> Report:
-    """The section of the problem that was solved, empty without one."""
+    """Return the section of the problem that was solved, empty where nothing was solved."""
     return next((report[name] for name in ("poisson", "elasticity", "study") if name in report), {})
 
 
@@ -103,10 +103,10 @@ def one_to_one(report: Report) -> str:
 
 
 def verdict(report: Report, folder: Path) -> Report:
-    """What decides whether a result is used: the `--json` answer of the command line."""
+    """Return what decides whether a result is used: what `--json` prints."""
     quality = report["parameterization"]
     short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
-    short["boundary_injective"] = quality.get("boundary_injective")
+    short |= {"boundary_injective": quality.get("boundary_injective"), "one_to_one": one_to_one(report)}
     if "arap" in quality:
         short["arap"] = quality["arap"]
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}

@@ -17,16 +17,17 @@ PNG = (".png",)
 
 
 def draw_figures(folder: Path, part: Part, known: Mapping[str, Any], endings: Sequence[str] = PNG) -> dict[str, str]:
-    """Draw each figure of one part that `known` suffices for, and return why others failed, by file name.
+    """Draw each figure of one part that `known` suffices for, and return why others were not drawn, by file name.
 
-    endings: of the files a curve is written to. Without VTK only curves are drawn.
+    endings: of the files a curve is written to.
     """
     failures: dict[str, str] = {}
     wanted = [a for a in ARTIFACTS if a.draw and a.part == part and known.keys() >= set(a.takes)]
-    vtk_draws = any(not artifact.is_curve for artifact in wanted) and figures.can_draw()
+    solid = [artifact for artifact in wanted if not artifact.is_curve]
+    if solid and not figures.can_draw():
+        failures = {artifact.file: figures.CANNOT_DRAW for artifact in solid}
+        wanted = [artifact for artifact in wanted if artifact.is_curve]
     for artifact in wanted:
-        if not (artifact.is_curve or vtk_draws):
-            continue
         for ending in endings if artifact.is_curve else PNG:
             path = (folder / artifact.file).with_suffix(ending)
             try:

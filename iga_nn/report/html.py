@@ -1,58 +1,50 @@
-"""report.html: what report.json says, the figures and an interactive view, in one file that fetches nothing."""
+"""Writes report.html: what report.json says, the figures and an interactive view, in one file that fetches nothing.
+
+The page is laid out by the template page.html, which escapes whatever it is given; this module chooses its content.
+"""
 
 from __future__ import annotations
 
 import base64
 import json
 import logging
-from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from parameterize.files import save_text
 
 from ..errors import one_line
-from ..levels import TITLES
+from ..levels import TITLES, capitalized, number
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, figures_of
 from .document import Report
-from .viewer import Scene
+
+if TYPE_CHECKING:
+    from .viewer import Scene
 
 log = logging.getLogger(__name__)
 
-VERDICTS = {
-    "certified": (
-        "good",
-        "Certified: free of folds",
-        "det J > 0 is proved on the whole cube, rounding errors included.",
-    ),
-    "folded": (
-        "bad",
-        "Not certified: the map folds",
-        "det J is negative somewhere; do not trust what is solved on it.",
-    ),
-    "undecided": ("unsure", "Not certified", "Neither det J > 0 on the whole cube nor a fold could be proved."),
-    "overlapping": (
-        "bad",
-        "Nowhere folded, yet it meets itself",
-        "det J > 0 is proved, but two parts of the boundary meet",
-    ),
+SOLVED = {"poisson": "Poisson's equation", "elasticity": "linear elasticity", "study": "convergence study"}
+MEANINGS = {
+    "certified": "det J > 0 is proved on the whole cube, rounding errors included.",
+    "folded": "The map folds: det J is negative somewhere. Do not trust what is solved on it.",
+    "undecided": "Neither det J > 0 on the whole cube nor a fold could be proved.",
 }
 
 
 def write(folder: Path, report: Report, scene: Scene | None) -> None:
-    """Write report.html from a finished report; its figures are taken from the folder, where they are. Atomic.
+    """Write report.html from a finished report and the figures in its folder; atomic.
 
-    scene: for the interactive view, where it could be drawn. A page that cannot be made is a bare one: report.json.
+    scene: for the interactive view, None where it could not be drawn. Where the page cannot be laid out, a bare one
+    with the text of report.json is written.
     """
     try:
         text = page(report, scene, folder)
     except Exception as error:
-        log.warning("report.html is bare, it could not be laid out: %s", one_line(error))
+        log.warning("report.html shows report.json only, the page could not be laid out: %s", one_line(error))
         text = _bare(report, one_line(error))
     save_text(folder / PAGE, text)
 
@@ -66,57 +58,63 @@ def _bare(report: Report, reason: str) -> str:
 
 
 def page(report: Report, scene: Scene | None, folder: Path) -> str:
-    """The page as text."""
+    """Return the page as text."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
     here = files(__package__)
-    skeleton, style, script = ((here / f).read_text(encoding="utf-8") for f in ("page.html", "page.css", "viewer.js"))
-    name = Path(report["input"]["file"]).name
-    sections = [
-        _advice(report),
-        _convergence(report),
-        _notices(report),
-        *_figures(report, folder),
-        _command(report),
-        _details(report),
-    ]
-    return Template(skeleton).substitute(
-        title=f"{escape(name)}: {_heading(report)}",
-        subtitle=f"iga-nn {escape(report['versions']['iga-nn'])}, {report['seconds']['total']:.1f} s",
-        style=style,
-        script=script,
-        verdict=_verdict(report),
+    own = {"style": "page.css", "script": "viewer.js"}  # inserted as they are
+    section = reports.solved(report)
+    environment = Environment(
+        loader=PackageLoader(__package__, ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    return environment.get_template("page.html").render(
+        {name: Markup((here / file).read_text(encoding="utf-8")) for name, file in own.items()},  # noqa: S704
+        title=f"{Path(report['input']['file']).name}: {_heading(report)}",
+        report=report,
+        verdicts=_verdicts(report),
         facts=_facts(report),
-        hidden="" if scene else "hidden",
-        choices="".join(_choice(name) for name in ("faces", *_fields(scene))),
-        scene=json.dumps(scene, ensure_ascii=False).replace("<", "\\u003c"),
-        sections="\n".join(filter(None, sections)),
+        scene=scene,
+        advice=in_words(report),
+        exact=section.get("exact"),
+        levels=_levels(section),
+        notices=_notices(report),
+        figures=_figures(report, folder),
+        details=_details(report),
     )
 
 
 def _heading(report: Report) -> str:
-    solved = {"poisson": "Poisson's equation", "elasticity": "linear elasticity", "study": "convergence study"}
-    return next((text for section, text in solved.items() if section in report), "spline volume")
+    return next((text for section, text in SOLVED.items() if section in report), "spline volume")
 
 
-def _verdict(report: Report) -> str:
-    quality = report["parameterization"]
-    overlapping = quality["bijective"] == "certified" and not reports.is_certified(report)
-    kind, heading, meaning = VERDICTS["overlapping" if overlapping else quality["bijective"]]
-    if overlapping:
-        meaning += " at x, y, z = " + ", ".join(f"{value:.4g}" for value in quality["boundary_meeting"]["point"]) + "."
-    elif quality["bijective"] == "certified" and quality.get("boundary_injective"):
-        meaning += " Nor do its faces meet themselves: the map is one-to-one."
+def _verdicts(report: Report) -> list[tuple[str, str, str]]:
+    """Return what decides whether the result is used: the colour, the heading and the meaning of each verdict."""
+    quality, answer = report["parameterization"], reports.one_to_one(report)
+    meaning = MEANINGS[quality["bijective"]]
+    if meeting := quality.get("boundary_meeting"):
+        meaning += f" Two parts of the boundary meet at x, y, z = {_point(meeting['point'])}."
+    elif answer == "yes":
+        meaning += " Its faces do not meet themselves either: the map is one-to-one."
     if quality.get("witness"):
-        meaning += " The worst place: u, v, w = " + ", ".join(f"{value:.4g}" for value in quality["witness"]) + "."
-    found = f'<div class="verdict {kind}"><strong>{heading}</strong>{escape(meaning)}</div>'
+        meaning += f" The worst place is u, v, w = {_point(quality['witness'])}."
+    color = "good" if reports.is_certified(report) else "bad" if answer == "no" else "unsure"
+    found = [(color, f"det J > 0: {quality['bijective']}; one-to-one: {answer}", meaning)]
+    if "not_solved" in report:
+        found.append(("bad", "The problem was not solved", report["not_solved"]))
     if not reports.is_meaningful(report):
-        found += '<div class="verdict bad"><strong>The errors mean nothing</strong>The notices below say why.</div>'
+        found.append(("bad", "The errors mean nothing", "The notices below say why."))
     if not reports.is_converged(report):
-        found += '<div class="verdict bad"><strong>A solve did not converge</strong>The last iterate is shown.</div>'
+        found.append(("bad", "A solve did not converge", "The last iterate is shown."))
     return found
 
 
-def _facts(report: Report) -> str:
-    """The numbers that matter, each with what it is and a remark."""
+def _point(coordinates: list[float]) -> str:
+    return ", ".join(f"{value:.4g}" for value in coordinates)
+
+
+def _facts(report: Report) -> list[tuple[str, str, str]]:
+    """Return the numbers that matter: what each is, the number and a remark."""
     quality = report["parameterization"]
     facts = []
     if "arap" in quality:
@@ -124,116 +122,53 @@ def _facts(report: Report) -> str:
         facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; at volume 1"))
         given = f"rms at volume 1; {boundary['as_given']['rms']:.3g} as given"
         facts.append(("Boundary distance", f"{boundary['unit_volume']['rms']:.3g}", given))
-    levels = reports.solved(report).get("levels", [])
-    if levels:
+    if levels := reports.solved(report).get("levels"):
         finest = levels[-1]
         facts += [_error_fact(finest, key) for key in ("l2", "error_estimate") if finest.get(key) is not None]
         facts.append(("Unknowns", f"{finest['dofs']:,}", f"{finest['iterations']} iterations"))
     points = " × ".join(map(str, quality["control_points"]))
-    facts.append(("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"]))))
-    rows = (
-        f"<div><dt>{name}</dt><dd>{escape(value)}</dd><small>{escape(remark)}</small></div>"
-        for name, value, remark in facts
-    )
-    return f'<dl class="facts">{"".join(rows)}</dl>'
+    return [*facts, ("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"])))]
 
 
 def _error_fact(level: Report, key: str) -> tuple[str, str, str]:
-    """The relative error, and the absolute one as the remark; that alone where the solution is zero."""
+    """Return the relative error with the absolute one as the remark; where the solution is zero, that alone."""
     relative = level.get(f"{key}_relative")
     if relative is None:
-        return _capitalized(TITLES[key]), f"{level[key]:.3e}", "on the finest mesh"
-    return _capitalized(TITLES[f"{key}_relative"]), f"{relative:.3e}", f"absolute {level[key]:.3e}"
+        return capitalized(TITLES[key]), f"{level[key]:.3e}", "on the finest mesh"
+    return capitalized(TITLES[f"{key}_relative"]), f"{relative:.3e}", f"absolute {level[key]:.3e}"
 
 
-def _capitalized(title: str) -> str:
-    return title[0].upper() + title[1:]
+def _levels(section: Report) -> list[list[str]]:
+    """Return the table of levels: the titles of the numbers that are known, then a row a level."""
+    levels = section.get("levels", [])
+    rates = {f"rate_{norm}": [None, *values] for norm, values in section.get("rates", {}).items()}
+    rows = [level | {name: values[i] for name, values in rates.items()} for i, level in enumerate(levels)]
+    keys = [key for key in TITLES if any(row.get(key) is not None for row in rows)]
+    return [[TITLES[key] for key in keys], *([number(key, row.get(key)) for key in keys] for row in rows)] * bool(rows)
 
 
-def _fields(scene: Scene | None) -> list[str]:
-    return [field["name"] for field in scene["fields"]] if scene else []
+def _notices(report: Report) -> list[str]:
+    """Return the notices of the surface and of the solves, and which figures are missing for which reason."""
+    missing: dict[str, list[str]] = {}
+    for name, reason in report.get("not_drawn", {}).items():
+        missing.setdefault(reason, []).append(name)
+    undrawn = [f"{', '.join(names)} could not be drawn: {reason}" for reason, names in missing.items()]
+    return [*report["input"].get("notices", []), *reports.solved(report).get("notices", []), *undrawn]
 
 
-def _choice(name: str) -> str:
-    return f'<label><input type="radio" name="field" value="{name}"> {name}</label>'
-
-
-def _convergence(report: Report) -> str:
-    """A row a level, the columns that are known."""
-    section = reports.solved(report)
-    if not section:
-        return ""
-    levels = _with_rates(section)
-    keys = [key for key in TITLES if any(level.get(key) is not None for level in levels)]
-    body = [[_number(key, level.get(key)) for key in keys] for level in levels]
-    formula = f'<p class="soft">exact solution {escape(str(section["exact"]))}</p>' if section.get("exact") else ""
-    return f"<h2>Convergence</h2>{formula}{_table([TITLES[key] for key in keys], body)}"
-
-
-def _with_rates(section: Report) -> list[dict[str, Any]]:
-    rates = section.get("rates", {})
-    columns = {f"rate_{norm}": [None, *rates[norm]] for norm in rates}
+def _figures(report: Report, folder: Path) -> list[tuple[str, str]]:
+    """Return heading and picture, in Base64, of the figures that belong to this report and are there."""
+    there = [figure for figure in figures_of(report) if (folder / figure.file).is_file()]
     return [
-        {**level, **{name: values[i] for name, values in columns.items()}} for i, level in enumerate(section["levels"])
+        (capitalized(each.shows), base64.b64encode((folder / each.file).read_bytes()).decode("ascii")) for each in there
     ]
 
 
-def _number(key: str, value: Any) -> str:
-    if value is None:
-        return "–"
-    if isinstance(value, int):
-        return f"{value:,}"
-    return f"{value:.2f}" if key.startswith("rate") else f"{value:.3e}" if key != "h" else f"{value:.4g}"
-
-
-def _advice(report: Report) -> str:
-    """Where the map is not certified: the places, and what to try."""
-    lines = in_words(report)
-    return f"<h2>Not certified: where, and what to try</h2>{_items(lines)}" if lines else ""
-
-
-def _items(texts: Iterable[str]) -> str:
-    return f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ul>"
-
-
-def _notices(report: Report) -> str:
-    notices = [*report["input"].get("notices", []), *reports.solved(report).get("notices", [])]
-    notices += [f"{name} could not be drawn: {why}" for name, why in report.get("not_drawn", {}).items()]
-    if not notices:
-        return ""
-    return f"<h2>Notices</h2>{_items(notices)}"
-
-
-def _figures(report: Report, folder: Path) -> Iterable[str]:
-    """The figures of the sections this report has."""
-    for figure in figures_of(report):
-        path = folder / figure.file
-        if path.is_file():
-            data = base64.b64encode(path.read_bytes()).decode("ascii")
-            image = f'<img src="data:image/png;base64,{data}" alt="{figure.title}">'
-            yield f"<h2>{figure.title}</h2><figure>{image}</figure>"
-
-
-def _command(report: Report) -> str:
-    return f"<h2>The command that repeats this</h2><pre>{escape(report['command'])}</pre>"
-
-
-def _details(report: Report) -> str:
-    """What was given, how long each step took, which versions did it."""
+def _details(report: Report) -> dict[str, dict[str, Any]]:
+    """Return what was given, how long each step took, and which versions were used."""
     given = {name: value for name, value in report["input"].items() if name in ("file", "sha256", "vertices", "faces")}
     given |= {name: report[name] for name in ("seed", "device") if name in report}
     if "config" in report:
         given["preset"] = report["config"]["name"]
     seconds = {name: f"{value:.2f}" for name, value in report["seconds"].items()}
-    tables = {"Input": given, "Seconds": seconds, "Versions": report["versions"]}
-    blocks = (
-        f"<div><h2>{title}</h2>{_table((), [list(map(str, row)) for row in rows.items()], 'named')}</div>"
-        for title, rows in tables.items()
-    )
-    return f'<div class="columns">{"".join(blocks)}</div>'
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
-    first = f"<tr>{''.join(f'<th>{escape(text)}</th>' for text in head)}</tr>" if head else ""
-    body = "".join(f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in row)}</tr>" for row in rows)
-    return f'<div class="wide"><table class="{kind}">{first}{body}</table></div>'
+    return {"Input": given, "Seconds": seconds, "Versions": report["versions"]}

@@ -1,4 +1,4 @@
-"""Convergence studies as tables, CSV and rows of numbers."""
+"""Writes convergence studies as tables, as CSV and as rows of numbers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import csv
 import io
 from typing import TYPE_CHECKING, Any
 
-from ..levels import ESTIMATES, TITLES
+from ..levels import ESTIMATES, TITLES, number
 
 if TYPE_CHECKING:
     from ..figures.curves import Study
@@ -15,7 +15,7 @@ COLUMNS = (*(key for key in TITLES if key not in ESTIMATES), "converged", "meani
 
 
 def rows_of(study: Study) -> list[dict[str, Any]]:
-    """One entry a level with the names of COLUMNS; what is not known is None. Seconds are process CPU seconds."""
+    """Return one entry a level with the names of COLUMNS; what is not known is None. Seconds are CPU seconds."""
     found = []
     for degree, levels in study.items():
         for level in levels:
@@ -26,7 +26,7 @@ def rows_of(study: Study) -> list[dict[str, Any]]:
 
 
 def as_csv(study: Study) -> str:
-    """Comma-separated, all digits, first row the names."""
+    """Return the study as comma-separated values with all digits; the first row holds the names."""
     stream = io.StringIO()
     writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -35,18 +35,10 @@ def as_csv(study: Study) -> str:
 
 
 def as_table(study: Study) -> str:
-    """Columns for a reader."""
+    """Return the study as a table for a reader, its columns aligned."""
     keys = [key for key in COLUMNS if key in TITLES and key != "h"]
     lines = [[*(TITLES[key] for key in keys), "seconds"]]
     for row in rows_of(study):
-        lines.append([*(_number(key, row[key]) for key in keys), f"{row['setup'] + row['solve']:.2f}"])
+        lines.append([*(number(key, row[key]) for key in keys), f"{row['setup'] + row['solve']:.2f}"])
     widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
     return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in lines)
-
-
-def _number(key: str, value: float | None) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, int):
-        return str(value)
-    return f"{value:.2f}" if key.startswith("rate") else f"{value:.3e}"

@@ -1,8 +1,8 @@
-"""The interactive scene of report.html: faces and mid-sections of a volume as compact arrays, for viewer.js.
+"""Makes the interactive scene of report.html: faces and mid-sections of a volume as compact arrays for viewer.js.
 
-Nine patches (the six faces, u = 1/2, v = 1/2, w = 1/2), each sampled on the same lattice of SAMPLES x SAMPLES points.
-Places are 16-bit numbers between the scene's two corners, values 8-bit numbers of a colour map, both in Base64: some
-0.8 MB for a volume with all its fields.
+Nine patches (the six faces, u = 1/2, v = 1/2, w = 1/2) are sampled on lattices of SAMPLES x SAMPLES points. Places are
+16-bit numbers between two corners of the scene, values 8-bit numbers of a colour map, both in Base64: some 0.8 MB for a
+volume with all its fields.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
+from ..figures import evaluate
 from ..figures.color_range import ColorRange, error_range, even_range
-from ..figures.evaluate import FACE_COLORS, MAP, all_grids, distortions, error_on, face_labels, points_on, solution_on
+from ..figures.evaluate import distortions, points_on, solution_on
 from ..figures.render import widest_view
 
 if TYPE_CHECKING:
@@ -26,15 +27,15 @@ if TYPE_CHECKING:
 
     from ..figures.evaluate import Problem
 
-SAMPLES = 81  # a direction and patch
-TILT = 0.45  # radians: more than one side is seen
+SAMPLES = 81  # per direction of a patch
+TILT = 0.45  # radians: shows more than one side
 
 Scene = dict[str, Any]
 
 
 def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: Problem | None = None) -> Scene:
-    """What viewer.js draws, in JSON's own types; solution and error are there where they are known and finite."""
-    grids = all_grids(SAMPLES)
+    """Return what viewer.js draws, in JSON's own types; solution and error only where they are known and finite."""
+    grids = evaluate.all_grids(SAMPLES)
     points = [points_on(volume, grid) for grid in grids]
     fields = [_field("distortion", "tanh(√ARAP / 2), volume 1", distortions(volume, grids), ColorRange(0.0, 1.0))]
     if solution is not None and np.all(np.isfinite(solution.coefficients)):
@@ -42,8 +43,7 @@ def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: P
         values = [solution_on(solution, grid) for grid in grids]
         fields.append(_field("solution", name, values, even_range(values)))
         if problem is not None and problem.exact is not None:
-            known = problem.on(volume)
-            errors = [error_on(solution, known, grid, where) for grid, where in zip(grids, points, strict=True)]
+            _, errors = evaluate.sampled_error(volume, solution, problem, SAMPLES)
             fields.append(_field("error", "|u − uₕ|, logarithmic", errors, error_range([errors])))
     cloud = np.concatenate([where.reshape(-1, 3) for where in points])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
@@ -57,15 +57,15 @@ def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: P
         "view": frame.tolist(),
         "half": half.tolist(),
         "places": _packed((cloud - low) / np.where(high > low, high - low, 1.0), np.uint16),
-        "colors": list(FACE_COLORS),
-        "labels": face_labels(),
+        "colors": list(evaluate.FACE_COLORS),
+        "labels": evaluate.face_labels(),
         "map": _color_map(),
         "fields": fields,
     }
 
 
 def _field(name: str, title: str, patches: Sequence[Array], limits: ColorRange) -> dict[str, str]:
-    """Values on the nine patches, coloured between the limits."""
+    """Return the values on the nine patches, coloured between the limits."""
     low, high = limits.labels
     return {"name": name, "title": title, "low": low, "high": high, "values": _packed(limits.shares(np.stack(patches)))}
 
@@ -73,10 +73,10 @@ def _field(name: str, title: str, patches: Sequence[Array], limits: ColorRange) 
 def _color_map() -> str:
     from matplotlib import colormaps
 
-    return _packed(colormaps[MAP](np.arange(256))[:, :3])  # (256, 3)
+    return _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3])  # (256, 3)
 
 
 def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint8) -> str:
-    """Numbers 0..1 as whole numbers over the range of `kind`, little-endian, in Base64."""
+    """Return numbers 0..1 as whole numbers over the range of `kind`, little-endian, in Base64."""
     numbers = np.rint(np.clip(shares, 0.0, 1.0) * np.iinfo(kind).max).astype(np.dtype(kind).newbyteorder("<"))
     return base64.b64encode(numbers.tobytes()).decode("ascii")

@@ -1,7 +1,7 @@
-"""What a run will take, said before it starts: from counts, and the time of two small pieces of its work.
+"""Estimates the time and the memory of a run before it starts, from counts and the time of two small pieces of work.
 
-The pieces: a pass, the network forward and back on 1000 points; a product with the second derivative of the spline's
-distortion. How many of them a run takes is known from profiles of the models conch, bird and bunny.
+The pieces are a pass (the network forward and backward on 1000 points) and a product with the second derivative of the
+spline's distortion. How many of them a run takes is known from profiles of the models conch, bird and bunny.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 Clock = Callable[[], float]
 REPEATS = 3
 PASS_POINTS = 1000
-LARGEST = 30  # control points a direction that the product is timed with; beyond that it grows with their number
+LARGEST = 30  # control points per direction that the product is timed with; beyond, it grows with their number
 
 # Passes
 TRAINING_STEP = 1.5e-3  # for each of its points
@@ -41,7 +42,10 @@ LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8
 
 @dataclass(frozen=True)
 class Forecast:
-    """seconds: where the surface is an easy and where it is a hard one, one start; memory_mb: the peak, resident."""
+    """The cost of one start, the section `estimate` of report.json.
+
+    seconds: for an easy and for a hard surface. memory_mb: peak of the resident memory.
+    """
 
     seconds: tuple[float, float]
     memory_mb: float
@@ -53,10 +57,6 @@ class Forecast:
         span = f"{first} to {last} {unit}s" if first < last else f"{last} {unit}{'s' * (last > 1)}"
         return f"about {span}, {self.memory_mb / 1000.0:.1f} GB of memory"
 
-    def as_dict(self) -> dict[str, Any]:
-        """The section `estimate` of report.json."""
-        return {"seconds": list(self.seconds), "memory_mb": self.memory_mb}
-
 
 def forecast(
     surface: Surface,
@@ -66,9 +66,9 @@ def forecast(
     unknowns: int = 0,
     clock: Clock = time.perf_counter,
 ) -> Forecast:
-    """Estimate a run on this machine, as busy as it is now.
+    """Return the estimate for this machine, as busy as it is now.
 
-    unknowns: of the largest problem that is solved afterwards. Where the first start is not certified, the second takes
+    unknowns: of the largest problem that is solved afterwards. A second start, where the first is not certified, takes
     as long again.
     """
     spline, vertices = config.spline, len(surface.vertices)
@@ -88,7 +88,7 @@ def forecast(
 
 
 def _training_points(surface: Surface, config: Config) -> int:
-    """Points that the network maps in a step."""
+    """Return the number of points that the network maps in a step."""
     import torch
 
     from parameterize.training.samples import stencils
@@ -132,10 +132,20 @@ def _product_seconds(spline: SplineConfig, device: torch.device, clock: Clock) -
 
 
 def _fastest(work: Callable[[], object], clock: Clock) -> float:
-    """Seconds of the fastest run but the first, which also warms up."""
+    """Return the seconds of the fastest run without the first, which warms up."""
     seconds = []
     for _ in range(REPEATS + 1):
         start = clock()
         work()
         seconds.append(clock() - start)
     return max(min(seconds[1:]), 1e-6)
+
+
+def available_memory_mb() -> float | None:
+    """Return the megabytes of memory that a process can still take, None where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return None
+    found = (line.split() for line in lines if line.startswith("MemAvailable:"))
+    return next((int(words[1]) / 1000.0 for words in found), None)

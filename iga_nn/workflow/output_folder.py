@@ -1,4 +1,4 @@
-"""One output folder: held by one run at a time, its report so far, and the clock."""
+"""Holds one output folder for one run: its report so far, and the clock."""
 
 from __future__ import annotations
 
@@ -34,21 +34,17 @@ class Outcome:
 
 @dataclass
 class RunFolder:
-    """One output folder being filled: its report so far, and the clock.
+    """One output folder that is being filled: its report so far, and the clock.
 
-    vector: write plots of curves as PDF, too.
+    vector: write plots of curves as PDF, too. finished: the result that a resumed run found; nothing is left to do.
     """
 
     folder: Path
     vector: bool = False
+    finished: Outcome | None = None
     report: reports.Report = field(default_factory=lambda: {"schema": reports.SCHEMA})
     seconds: dict[str, float] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
-
-    @property
-    def endings(self) -> tuple[str, ...]:
-        """Of the files a plot of curves is written to."""
-        return (".png", ".pdf") if self.vector else (".png",)
 
     @contextmanager
     def timed(self, step: str) -> Iterator[None]:
@@ -58,17 +54,18 @@ class RunFolder:
         self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
 
     def draw(self, part: Part, **known: Any) -> None:
-        """Draw the figures of one part, timed; importing matplotlib and VTK takes part of it.
+        """Draw the figures of one part of a run.
 
         known: what the figures show, by the names that the table of artifacts uses. Figures that fail are listed in the
         report as `not_drawn`, with the reason.
         """
-        with self.timed("report"):
+        endings = (".png", ".pdf") if self.vector else (".png",)
+        with self.timed("report"):  # importing matplotlib and VTK takes part of it
             try:
                 from ..report.figures import draw_figures
 
-                self.note_failures(draw_figures(self.folder, part, known, self.endings))
-            except Exception as error:  # matplotlib itself is missing, say: whatever it is, it ends no run
+                self.note_failures(draw_figures(self.folder, part, known, endings))
+            except Exception as error:  # matplotlib is missing, for example; no figure ends a run
                 self.note_failures({"figures": one_line(error) or type(error).__name__})
                 log.warning("figures could not be drawn: %s", one_line(error))
 
@@ -78,7 +75,7 @@ class RunFolder:
             self.report["not_drawn"] = self.report.get("not_drawn", {}) | failures
 
     def begin(self, *parts: Part) -> None:
-        """Remove what an older run left of these parts, and its report: the input is good, a new result begins."""
+        """Remove the report and the files of these parts that an older run left; call it once the input is accepted."""
         for name in files_of("report", *parts):
             target = self.folder / name
             for old in (target, *unfinished(target)):
@@ -90,7 +87,7 @@ class RunFolder:
         reports.write(self.folder, self.report | {"seconds": self.seconds})
 
     def finish(self) -> Outcome:
-        """Write the total: the result is finished, and needs no checkpoint any more."""
+        """Write the total time, which marks the result as finished, and remove the checkpoint."""
         self.seconds["total"] = time.perf_counter() - self.started
         self.write(seconds=self.seconds)
         if "config" in self.report:  # of a training here
@@ -99,44 +96,57 @@ class RunFolder:
 
 
 def default_folder(source: str | Path) -> Path:
-    """Where results go unless `--out` says so: the input's stem, in the current folder."""
+    """Return where results go without `--out`: the input's stem, in the current folder."""
     name = Path(source).name
-    return Path(name.split(".")[0] or Path(name).stem)  # the stem of a hidden file starts with its dot
+    return Path(name.split(".")[0] or Path(name).stem)  # the name of a hidden file starts with its dot
 
 
 @contextmanager
 def open_folder(
     source: str | Path, out: str | Path | None, force: bool, resume: bool = False, vector: bool = False
-) -> Iterator[tuple[RunFolder, Outcome | None]]:
-    """Make the output folder and hold it, tried before anything costly; on --resume a finished one is the answer."""
+) -> Iterator[RunFolder]:
+    """Create the output folder, hold it for one run and yield it; an empty one is removed again at the end.
+
+    Raises InputError, before anything costly is computed, where the folder cannot be written or another run uses it,
+    and where it holds a result or an interrupted run that neither `force` nor `resume` allows to touch.
+    """
     if out == "":
         raise InputError("out is empty: name a folder")
     folder = Path(out) if out is not None else default_folder(source)
+    is_new = not folder.exists()
     with _writable(folder):
-        is_new = not folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
     try:
         with _locked(folder):
-            known = reports.read(folder)
-            finished = Outcome(folder, known) if known and reports.is_finished(known) and not force else None
-            if finished and not resume:
-                raise InputError(f"{folder}: holds a finished result; --force replaces it, --out names another folder")
-            if has_checkpoint(folder) and not (resume or force):
-                raise InputError(f"{folder}: holds an interrupted run; --resume goes on from it, --force starts anew")
-            with _writable(folder):
-                if not finished:
+            finished = _finished_result(folder, force, resume)
+            if not finished:
+                with _writable(folder):
                     TemporaryFile(dir=folder).close()
-            yield RunFolder(folder, vector), finished
+            yield RunFolder(folder, vector, finished)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {_way_on(folder)}") from None
     finally:
         if is_new:
-            with suppress(OSError):
-                folder.rmdir()  # where nothing was written
+            with suppress(OSError):  # it is not empty
+                folder.rmdir()
+
+
+def _finished_result(folder: Path, force: bool, resume: bool) -> Outcome | None:
+    """Return the finished result in the folder for a run that resumes. Raises InputError as `open_folder` does."""
+    if force:
+        return None
+    known = reports.read(folder)
+    is_finished = known is not None and reports.is_finished(known)
+    if is_finished and not resume:
+        raise InputError(f"{folder}: holds a finished result; --force replaces it, --out names another folder")
+    if has_checkpoint(folder) and not resume:
+        raise InputError(f"{folder}: holds an interrupted run; --resume continues it, --force starts anew")
+    return Outcome(folder, known) if known is not None and is_finished else None
 
 
 @contextmanager
 def _writable(folder: Path) -> Iterator[None]:
+    """Turn an OSError of the block into an InputError with the remedy."""
     try:
         yield
     except OSError as error:
@@ -145,7 +155,10 @@ def _writable(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Keep other runs out of the folder; where there are no such locks, do without. Raises InputError."""
+    """Lock the folder against other runs, where the system has locks. Raises InputError where another run holds it.
+
+    The lock is on the folder itself: a lock file would stay in it among the results.
+    """
     try:
         import fcntl
     except ImportError:
@@ -165,14 +178,14 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def has_checkpoint(folder: Path) -> bool:
-    """Whether an interrupted training left something to go on from."""
+    """Return whether an interrupted training left a checkpoint in the folder."""
     return any((folder / CHECKPOINT).glob("*.safetensors"))
 
 
 def _way_on(folder: Path) -> str:
-    """How to go on after an interruption."""
+    """Return how to continue after an interruption, in words."""
     if has_checkpoint(folder):
-        return "the same command with --resume goes on from the checkpoint"
+        return "the same command with --resume continues from the checkpoint"
     if (folder / "volume.npz").exists():
         return f"the volume is written: `iga-nn solve poisson {folder / 'volume.npz'}` solves on it"
     return "nothing was computed yet that could be resumed"

@@ -1,4 +1,4 @@
-"""The command that repeats a result, from the options it was made with."""
+"""Writes the command that repeats a result, from the options it was made with."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ SILENT = ("resume",)  # changes how a result is reached, not what it is
 
 
 def command_line(command: str, source: str | Path, *options: Any, **given: Any) -> str:
-    """One line for a shell: the command, its input, every option that is not the default.
+    """Return one line for a shell: the command, its input, and every option that is not the default.
 
-    options: frozen dataclasses of `iga_nn.options`. given: further options by name, left out where None.
+    options: frozen dataclasses of `iga_nn.options`. given: further options by name, left out where they are None.
     """
     words = ["iga-nn", *command.split(), str(source)]
     for chosen in options:
@@ -28,7 +28,7 @@ def command_line(command: str, source: str | Path, *options: Any, **given: Any) 
 
 
 def gives_the_same(one: str, other: str) -> bool:
-    """Whether two such lines lead to the same result: they differ in the output folder alone."""
+    """Return whether two such lines give the same result: they differ at most in the output folder."""
     return _without_folder(one) == _without_folder(other)
 
 

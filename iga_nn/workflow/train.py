@@ -1,10 +1,10 @@
-"""From a surface to its volume in a folder: read, announced, trained, written, drawn."""
+"""Makes the volume of a surface in an output folder: reads, announces, trains, writes and draws."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,8 +20,7 @@ from ..models import resolve
 from ..options import MapOptions, read_corners
 from ..report import advice
 from ..report import document as reports
-from .cost_estimate import Forecast, forecast
-from .machine import available_memory_mb
+from .cost_estimate import Forecast, available_memory_mb, forecast
 from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
 from .verdict import tell
 
@@ -36,6 +35,16 @@ log = logging.getLogger(__name__)
 _TRIED = 50  # points of the surface
 
 
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What a training starts from. corners: vertices or points; marks: the points (8, 3) that they are, for figures."""
+
+    surface: Surface
+    corners: Any
+    marks: Array | None
+    expected: Forecast
+
+
 def map_surface(
     state: RunFolder,
     mesh: str | Path,
@@ -45,10 +54,27 @@ def map_surface(
     equation: Poisson | None = None,
     unknowns: int = 0,
 ) -> Parameterization:
-    """Parameterize, and leave everything that is known of the map in the folder.
+    """Parameterize a surface, write everything that is known of the map into the folder, and return it.
 
-    command: that repeats it. equation, unknowns: what is solved on it afterwards, and how large that is.
+    command: the one that repeats it. equation, unknowns: the problem that is solved on the map, and its size.
     """
+    given = _prepare(state, mesh, options, equation, unknowns)
+    result = _train(given, options, progress, state.folder / CHECKPOINT)
+    state.seconds.update(result.seconds)
+    _write(state, given, result, command, options)
+    _draw(state, given, result)
+    return result
+
+
+def _prepare(
+    state: RunFolder, mesh: str | Path, options: MapOptions, equation: Poisson | None, unknowns: int
+) -> _Given:
+    """Read the surface and the corners, check the problem's data on it, and announce what the run will take.
+
+    The folder is cleared once all of them are accepted.
+    """
+    from parameterize.run import choose_device, corner_vertices
+
     with state.timed("load"):
         surface = resolve(
             str(mesh), component=options.component, max_faces=options.max_faces, decimate=options.decimate
@@ -57,8 +83,6 @@ def map_surface(
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
         log.warning("%s: %s", surface.name, notice)
-    from parameterize.run import choose_device, corner_vertices
-
     with input_errors():
         device = choose_device(options.device)
         marks = None if corners is None else surface.vertices[corner_vertices(surface, corners)]
@@ -70,27 +94,18 @@ def map_surface(
     with state.timed("load"):
         expected = forecast(surface, options.config(), device=device, unknowns=unknowns)
     _announce(expected)
-    result = _train(surface, options, corners, progress, state.folder / CHECKPOINT)
-    state.seconds.update(result.seconds)
-    _write(state, surface, result, command, expected, options)
-    defects: dict[str, Any] = {}
-    if len(unproved := result.certificate.unproved):
-        defects["places"] = advice.span_places(result.volume, unproved)
-    if meeting := result.quality.boundary_check.meeting:
-        defects["meeting"] = meeting
-    state.draw("map", volume=result.volume, history=result.history, marks=marks, **defects)
-    return result
+    return _Given(surface, corners, marks, expected)
 
 
 def _frame(surface: Surface) -> UnitFrame:
-    """What X, Y, Z mean before there is a volume."""
+    """Return the meaning of X, Y, Z before there is a volume."""
     low, high = surface.bbox
     x, y, z = ((low + high) / 2.0).tolist()
     return UnitFrame((x, y, z), 1.0 / surface.scale)
 
 
 def _check_data(equation: Poisson, surface: Surface) -> None:
-    """What can be known of the data before there are points inside: their values on the surface."""
+    """Check the problem's data on the surface: no points inside are known yet. Raises ExpressionError."""
     from parameterize.surface.geometry import vertex_normals
     from solve.meaning import empty_formulas
 
@@ -110,7 +125,7 @@ def _check_data(equation: Poisson, surface: Surface) -> None:
 
 
 def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:
-    """Raise what `evaluate` raises on all of some points: one face's data need be good on that face alone."""
+    """Raise the ExpressionError that `evaluate` raises at all points tried: a face's data need only be valid on it."""
     from solve import ExpressionError
 
     refused = None
@@ -125,7 +140,7 @@ def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, 
 
 
 def _announce(expected: Forecast) -> None:
-    """Say what the run will take, and warn where the machine has not that much memory."""
+    """Log what the run will take, and warn where that much memory is not free."""
     log.info("estimate: %s", expected)
     free = available_memory_mb()
     if free is not None and expected.memory_mb > free:
@@ -136,20 +151,19 @@ def _announce(expected: Forecast) -> None:
         )
 
 
-def _train(
-    surface: Surface, options: MapOptions, corners: Any, progress: ProgressCallback | None, checkpoint: Path
-) -> Parameterization:
+def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None, checkpoint: Path) -> Parameterization:
+    """Train, and return the map. Raises InputError for a checkpoint of another run and corners without paths."""
     from parameterize.checkpoint import CheckpointError
     from parameterize.cube.edge_paths import PathError
     from parameterize.run import parameterize
 
     try:
         return parameterize(
-            surface,
+            given.surface,
             options.config(),
             seed=options.seed,
             device=options.device,
-            corners=corners,
+            corners=given.corners,
             progress=progress,
             checkpoint_dir=checkpoint,
             resume=options.resume,
@@ -157,23 +171,31 @@ def _train(
     except CheckpointError as error:
         raise InputError(str(error)) from None
     except PathError as error:
-        raise InputError(f"{surface.name}: {error}; train longer, or give --corners") from None
+        raise InputError(f"{given.surface.name}: {error}; train longer, or give --corners") from None
 
 
-def _write(
-    state: RunFolder, surface: Surface, result: Parameterization, command: str, expected: Forecast, options: MapOptions
-) -> None:
+def _write(state: RunFolder, given: _Given, result: Parameterization, command: str, options: MapOptions) -> None:
     result.volume.save(state.folder / "volume.npz")
     result.boundary.save(state.folder / "boundary.npz")
     save_arrays(state.folder / "history.npz", **result.history)
     state.write(
         command=command,
-        input=surface.summary(),
+        input=given.surface.summary(),
         config=asdict(result.config),
-        estimate=expected.as_dict(),
+        estimate=asdict(given.expected),
         seed=options.seed,
         device=result.device,
         versions=reports.versions(),
         parameterization=result.quality.as_dict() | advice.unproved(result.volume, result.certificate),
     )
     tell(state, options)
+
+
+def _draw(state: RunFolder, given: _Given, result: Parameterization) -> None:
+    """Draw the map, with the places where it is not proved or meets itself if there are any."""
+    defects: dict[str, Any] = {}
+    if len(unproved := result.certificate.unproved):
+        defects["places"] = advice.span_places(result.volume, unproved)
+    if meeting := result.quality.boundary_check.meeting:
+        defects["meeting"] = meeting
+    state.draw("map", volume=result.volume, history=result.history, marks=given.marks, **defects)

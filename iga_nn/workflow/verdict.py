@@ -1,4 +1,4 @@
-"""What a report says of a volume: the certificate, the boundary, where it is not proved and what to try."""
+"""Says whether a surface is accepted and what is proved of a volume: for `check`, the report and the terminal."""
 
 from __future__ import annotations
 
@@ -21,8 +21,30 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
+def check_surface(
+    mesh: str, component: int | None, max_faces: int, decimate: bool = False, strict: bool = False
+) -> dict[str, Any]:
+    """Return the section `input` of report.json for a surface that is accepted. Raises MeshError where it is not.
+
+    decimate: reduce a larger surface to max_faces. strict: also refuse a surface that intersects itself.
+    """
+    from ..models import resolve
+
+    surface = resolve(mesh, component=component, max_faces=max_faces, decimate=decimate)
+    if strict:
+        surface.refuse_crossings()
+    return surface.summary()
+
+
+def check_volume(path: str | Path) -> dict[str, Any]:
+    """Certify a saved volume and return what was proved. Raises InputError for a file that is not a volume."""
+    from ..io.formats import load_volume
+
+    return certified_facts(load_volume(path))
+
+
 def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
-    """What the section `parameterization` of report.json says of a volume alone."""
+    """Certify a volume and return the section `parameterization` of report.json."""
     from parameterize.certificate.boundary import check_boundary
     from parameterize.certificate.jacobian import certify
 
@@ -39,7 +61,7 @@ def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
 
 
 def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, command: str) -> None:
-    """Certify a saved volume, and write the sections of report.json that say what was given."""
+    """Certify a saved volume, and write the sections of report.json that say what was given and what is proved."""
     with state.timed("certify"):
         facts = certified_facts(volume)
     state.write(
@@ -52,7 +74,7 @@ def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, comma
 
 
 def tell(state: RunFolder, options: MapOptions | None = None) -> None:
-    """Say the verdict that the report has; where the map is not certified, write what to try.
+    """Log the verdict of the report; where the map is not certified, add what to try to the report.
 
     options: those the map was made with, where they are known.
     """
@@ -60,6 +82,6 @@ def tell(state: RunFolder, options: MapOptions | None = None) -> None:
     log.info("certificate: %s", quality["bijective"])
     if meeting := quality["boundary_meeting"]:  # not one-to-one, although perhaps nowhere folded
         place = in_brackets(meeting["point"])
-        log.warning("the volume overlaps itself: its boundary passes twice through %s", place)
+        log.warning("the volume overlaps itself: its boundary passes through %s twice", place)
     if remedies := advice.what_to_try(state.report, options):
         state.write(advice=remedies)

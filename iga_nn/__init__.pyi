@@ -1,0 +1,25 @@
+from parameterize.certificate.jacobian import certify as certify
+from parameterize.config import preset as preset
+from parameterize.run import Parameterization as Parameterization
+from parameterize.run import parameterize as parameterize
+from parameterize.spline.volume import BSplineVolume as BSplineVolume
+from parameterize.surface.surface import MeshError as MeshError
+from parameterize.surface.surface import Surface as Surface
+from parameterize.surface.surface import load_surface as load_surface
+from solve import Elasticity as Elasticity
+from solve import Poisson as Poisson
+from solve import convergence as convergence
+from solve import solve_problem
+
+from .errors import InputError as InputError
+from .io.formats import export as export
+from .io.formats import load_volume as load_volume
+from .options import ElasticityOptions as ElasticityOptions
+from .options import MapOptions as MapOptions
+from .options import PoissonOptions as PoissonOptions
+from .samples import sample as sample
+from .version import __version__ as __version__
+from .workflow.pipeline import run as run
+
+__all__: list[str]
+solve = solve_problem

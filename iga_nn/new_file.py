@@ -1,0 +1,37 @@
+"""Checks the name of a file that a command writes, and writes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from parameterize.files import save_bytes
+
+from .errors import InputError
+
+
+def check_new(path: str | Path, ending: str) -> Path:
+    """Return the path of a file to write. Raises InputError where it cannot be a file with that ending."""
+    target = Path(path)
+    if target.is_dir() or not target.name:
+        raise InputError(f"{target}: is a directory: name the file to write with --out")
+    if target.suffix != ending:
+        raise InputError(f"{target}: such files end in {ending}: choose another name with --out")
+    if not target.parent.is_dir():
+        raise InputError(
+            f"{target}: cannot be written (there is no folder {target.parent}): make it, or choose another with --out"
+        )
+    return target
+
+
+def save_new(target: Path, content: bytes, force: bool) -> None:
+    """Write a file that does not exist or has that content already; replace another one only where `force`.
+
+    Raises InputError.
+    """
+    try:
+        if not target.exists() or force:
+            save_bytes(target, content)
+        elif target.read_bytes() != content:
+            raise InputError(f"{target}: exists; --force replaces it, --out names another file")
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None

@@ -1,0 +1,124 @@
+"""Solves a problem on the volume of an output folder, level after level, and writes what is found."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solve.forms.frame import UnitFrame
+
+from ..errors import InputError, input_errors, one_line
+from ..options import ProblemOptions
+from ..report import document as reports
+from ..report import html
+from .output_folder import RunFolder
+
+if TYPE_CHECKING:
+    from parameterize.spline.volume import BSplineVolume
+    from solve import Elasticity, Poisson, Solution, SolveReport
+
+log = logging.getLogger(__name__)
+
+
+def solve_levels(
+    state: RunFolder, volume: BSplineVolume, equation: Poisson | Elasticity, options: ProblemOptions, **solver: Any
+) -> Solution:
+    """Solve on every level, write the report of all and the solution of each, and return the finest one.
+
+    solver: keywords of `solve.solve_problem`.
+    """
+    from solve import rates
+
+    with reported(state, volume), state.timed("solve"):
+        solutions = list(_solutions(state, volume, equation, options, **solver))
+    found = [solution.report for solution in solutions]
+    asked = {name: given for name, given in asdict(options).items() if name not in ("refine", "degree")}
+    known = asked | described(equation, volume)
+    state.write(
+        **{
+            options.section: {name: value for name, value in known.items() if value is not None and value != ()}
+            | {"levels": [item.as_dict() for item in found], "rates": rates(found), "notices": notices_of(found)}
+        }
+    )
+    _draw_errors(state, volume, solutions, equation)
+    return solutions[-1]
+
+
+def _solutions(
+    state: RunFolder, volume: BSplineVolume, equation: Poisson | Elasticity, options: ProblemOptions, **solver: Any
+) -> Iterator[Solution]:
+    """Solve level after level, each from the solution before; solution.npz holds the finest so far."""
+    from solve import Poisson, solve_problem
+
+    for level in sorted(set(options.refine)):
+        with input_errors():
+            solution = solve_problem(
+                volume, equation, refine=level, degree=options.degree, certified=verdict_of(state), **solver
+            )
+        log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
+        solution.save(state.folder / "solution.npz")
+        yield solution
+        if isinstance(equation, Poisson):
+            solver["start"] = solution
+
+
+@contextmanager
+def reported(state: RunFolder, volume: BSplineVolume) -> Iterator[None]:
+    """Where the block refuses the problem, say so in the report and write the page of what is known without it."""
+    try:
+        yield
+    except InputError as error:
+        state.write(not_solved=one_line(error))
+        known = reports.plain(state.report | {"seconds": state.seconds})
+        html.write(state.folder, known, scene_of(state, volume))
+        raise
+
+
+def verdict_of(state: RunFolder) -> str:
+    """Return the verdict on det J, which every solve on the volume repeats."""
+    return str(state.report["parameterization"]["bijective"])
+
+
+def _draw_errors(
+    state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Poisson | Elasticity
+) -> None:
+    """Draw the error where the exact solution is known, and the convergence where there are several levels."""
+    from solve import ConvergenceRow
+
+    is_finite = all(np.all(np.isfinite(solution.coefficients)) for solution in solutions)
+    if equation.exact is None or not is_finite:  # not finite: the solver broke down
+        return
+    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1], "problem": equation}
+    if len(solutions) > 1:
+        rows = [ConvergenceRow(solution.report, None, None) for solution in solutions]
+        known["levels"] = {max(solutions[-1].degrees): rows}
+    state.draw("solution", **known)
+
+
+def described(equation: Poisson | Elasticity, volume: BSplineVolume) -> dict[str, Any]:
+    """Return what the report says of a problem beside the options: the exact solution, and the meaning of X, Y, Z."""
+    given: dict[str, Any] = {"exact": equation.exact} if isinstance(equation.exact, str) else {}
+    return given | ({"frame": UnitFrame.of(volume).as_dict()} if equation.is_scaled else {})
+
+
+def notices_of(found: Iterable[SolveReport]) -> list[str]:
+    """Return the notices of some solves, each once."""
+    return list(dict.fromkeys(notice for item in found for notice in item.notices))
+
+
+def scene_of(state: RunFolder, volume: BSplineVolume, *solved: Any) -> Any:
+    """Return the interactive view of a volume and what is solved on it; None where it cannot be drawn."""
+    with state.timed("report"):
+        try:
+            from ..report import viewer
+
+            return viewer.scene_of(volume, *solved)
+        except Exception as error:  # no figure ends a run
+            log.warning("the interactive view could not be drawn: %s", one_line(error))
+            state.note_failures({"interactive view": one_line(error) or type(error).__name__})
+            return None
