@@ -7,8 +7,11 @@ from parameterize.surface.surface import MeshError as MeshError
 from parameterize.surface.surface import Surface as Surface
 from parameterize.surface.surface import load_surface as load_surface
 from solve import Elasticity as Elasticity
+from solve import Form as Form
 from solve import Poisson as Poisson
+from solve import Problem as Problem
 from solve import convergence as convergence
+from solve import discretize as discretize
 from solve import solve_problem
 
 from .errors import InputError as InputError

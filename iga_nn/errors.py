@@ -22,7 +22,7 @@ def input_errors() -> Iterator[None]:
 def expected_errors() -> tuple[type[Exception], ...]:
     """Return the exceptions that end a command with one line instead of a traceback."""
     from parameterize.surface.errors import MeshError
-    from solve.forms.formula import ExpressionError
+    from solve.forms.parser import ExpressionError
 
     return InputError, MeshError, ExpressionError, OSError
 

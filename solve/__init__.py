@@ -1,12 +1,16 @@
-"""Isogeometric solver on a B-spline volume F: Poisson's problem and elasticity, their errors, convergence studies.
+"""Isogeometric solver on a B-spline volume F: linear second-order PDEs, their errors, convergence studies.
 
-Problem (`forms`). On the image of the cube, with data on its six faces u0, u1, v0, v1, w0, w1,
+Law (`forms`). A `Form` gives a flux and a reaction, linear in u and its gradient. On the image of the cube, with data
+on its six faces u0, u1, v0, v1, w0, w1,
 
-    -div(kappa grad u) + c u = f,     u = g,    kappa du/dn = g,    or    kappa du/dn + alpha u = g,
+    -div flux + react = f,     u = g,    flux . n = g,    or    flux . n + alpha u = g,
 
 and in weak form, tests v zero where u is given,
 
-    int grad v . kappa grad u + c v u + int_Robin alpha v u  =  int v f + int_Neumann v g + int_Robin v g.
+    int flux : grad v + react . v + int_Robin alpha u . v  =  int f . v + int_Neumann g . v + int_Robin g . v.
+
+`Poisson`: flux = kappa grad u, react = c u. `Elasticity`: flux = sigma = 2 mu eps + lambda tr(eps) I with
+eps = (grad u + grad u^T) / 2, mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 
 Discretisation (`discretization`). The trial space holds the splines of F's own degrees and knots, every
 span halved `refine` times, or of another `degree`; F itself stays as it is. With J the derivative of F,
@@ -14,11 +18,13 @@ span halved `refine` times, or of another `degree`; F itself stays as it is. Wit
     int grad v . kappa grad u dx = int (grad v)^T G (grad u) d(u, v, w),    G = det J  J^-1 kappa J^-T,
 
 gradients by the parameters on the right. p Gauss points a span and direction integrate it (one more where functions are
-only continuous). The matrix A is not assembled: six numbers of G a Gauss point are kept, and sum factorization applies
-it. Given values of u are interpolated at the cube's corners, and projected in L2 on its edges, then on its faces.
+only continuous). The matrix A is not assembled. Of a scalar symmetric law six numbers of G a point are kept, and sum
+factorization applies it; any other law is called on planes of points, between sum factorizations. Given values of u are
+interpolated at the cube's corners, and projected in L2 on its edges, then on its faces.
 
-Preconditioner (`linear`; Sangalli, Tani, SIAM J. Sci. Comput. 38, 2016). G is replaced by its diagonal, and that
-by products of functions of one parameter, fitted in the sense of least squares of logarithms:
+Preconditioner (`linear`; Sangalli, Tani, SIAM J. Sci. Comput. 38, 2016). Each component has its own, from the flux of
+unit gradients. G is replaced by its diagonal, and that by products of functions of one parameter, fitted in the sense
+of least squares of logarithms:
 
     G_dd(t_1, t_2, t_3)  ~  a_d(t_d) b_e(t_e) b_f(t_f)        e, f: the two other directions
     K_d = int a_d N_i' N_j',    M_d = int b_d N_i N_j,    K_d U_d = M_d U_d L_d,    U_d^T M_d U_d = I.
@@ -30,14 +36,8 @@ added to the K_d,
     P^-1 = U (L_1 (+) L_2 (+) L_3 + c_0)^-1 U^T    a diagonal matrix: the sums of one eigenvalue of each direction
     A^-1 ~ D P^-1 D,    D^2 = diag(P) / diag(A).
 
-It costs three small matrix products each way. Conjugate gradients (`linear.cg`) end at |r| <= tolerance |b|.
-
-Elasticity (`elasticity`). A displacement u of three components; eps = (grad u + grad u^T) / 2,
-
-    -div sigma = f,    sigma = 2 mu eps + lambda tr(eps) I,    mu = E / (2 (1 + nu)),
-    lambda = E nu / ((1 + nu) (1 - 2 nu)),    u = g    or    sigma n = t on a face;
-
-the preconditioner is that of each component's own block.
+It costs three small matrix products each way. Conjugate gradients (`linear.cg`), or GMRES where the law is not
+symmetric, end at |r| <= tolerance |b|.
 
 Errors (`norms`, `estimate`, `study`). Against an exact solution with p + 2 Gauss points a span and direction; for
 smooth solutions the L2 norm falls like h^(p + 1), the H1 seminorm like h^p. Without one the L2 norm is estimated from
@@ -46,25 +46,31 @@ the residual, which for Poisson's problem is close to kappa (2 pi / h)^2 times t
 Formulas (`forms`). Beside x, y, z they know X, Y, Z: with c the middle of F's bounding box and V its
 volume, (X, Y, Z) = ((x, y, z) - c) / V^(1/3). `meaning` finds data that do not vary on the domain.
 
->>> from solve import Poisson, benchmark_volume, convergence
+>>> from solve import Form, Poisson, Problem, benchmark_volume, convergence
 >>> rows = convergence(benchmark_volume(2), Poisson(exact="exp(X+Z)*sin(Y)"), refine=range(3))
 >>> [row.report.dofs for row in rows]
 [125, 343, 1331]
 >>> rows[-1].rate_l2 > 3.5, rows[-1].rate_h1 > 2.5
 (True, True)
+>>> class Law(Form):
+...     def flux(self, u, grad, x):
+...         return (1 + x[0] ** 2) * grad
+>>> convergence(benchmark_volume(2), Problem(Law(), exact="exp(x)*y*z"), refine=range(3))[-1].rate_l2 > 3.5
+True
 """
 
-from .elasticity import check_elastic_data, solve_elasticity
 from .failure import ConvergenceError
 from .field import SplineField
-from .forms.elastic_problem import Elasticity
-from .forms.formula import Expression, ExpressionError
-from .forms.problem import Poisson
-from .poisson import check_data, check_device, solve_poisson
+from .forms.elasticity import Elasticity
+from .forms.form import Form
+from .forms.parser import Expression, ExpressionError
+from .forms.poisson import Poisson
+from .forms.problem import Problem
 from .report import SolveReport
 from .solution import Solution
-from .solver import check_problem, solve_problem
+from .solver import check_device, check_problem, discretize, solve_problem
 from .study import ConvergenceRow, benchmark_volume, convergence, rates
+from .system import System
 
 __all__ = [
     "ConvergenceError",
@@ -72,18 +78,18 @@ __all__ = [
     "Elasticity",
     "Expression",
     "ExpressionError",
+    "Form",
     "Poisson",
+    "Problem",
     "Solution",
     "SolveReport",
     "SplineField",
+    "System",
     "benchmark_volume",
-    "check_data",
     "check_device",
-    "check_elastic_data",
     "check_problem",
     "convergence",
+    "discretize",
     "rates",
-    "solve_elasticity",
-    "solve_poisson",
     "solve_problem",
 ]

@@ -10,13 +10,13 @@ from parameterize.spline.volume import BSplineVolume
 from .discretization.planes import PlaneField, map_planes
 from .discretization.quadrature import gauss_rule
 from .discretization.space import TrialSpace
-from .forms.problem import Poisson
+from .forms.problem import BoundaryValueProblem
 
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
 
 def balanced(load: Array) -> Array:
-    """Return the load (n_u, n_v, n_w) less its mean.
+    """Return the load (1, n_u, n_v, n_w) less its mean.
 
     The basis functions sum to one, so the load is then orthogonal to constants.
 
@@ -31,15 +31,15 @@ def balanced(load: Array) -> Array:
     return load - load.mean()
 
 
-def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Poisson) -> float:
+def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: BoundaryValueProblem) -> float:
     """Return the constant that gives the solution the mean of `exact`, or mean zero without one."""
     rule = gauss_rule(space)
     spline = PlaneField(coefficients, rule.tabulate(space.degrees, space.knots))
     plane = np.empty((4, *rule.plane_shape))
     lack = size = 0.0
-    for q, fields in map_planes(volume, rule):
+    for q, fields, x in map_planes(volume, rule):
         spline.evaluate(q, plane)
-        wanted = 0.0 if problem.exact is None else problem.exact_at(*fields[:, 0])[0]
+        wanted = 0.0 if problem.exact is None else problem.exact_at(x)[0][0]
         measure = rule.plane_weights(q) * np.abs(np.linalg.det(np.moveaxis(fields[:, 1:], (0, 1), (2, 3))))
         lack += float(((wanted - plane[0]) * measure).sum())
         size += float(measure.sum())

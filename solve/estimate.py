@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -21,8 +20,9 @@ from parameterize.spline.volume import BSplineVolume
 
 from .discretization.quadrature import GaussRule, gauss_rule
 from .discretization.space import TrialSpace
-from .forms.formula import PAIRS
-from .forms.problem import SYMMETRIC
+from .field import Points
+from .forms.jets import PAIRS, SYMMETRIC, jets_of
+from .forms.problem import BoundaryValueProblem
 
 Orders = tuple[int, int, int]
 UNITS: tuple[Orders, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -37,27 +37,15 @@ class Estimate:
     l2_relative: float | None
 
 
-class Problem(Protocol):
-    """What the estimate asks of a problem; fields of several components have those first."""
-
-    @property
-    def is_differentiable(self) -> bool:
-        """Whether the coefficients' derivatives are known."""
-
-    def residual_at(self, value: Array, gradient: Array, hessian: Array, x: Array, y: Array, z: Array) -> Array:
-        """Source less operator (c, ...), from u (c, ...), its gradient (c, 3, ...) and its Hessian (c, 6, ...)."""
-
-    def symbol_at(self, wave: Array, x: Array, y: Array, z: Array) -> Array:
-        """The least factor (...) by which the operator multiplies a wave exp(i k . x) with wave vector k (3, ...)."""
-
-
-def error_estimate(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: Problem) -> Estimate | None:
-    """Estimate of the error of a solution with coefficients (c, n_u, n_v, n_w), c components.
+def error_estimate(
+    volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: BoundaryValueProblem
+) -> Estimate | None:
+    """Return the estimated error of a solution with coefficients (c, n_u, n_v, n_w), c components.
 
     None where the residual tells too little: in a space that is only continuous somewhere, whose derivatives jump, and
-    with a function as kappa, whose derivatives are unknown.
+    where the derivatives of the law's coefficients are unknown.
     """
-    if space.is_only_continuous or not problem.is_differentiable:
+    if space.is_only_continuous or problem.not_differentiable:
         return None
     rule, counts = gauss_rule(space), space.gauss_points
     map_layers = _layers(np.moveaxis(volume.control_points, -1, 0), volume.degrees, volume.knots, rule, counts[0])
@@ -67,7 +55,8 @@ def error_estimate(volume: BSplineVolume, space: TrialSpace, coefficients: Array
     sums = np.zeros(2)
     for (layer, geometry), (_, spline) in zip(map_layers, own_layers, strict=True):
         spacing = (sizes[0][layer, None, None], sizes[1][:, None], sizes[2])
-        error, det = _local_error(geometry, spline, problem, spacing)
+        x = Points.of(geometry[0, 0, 0], (rule.points[0][layer], *rule.points[1:]))
+        error, det = _local_error(geometry, spline, problem, spacing, x)
         for place, field in enumerate((error, spline[0, 0, 0])):
             sums[place] += np.einsum("ijk,i,j,k", np.abs(det) * (field**2).sum(axis=0), w_u[layer], w_v, w_w)
     l2, norm = np.sqrt(sums).tolist()
@@ -95,10 +84,13 @@ def _layers(
 
 
 def _local_error(
-    geometry: dict[Orders, Array], spline: dict[Orders, Array], problem: Problem, spacing: tuple[Array, ...]
+    geometry: dict[Orders, Array],
+    spline: dict[Orders, Array],
+    problem: BoundaryValueProblem,
+    spacing: tuple[Array, ...],
+    x: Points,
 ) -> tuple[Array, Array]:
     """The estimated error (c, ...) and det J (...) at the points of a layer."""
-    where = geometry[0, 0, 0]
     tangents = [geometry[order] for order in UNITS]
     cofactors = [np.cross(tangents[a - 2], tangents[a - 1], axis=0) for a in range(3)]
     det = (tangents[0] * cofactors[0]).sum(axis=0)
@@ -109,8 +101,8 @@ def _local_error(
         bent = [spline[order][component] - _dot(gradient, geometry[order]) for order in SECOND]
         gradients.append(gradient)
         hessians.append(_physical_hessian(bent, inverse))
-    residual = problem.residual_at(spline[0, 0, 0], np.stack(gradients), np.stack(hessians), *where)
-    symbols = [problem.symbol_at(2.0 * np.pi / spacing[a] * inverse[a], *where) for a in range(3)]
+    residual = problem.residual_at(jets_of(spline[0, 0, 0], np.stack(gradients), np.stack(hessians)), x)
+    symbols = [problem.form.symbol(2.0 * np.pi / spacing[a] * inverse[a], x) for a in range(3)]
     return residual / np.min(symbols, axis=0), det
 
 

@@ -11,8 +11,8 @@ from parameterize.arrays import Array
 from parameterize.quality.quality import scaled_jacobian
 from parameterize.spline.volume import AXES, BSplineVolume
 
-from .discretization.elastic_operator import ElasticSystem
-from .discretization.operator import System, free_window
+from .discretization.assembly import Assembled
+from .discretization.operator import free_window
 from .discretization.planes import map_planes
 from .discretization.quadrature import gauss_rule
 from .discretization.space import TrialSpace
@@ -47,7 +47,7 @@ def check_unknowns(space: TrialSpace, dirichlet: Collection[str]) -> None:
 def solve_notices(
     volume: BSplineVolume,
     space: TrialSpace,
-    system: System | ElasticSystem,
+    assembled: Assembled,
     certified: str | None,
     result: LinearResult,
 ) -> tuple[str, ...]:
@@ -55,8 +55,10 @@ def solve_notices(
     notices = []
     if certified not in (None, "certified"):
         notices.append(f"the map is {certified}, not certified: do not trust the solution")
-    if system.folded:
-        notices.append(f"det J < 0 at {system.folded} of {system.points} Gauss points: solved with |det J| instead")
+    if assembled.folded:
+        notices.append(
+            f"det J < 0 at {assembled.folded} of {assembled.points} Gauss points: solved with |det J| instead"
+        )
     if not result.converged:
         notices.append(_no_convergence(volume, space, result))
     return tuple(notices)
@@ -81,7 +83,7 @@ def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array,
     """
     rule = gauss_rule(space)
     parameters, point, least = np.zeros(3), np.zeros(3), np.inf
-    for q, fields in map_planes(volume, rule):
+    for q, fields, _ in map_planes(volume, rule):
         jacobian = np.moveaxis(fields[:, 1:], (0, 1), (2, 3))  # (q_w, q_v, 3, 3)
         scaled = scaled_jacobian(jacobian)
         w, v = (int(i) for i in np.unravel_index(np.argmin(scaled), scaled.shape))

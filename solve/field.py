@@ -1,9 +1,11 @@
-"""SplineField: a scalar or vector-valued trivariate spline on the unit cube, as solution.npz holds it."""
+"""SplineField: a function of the parameters, as solution.npz holds it; and points that know their parameters."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,12 +15,30 @@ from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.volume import checked_knots, load_spline, save_spline
 
 
+class Points(np.ndarray[Any, Any]):
+    """Points (3, ...) of a volume: an array that knows the parameters of its points, so that fields have values there.
+
+    rows: the parameters of a tensor grid, an array a direction; None where unknown, as for a part of the array.
+    order: the directions along which the axes (...) run.
+    """
+
+    rows: Sequence[ArrayLike] | None = None
+    order: tuple[int, ...] = (0, 1, 2)
+
+    @classmethod
+    def of(cls, x: Array, rows: Sequence[ArrayLike], order: tuple[int, ...] = (0, 1, 2)) -> Self:
+        """Return the points x (3, ...) that lie at the parameters `rows`."""
+        points = x.view(cls)
+        points.rows, points.order = rows, order
+        return points
+
+
 @dataclass(frozen=True, eq=False)
 class SplineField:
     """A function of the parameters.
 
-    degrees: one per direction. knots: three open knot vectors on [0, 1]. coefficients: (m_u, m_v, m_w), with three
-    components (m_u, m_v, m_w, 3).
+    degrees: one per direction. knots: three open knot vectors on [0, 1]. coefficients: (m_u, m_v, m_w), with c
+    components (m_u, m_v, m_w, c).
     Raises ValueError where the parts do not fit together.
     """
 
@@ -28,19 +48,32 @@ class SplineField:
 
     def __post_init__(self) -> None:
         shape = np.shape(self.coefficients)
-        if len(self.degrees) != 3 or len(self.knots) != 3 or len(shape) < 3 or shape[3:] not in ((), (3,)):
-            raise ValueError(
-                "a field has three degrees, three knot vectors, coefficients (m_u, m_v, m_w) or with (, 3)"
-            )
+        if len(self.degrees) != 3 or len(self.knots) != 3 or len(shape) not in (3, 4):
+            raise ValueError("a field has three degrees, three knot vectors, coefficients (m_u, m_v, m_w) or (.., c)")
         object.__setattr__(self, "knots", checked_knots(self.degrees, self.knots, shape[:3], "coefficients"))
 
     def __call__(self, points: ArrayLike) -> Array:
-        """Values (m,) or (m, 3) at parameters (m, 3)."""
+        """Return values (m,) or (m, c) at parameters (m, 3)."""
         return evaluate_at(self.degrees, self.knots, self.coefficients, points)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
-        """Values (len(u), len(v), len(w)) or (len(u), len(v), len(w), 3) on a tensor grid of parameters."""
+        """Return values (len(u), len(v), len(w)) or (.., c) on a tensor grid of parameters."""
         return evaluate_grid(self.degrees, self.knots, self.coefficients, (u, v, w))
+
+    def at(self, x: Array) -> Array:
+        """Return values (...) or (c, ...) at the points (3, ...) that the solver hands to laws and functions.
+
+        Raises ValueError for points whose parameters are not known.
+        """
+        if not isinstance(x, Points) or x.rows is None:
+            raise ValueError("a field has values at the points x that the solver hands out, whole and unchanged")
+        values = np.moveaxis(self.grid(*x.rows), -1, 0) if self.coefficients.ndim == 4 else self.grid(*x.rows)[None]
+        order = (
+            *x.order,
+            *(axis for axis in range(3) if axis not in x.order),
+        )  # directions of one parameter at the end
+        values = values.transpose(0, *(1 + axis for axis in order)).reshape(-1, *x.shape[1:])
+        return values if self.coefficients.ndim == 4 else values[0]
 
     def save(self, path: str | Path) -> None:
         """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients); atomic."""

@@ -12,8 +12,9 @@ import numpy as np
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
-from .forms.elastic_problem import Elasticity
-from .forms.problem import Poisson
+from .forms.elasticity import Elasticity
+from .forms.poisson import Poisson
+from .forms.problem import Problem
 from .report import SolveReport
 from .solver import solve_problem
 
@@ -33,7 +34,7 @@ class ConvergenceRow:
 
 def convergence(
     volume: BSplineVolume,
-    problem: Poisson | Elasticity,
+    problem: Poisson | Elasticity | Problem,
     refine: Iterable[int] = range(3),
     degree: int | None = None,
     *,

@@ -9,8 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
+
+from parameterize.arrays import IntArray
 
 Piece = TypeVar("Piece")
 LAYERS = 4  # of elements in a piece of work, where the degree allows so few
@@ -32,14 +33,15 @@ def checked_threads(threads: int | None) -> int:
     return threads or default_threads()
 
 
-def colours(layers: int, degree: int) -> tuple[list[NDArray[np.int64]], list[NDArray[np.int64]]]:
-    """Consecutive layers of elements in pieces, every other piece in the first list, the rest in the second.
+def colours(first: IntArray, degree: int) -> tuple[list[IntArray], list[IntArray]]:
+    """Consecutive points in pieces, every other piece in the first list, the rest in the second.
 
-    A piece is at least as thick as the degree, so that no two of one list share a basis function: they may add to
-    the same array at the same time, and each sum has one order.
+    first: (q,) number of the first function that is not zero at each point. A piece covers at least as many layers of
+    elements as the degree, so that no two of one list share a basis function: they may add to the same array at the
+    same time, and each sum has one order.
     """
-    step = max(degree, LAYERS)
-    pieces = [np.arange(start, min(start + step, layers)) for start in range(0, layers, step)]
+    layers = np.unique(first, return_inverse=True)[1]
+    pieces = np.split(np.arange(len(first)), np.flatnonzero(np.diff(layers // max(degree, LAYERS))) + 1)
     return pieces[0::2], pieces[1::2]
 
 

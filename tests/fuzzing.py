@@ -50,7 +50,7 @@ from parameterize.run import corner_vertices
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import MAX_FACES, MeshError
 from solve.field import SplineField
-from solve.forms.formula import Expression, ExpressionError
+from solve.forms.parser import Expression, ExpressionError
 from solve.study import benchmark_volume
 
 OUTCOMES = ("accepted", "refused", "crashed", "slow")

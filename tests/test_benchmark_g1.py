@@ -181,9 +181,9 @@ def test_after_an_error_the_figures_known_before_stay(formula, monkeypatch, caps
 
 def test_a_solve_that_does_not_converge_is_a_status(formula, monkeypatch):
     def solve(*arguments, **given):
-        from solve import solve_poisson
+        from solve import solve_problem
 
-        return solve_poisson(*arguments, **given, max_iterations=1)
+        return solve_problem(*arguments, **given, max_iterations=1)
 
     monkeypatch.setattr(iga_nn, "solve", solve)
     row = g1.run_model("duck", formula)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from solve import Poisson, benchmark_volume, solve_poisson
+from solve import Poisson, benchmark_volume, solve_problem
 from solve.contradiction import contradictions
 
 VOLUME = benchmark_volume(4)
@@ -19,7 +19,7 @@ TWO_PROBLEMS = "the errors compare the solutions of two problems"
     ],
 )
 def test_data_that_contradict_the_exact_solution_are_named(data, notice):
-    notices = solve_poisson(VOLUME, Poisson(**data)).report.notices
+    notices = solve_problem(VOLUME, Poisson(**data)).report.notices
     assert len(notices) == 1
     assert notices[0].startswith(notice)
 

@@ -18,10 +18,11 @@ def test_norms_of_a_linear_function_against_zero_by_hand():
     volume = cube(2.0)
     space = trial_space(volume)
 
-    def exact(x, y, z):
-        return 3.0 * x, np.stack([3.0 + 0 * x, 0 * x, 0 * x])
+    def exact(points):
+        x = points[0]
+        return 3.0 * x[None], np.stack([3.0 + 0 * x, 0 * x, 0 * x])[None]
 
-    errors = error_norms(volume, space, np.zeros(space.shape), exact)
+    errors = error_norms(volume, space, np.zeros((1, *space.shape)), exact)
     assert errors.l2 == pytest.approx(np.sqrt(96.0))
     assert errors.l2_relative == pytest.approx(1.0)
     assert errors.h1_seminorm == pytest.approx(np.sqrt(72.0))
@@ -34,8 +35,8 @@ def test_a_spline_has_no_distance_from_itself():
     errors = error_norms(
         volume,
         trial_space(volume),
-        volume.control_points[..., 1],
-        lambda x, y, z: (y, np.stack([0 * x, 1 + 0 * x, 0 * x])),
+        volume.control_points[None, ..., 1],
+        lambda x: (x[1:2], np.stack([0 * x[0], 1 + 0 * x[0], 0 * x[0]])[None]),
     )
     assert errors.l2 < 1e-14
     assert errors.h1_seminorm < 1e-12
@@ -44,7 +45,7 @@ def test_a_spline_has_no_distance_from_itself():
 def test_without_gradient_the_seminorm_is_unknown():
     volume = cube(1.0)
     space = trial_space(volume)
-    errors = error_norms(volume, space, np.zeros(space.shape), lambda x, y, z: (x, None))
+    errors = error_norms(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1], None))
     assert errors.h1_seminorm is None
     assert errors.l2 == pytest.approx(np.sqrt(1.0 / 3.0))
 
@@ -52,5 +53,5 @@ def test_without_gradient_the_seminorm_is_unknown():
 def test_degree_plus_two_points_integrate_the_square_of_one_degree_more_exactly():
     volume = cube(1.0)
     space = trial_space(volume)
-    errors = error_norms(volume, space, np.zeros(space.shape), lambda x, y, z: (x**3, None))
+    errors = error_norms(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1] ** 3, None))
     assert errors.l2 == pytest.approx(np.sqrt(1.0 / 7.0), rel=1e-14)

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from volumes import scalar_system
 
 from parameterize.spline.bspline import collocation
 from parameterize.spline.volume import BSplineVolume
-from solve.discretization.operator import assemble, free_window
+from solve.discretization.operator import free_window
 from solve.discretization.quadrature import gauss_rule
 from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
@@ -48,7 +49,7 @@ def case(request):
     def source(x, y, z):
         return x * y + np.sin(z)
 
-    return assemble(volume, space, source), *assemble_dense(volume, space, rule, source)
+    return scalar_system(volume, space, source), *assemble_dense(volume, space, rule, source)
 
 
 def test_operator_equals_the_assembled_matrix(case):
@@ -69,7 +70,7 @@ def test_load_equals_the_assembled_vector(case):
 
 
 def test_interior_product_is_the_full_one_with_zero_boundary():
-    stiffness = assemble(benchmark_volume(3), trial_space(benchmark_volume(3)), lambda x, y, z: 0.0 * x).operator
+    stiffness = scalar_system(benchmark_volume(3)).operator
     x = np.zeros(stiffness.space.shape)
     x[1:-1, 1:-1, 1:-1] = np.random.default_rng(2).standard_normal((4, 4, 4))
     assert np.array_equal(stiffness.apply_free(x[1:-1, 1:-1, 1:-1]), stiffness.apply(x)[1:-1, 1:-1, 1:-1])
@@ -77,7 +78,7 @@ def test_interior_product_is_the_full_one_with_zero_boundary():
 
 def test_symmetric_positive_and_constants_in_the_kernel():
     volume = benchmark_volume(4)
-    stiffness = assemble(volume, trial_space(volume), lambda x, y, z: 0.0 * x).operator
+    stiffness = scalar_system(volume).operator
     rng = np.random.default_rng(3)
     a, b = rng.standard_normal((2, *stiffness.space.shape))
     assert np.vdot(a, stiffness.apply(b)) == pytest.approx(np.vdot(b, stiffness.apply(a)), rel=1e-12)
@@ -89,7 +90,7 @@ def test_linear_functions_are_in_balance_inside_a_curved_map_once_the_rule_is_ex
     """The integrand has degree 3 p - 1 per direction: 5 Gauss points for p = 3."""
     volume = benchmark_volume(4)
     space = trial_space(volume)
-    stiffness = assemble(volume, space, lambda x, y, z: 0.0 * x, gauss_rule(space, (5, 5, 5))).operator
+    stiffness = scalar_system(volume, rule=gauss_rule(space, (5, 5, 5))).operator
     for component in range(3):
         inside = stiffness.apply(volume.control_points[..., component])[1:-1, 1:-1, 1:-1]
         assert np.abs(inside).max() < 1e-13
@@ -98,35 +99,40 @@ def test_linear_functions_are_in_balance_inside_a_curved_map_once_the_rule_is_ex
 def test_folded_points_are_counted_and_a_flat_map_is_refused():
     smooth = benchmark_volume(4)
     mirrored = BSplineVolume(smooth.degrees, smooth.knots, smooth.control_points * [1.0, 1.0, -1.0])
-    system = assemble(mirrored, trial_space(mirrored), lambda x, y, z: 0.0 * x)
+    system = scalar_system(mirrored)
     assert system.folded == system.points == 12**3
-    assert assemble(smooth, trial_space(smooth), lambda x, y, z: 0.0 * x).folded == 0
+    assert scalar_system(smooth).folded == 0
     flat = BSplineVolume(smooth.degrees, smooth.knots, 0.0 * smooth.control_points)
     with pytest.raises(ValueError, match=r"det J is zero at the parameters \(0\.028"):
-        assemble(flat, trial_space(flat), lambda x, y, z: 0.0 * x)
+        scalar_system(flat)
 
 
-def tensor_kappa(x, y, z):
-    return np.stack([2.0 + x, 0.3 * y, 0.0 * x, 1.5 + z * z, 0.1 + 0.0 * x, 1.0 + y])
+TENSOR = [
+    lambda x, y, z: 2.0 + x,
+    lambda x, y, z: 0.3 * y,
+    lambda x, y, z: 0.0,
+    lambda x, y, z: 1.5 + z * z,
+    lambda x, y, z: 0.1,
+    lambda x, y, z: 1.0 + y,
+]
 
 
-@pytest.mark.parametrize("kappa", [lambda x, y, z: 1.0 + x * x, tensor_kappa], ids=["scalar", "tensor"])
+@pytest.mark.parametrize("kappa", [lambda x, y, z: 1.0 + x * x, TENSOR], ids=["scalar", "tensor"])
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_coefficients_equal_the_assembled_matrix(kappa, degree):
     volume = benchmark_volume(2)
     space = trial_space(volume, degree=degree)
 
     def dense_kappa(x):
-        values = kappa(*x)
-        if np.ndim(values) == 0:
-            return values * np.eye(3)
-        xx, xy, xz, yy, yz, zz = values
+        if callable(kappa):
+            return kappa(*x) * np.eye(3)
+        xx, xy, xz, yy, yz, zz = (entry(*x) for entry in kappa)
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     def reaction(x, y, z):
         return 3.0 + x - y
 
-    operator = assemble(volume, space, lambda x, y, z: x, kappa=kappa, reaction=reaction).operator
+    operator = scalar_system(volume, space, kappa=kappa, reaction=reaction).operator
     matrix, _ = assemble_dense(volume, space, gauss_rule(space), lambda x, y, z: x, dense_kappa, lambda p: reaction(*p))
     x = np.random.default_rng(1).standard_normal(space.shape)
     expected = (matrix @ x.ravel()).reshape(x.shape)

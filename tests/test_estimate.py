@@ -3,14 +3,14 @@ import pytest
 
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
-from solve import Elasticity, Poisson, benchmark_volume, solve_elasticity, solve_poisson
+from solve import Elasticity, Poisson, benchmark_volume, solve_problem
 
 WAVE = "exp(x+z)*sin(y)"
 TENSOR = ("2+x*x", "0.3*y", "0.1", "1.5", "0.2*sin(z)", "1+z*z")
 
 
 def effectivity(volume, problem, **arguments):
-    report = solve_poisson(volume, problem, estimate=True, **arguments).report
+    report = solve_problem(volume, problem, estimate=True, **arguments).report
     assert report.error_estimate_relative == pytest.approx(report.error_estimate / report.l2 * report.l2_relative, 1e-3)
     return report.error_estimate / report.l2
 
@@ -46,14 +46,14 @@ def test_estimate_errs_on_the_safe_side_where_elements_are_stretched():
 
 def test_estimate_of_displacements_is_on_the_safe_side():
     body = Elasticity(exact=("exp(x)*sin(y)", "cos(x*z)", "x*y*z+sin(z)"), traction={"u1": None}, young=210.0)
-    report = solve_elasticity(benchmark_volume(4), body, refine=1, estimate=True).report
+    report = solve_problem(benchmark_volume(4), body, refine=1, estimate=True).report
     assert 1.0 < report.error_estimate / report.l2 < 4.0
 
 
 def test_estimate_of_a_solution_with_singular_edges_is_on_the_safe_side():
     """u = 0 on all faces and f = 1: derivatives are unbounded along the edges. Measured against a much finer mesh."""
     volume = benchmark_volume(4)
-    coarse, fine = (solve_poisson(volume, Poisson(source="1"), refine=level) for level in (0, 2))
+    coarse, fine = (solve_problem(volume, Poisson(source="1"), refine=level) for level in (0, 2))
     points, weights = (part.ravel() for part in gauss_points(fine.knots[0], 3))
     difference = coarse.grid(points, points, points) - fine.grid(points, points, points)
     measure = np.linalg.det(volume.grid_jacobian(points, points, points))
@@ -63,8 +63,8 @@ def test_estimate_of_a_solution_with_singular_edges_is_on_the_safe_side():
 
 def test_no_estimate_where_derivatives_jump_or_are_unknown():
     plain = Poisson(source="1")
-    assert solve_poisson(benchmark_volume(4, 1), plain).report.error_estimate is None
-    assert solve_poisson(benchmark_volume(4), plain).report.error_estimate > 0.0
+    assert solve_problem(benchmark_volume(4, 1), plain).report.error_estimate is None
+    assert solve_problem(benchmark_volume(4), plain).report.error_estimate > 0.0
     unknown = Poisson(source="1", kappa=lambda x, y, z: 1 + x * x)
-    assert solve_poisson(benchmark_volume(4), unknown).report.error_estimate is None
-    assert solve_poisson(benchmark_volume(4), Poisson(exact=WAVE)).report.error_estimate is None  # not asked for
+    assert solve_problem(benchmark_volume(4), unknown).report.error_estimate is None
+    assert solve_problem(benchmark_volume(4), Poisson(exact=WAVE)).report.error_estimate is None  # not asked for

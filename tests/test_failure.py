@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from parameterize.spline.volume import BSplineVolume
-from solve import ConvergenceError, Poisson, solve_poisson
+from solve import ConvergenceError, Poisson, solve_problem
 from solve.discretization.space import trial_space
 from solve.failure import worst_place
 
@@ -26,7 +26,7 @@ def test_worst_place_is_found_near_the_pressed_corner():
 
 def test_the_line_of_a_failed_solve_has_history_and_place():
     with pytest.raises(ConvergenceError) as caught:
-        solve_poisson(pressed_corner(0.1), Poisson(exact="sin(9*x)*y*z"), refine=2, max_iterations=2, strict=True)
+        solve_problem(pressed_corner(0.1), Poisson(exact="sin(9*x)*y*z"), refine=2, max_iterations=2, strict=True)
     line = str(caught.value)
     assert "residual 1.0e+00 at the start" in line and "after 2 iterations" in line and "\n" not in line
     assert "the map is worst at u=0.9" in line

@@ -91,13 +91,13 @@ def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
 def test_error_figure_also_where_the_error_is_rounding(tmp_path, drawing):
     volume = benchmark_volume(4)
     problem = solve.Poisson(exact="x")
-    plotting.draw_error(tmp_path / "error.png", volume, solve.solve_poisson(volume, problem), problem)
+    plotting.draw_error(tmp_path / "error.png", volume, solve.solve_problem(volume, problem), problem)
     assert colored_share(tmp_path / "error.png") > 0.05
 
 
 def test_the_error_of_vectors_is_a_length():
     volume, problem = benchmark_volume(2), solve.Elasticity(exact=("x*y", "sin(z)", "x"))
-    solution = solve.solve_elasticity(volume, problem)
+    solution = solve.solve_problem(volume, problem)
     points, errors = sampling.sampled_error(volume, solution, problem, 3)
     x, y, z = np.moveaxis(points[4], -1, 0)
     exact = np.stack([x * y, np.sin(z), x], axis=-1)

@@ -128,7 +128,7 @@ def test_errors_of_any_size_are_drawn(size, tmp_path, small_views):
     if not rendering.can_draw():
         pytest.skip(f"VTK cannot draw on this machine; remedy: {rendering.REMEDY}")
     volume = benchmark_volume(1)
-    solution = solve.solve_poisson(volume, solve.Poisson(source="0"))
+    solution = solve.solve_problem(volume, solve.Poisson(source="0"))
     field = replace(solution, coefficients=np.full(solution.coefficients.shape, size))
     zero = solve.Poisson(exact="0")
     plotting.draw_error(tmp_path / "error.png", volume, field, zero)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import iga_nn
-from solve import benchmark_volume, solve_poisson
-from solve.forms.formula import Expression, ExpressionError
+from solve import benchmark_volume, solve_problem
 from solve.forms.frame import UnitFrame
-from solve.forms.problem import DEFAULT_EXACT
+from solve.forms.parser import Expression, ExpressionError
+from solve.forms.poisson import DEFAULT_EXACT
 
 BOX = iga_nn.BSplineVolume.uniform(
     np.stack(np.meshgrid([2.0, 6.0], [-1.0, 1.0], [0.0, 1.0], indexing="ij"), axis=-1), 1
@@ -73,7 +73,7 @@ def test_every_datum_of_a_problem_knows_the_scaled_names():
         neumann={"u1": None},
         robin={"w0": ("2+((x-4)/2)**2", None)},
     )
-    found, expected = (solve_poisson(BOX, problem, refine=2, degree=2) for problem in (scaled, written))
+    found, expected = (solve_problem(BOX, problem, refine=2, degree=2) for problem in (scaled, written))
     assert found.report.l2_relative < 1e-9
     assert found.coefficients == pytest.approx(expected.coefficients, abs=1e-9)
 
@@ -86,6 +86,6 @@ def test_elasticity_knows_the_scaled_names():
 def test_the_default_solution_has_no_unit():
     assert iga_nn.Poisson().exact == DEFAULT_EXACT == "exp(X+Z)*sin(Y)"
     volume = benchmark_volume(4)
-    errors = [solve_poisson(v, iga_nn.Poisson()).report for v in (volume, volume.transformed(1e3, [-5e5, 3e5, 100.0]))]
+    errors = [solve_problem(v, iga_nn.Poisson()).report for v in (volume, volume.transformed(1e3, [-5e5, 3e5, 100.0]))]
     assert errors[0].l2_relative == pytest.approx(errors[1].l2_relative, rel=1e-6)
     assert errors[0].h1_relative == pytest.approx(errors[1].h1_relative, rel=1e-6)

@@ -18,7 +18,7 @@ from parameterize.files import save_arrays
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import MeshError
 from solve.field import SplineField
-from solve.forms.formula import Expression, ExpressionError
+from solve.forms.parser import Expression, ExpressionError
 
 SLICE = 20  # files a reader
 QUICK = settings(

@@ -18,7 +18,7 @@ from iga_nn.io.formats import export, is_volume, load_volume
 from parameterize.spline.bernstein import binomials, elevation
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
-from solve import Poisson, solve_poisson
+from solve import Poisson, solve_problem
 from solve.field import SplineField
 from solve.forms.frame import UnitFrame
 from solve.study import benchmark_volume
@@ -125,7 +125,7 @@ def test_mfem_knows_the_faces_by_their_attributes(volume):
 def test_mfem_reads_a_solution_on_its_mesh(volume):
     mfem = pytest.importorskip("mfem.ser")
     pytest.importorskip("splinepy")
-    solution = solve_poisson(volume, Poisson(exact="x*y+z"), refine=1)
+    solution = solve_problem(volume, Poisson(exact="x*y+z"), refine=1)
     solution.save("solution.npz")
     mesh = mfem.Mesh(str(export("volume.npz", "mfem", solution="solution.npz")), 1, 0)
     field = mfem.GridFunction(mesh, "volume.gf")
@@ -212,7 +212,7 @@ def test_vtk_reads_its_bezier_cells(volume):
 def test_vtk_reads_a_solution_of_another_degree_on_finer_spans(degree, in_folder):
     volume = benchmark_volume(2)
     volume.save("volume.npz")
-    solution = solve_poisson(volume, Poisson(exact="x*y+z"), refine=1, degree=degree)
+    solution = solve_problem(volume, Poisson(exact="x*y+z"), refine=1, degree=degree)
     solution.save("solution.npz")
     grid = read_vtu(export("volume.npz", "vtk", solution="solution.npz"))
     finer = volume.refined()
@@ -221,7 +221,7 @@ def test_vtk_reads_a_solution_of_another_degree_on_finer_spans(degree, in_folder
 
 
 def test_view_holds_the_spline_and_its_fields_at_its_nodes(volume):
-    solution = solve_poisson(volume, Poisson(exact="x*y+z*z"), refine=1)
+    solution = solve_problem(volume, Poisson(exact="x*y+z*z"), refine=1)
     solution.save("solution.npz")
     Path("report.json").write_text(json.dumps({"schema": 1, "poisson": {"exact": "x*y+z*z"}}))
     grid = read_vtu(export("volume.npz", "view", solution="solution.npz"))
@@ -437,8 +437,8 @@ def test_bad_requests_are_one_line(arguments, says, in_folder, capsys):
     Path("words.txt").write_text("once upon a time\n")
     for name in ("here.vtu", "here_u.xml"):
         Path(name).write_text("mine\n")
-    solve_poisson(benchmark_volume(3), Poisson(exact="x")).save("other.npz")
-    solve_poisson(benchmark_volume(2), Poisson(exact="x"), degree=4).save("raised.npz")
+    solve_problem(benchmark_volume(3), Poisson(exact="x")).save("other.npz")
+    solve_problem(benchmark_volume(2), Poisson(exact="x"), degree=4).save("raised.npz")
     before = set(Path().iterdir())
     assert main(["export", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()

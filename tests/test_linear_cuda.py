@@ -3,9 +3,10 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from volumes import scalar_system  # noqa: E402
+
 from parameterize.spline.volume import FACE_NAMES  # noqa: E402
-from solve import Poisson, benchmark_volume, solve_poisson  # noqa: E402
-from solve.discretization.operator import assemble, free_window  # noqa: E402
+from solve import Poisson, benchmark_volume, solve_problem  # noqa: E402
 from solve.discretization.quadrature import gauss_rule  # noqa: E402
 from solve.discretization.space import trial_space  # noqa: E402
 from solve.linear.cg import conjugate_gradients  # noqa: E402
@@ -18,8 +19,7 @@ DEVICES = ["cpu", pytest.param("cuda", marks=pytest.mark.skipif(not torch.cuda.i
 def build(degree, dirichlet=FACE_NAMES, reaction=None):
     volume = benchmark_volume(4, degree)
     space = trial_space(volume, refine=1)
-    window = free_window(space, dirichlet)
-    operator = assemble(volume, space, lambda x, y, z: 0.0 * x, reaction=reaction, window=window).operator
+    operator = scalar_system(volume, space, reaction=reaction, dirichlet=dirichlet).operator
     return operator, fast_diagonalization(operator, gauss_rule(space))
 
 
@@ -56,9 +56,9 @@ def test_same_iterates(device):
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
 def test_an_absent_gpu_is_named():
     with pytest.raises(ValueError, match="no CUDA GPU"):
-        solve_poisson(benchmark_volume(2), Poisson(exact="x"), device="cuda")
+        solve_problem(benchmark_volume(2), Poisson(exact="x"), device="cuda")
 
 
 def test_other_devices_are_refused():
     with pytest.raises(ValueError, match="device must be one of cpu, cuda"):
-        solve_poisson(benchmark_volume(2), Poisson(exact="x"), device="tpu")
+        solve_problem(benchmark_volume(2), Poisson(exact="x"), device="tpu")

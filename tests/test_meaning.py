@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from solve import Elasticity, Poisson, benchmark_volume, solve_elasticity, solve_poisson
-from solve.forms.formula import ExpressionError
+from solve import Elasticity, Poisson, benchmark_volume, solve_problem
+from solve.forms.parser import ExpressionError
 
 UNIT = benchmark_volume(3)
 MILLIMETRES = UNIT.transformed(430.0, [-564.0, -300.0, -564.0])
@@ -12,7 +12,7 @@ WIDE = UNIT.transformed(120.0, [-60.0, -60.0, -60.0])
 
 
 def said(volume, problem):
-    report = solve_poisson(volume, problem).report
+    report = solve_problem(volume, problem).report
     return report, " ".join(report.notices)
 
 
@@ -56,7 +56,7 @@ def test_an_estimate_of_a_solution_not_resolved_is_named():
 
 def test_a_vector_that_is_not_resolved_is_named_whole():
     body = Elasticity(exact=("sin(x)", "0", "0"))
-    report = solve_elasticity(MILLIMETRES, body).report
+    report = solve_problem(MILLIMETRES, body).report
     assert not report.meaningful and "exact 'sin(x);0;0' runs from" in report.notices[0]
 
 
@@ -64,7 +64,7 @@ def test_a_volume_that_encloses_nothing_has_no_scale():
     flat = UNIT.transformed(1.0, [0.0] * 3)
     flat.control_points[..., 2] = 0.0
     with pytest.raises(ValueError, match="encloses nothing"):
-        solve_poisson(flat, Poisson())
+        solve_problem(flat, Poisson())
 
 
 def test_an_exact_solution_that_the_mesh_does_not_resolve_is_named():
@@ -94,15 +94,15 @@ def test_data_that_mean_something_are_not_doubted(data):
 
 def test_a_vector_that_underflows_is_named():
     body = Elasticity(exact=("exp(x-900)", "0", "0"))
-    report = solve_elasticity(MILLIMETRES, body).report
+    report = solve_problem(MILLIMETRES, body).report
     assert not report.meaningful and "exact 'exp(x-900)'" in report.notices[0]
 
 
 def test_values_that_are_not_finite_are_refused_with_their_range_and_the_way_out():
     with pytest.raises(ExpressionError, match=r"elsewhere it runs from .* try 'exp\(9\*X\)'"):
-        solve_poisson(WIDE, Poisson(source="exp(9*x)"))
+        solve_problem(WIDE, Poisson(source="exp(9*x)"))
     with pytest.raises(ExpressionError, match=r"exceeds 1e\+100 .* try '1e99\*X'"):
-        solve_poisson(MILLIMETRES, Poisson(source="1e99*x"))
+        solve_problem(MILLIMETRES, Poisson(source="1e99*x"))
     with np.errstate(all="ignore"), pytest.raises(ExpressionError, match="not finite") as refused:
-        solve_poisson(UNIT, Poisson(source=lambda x, y, z: np.log(x - 1e6)))
+        solve_problem(UNIT, Poisson(source=lambda x, y, z: np.log(x - 1e6)))
     assert "try" not in str(refused.value)

@@ -7,7 +7,7 @@ from volumes import spans_at
 from iga_nn.io import Content
 from iga_nn.io.splinepy import write_mfem
 from parameterize.spline.volume import FACE_NAMES
-from solve import Poisson, benchmark_volume, solve_poisson
+from solve import Poisson, benchmark_volume, solve_problem
 
 mfem = pytest.importorskip("mfem.ser")
 pytest.importorskip("splinepy")
@@ -81,7 +81,7 @@ def compare_robin(volume, folder):
     theirs.load.AddBoundaryIntegrator(mfem.BoundaryLFIntegrator(value, 2, 2))
     theirs.solve(fixed=False)
     robin = dict.fromkeys(FACE_NAMES, ("1", None))
-    ours = solve_poisson(volume, Poisson(exact="exp(x+z)*sin(y)", robin=robin), tolerance=1e-12)
+    ours = solve_problem(volume, Poisson(exact="exp(x+z)*sin(y)", robin=robin), tolerance=1e-12)
     return ours, theirs, theirs.solution.ComputeL2Error(value)
 
 
@@ -96,5 +96,5 @@ def test_dirichlet_problem_agrees(tmp_path):
     theirs, one = MfemPoisson(volume, tmp_path), mfem.ConstantCoefficient(1.0)
     theirs.load.AddDomainIntegrator(mfem.DomainLFIntegrator(one))
     theirs.solve(fixed=True)
-    found = solve_poisson(volume, Poisson(source="1"), tolerance=1e-12)(POINTS)
+    found = solve_problem(volume, Poisson(source="1"), tolerance=1e-12)(POINTS)
     assert np.abs(found - theirs.values(POINTS)).max() < 1e-2 * np.abs(found).max()

@@ -5,7 +5,15 @@ import pytest
 
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
-from solve import ConvergenceError, ExpressionError, Poisson, SplineField, benchmark_volume, check_data, solve_poisson
+from solve import (
+    ConvergenceError,
+    ExpressionError,
+    Poisson,
+    SplineField,
+    benchmark_volume,
+    check_problem,
+    solve_problem,
+)
 
 WAVE = Poisson(exact="exp(x+z)*sin(y)")
 
@@ -20,21 +28,21 @@ def affine(degree, n=3):
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 5])
 def test_patch_linear(degree):
-    solution = solve_poisson(affine(degree), Poisson(exact="1+2*x-3*y+z"), tolerance=1e-13)
+    solution = solve_problem(affine(degree), Poisson(exact="1+2*x-3*y+z"), tolerance=1e-13)
     assert solution.report.l2_relative < 1e-11
     assert solution.report.h1_seminorm < 1e-11
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4])
 def test_patch_quadratic(degree):
-    report = solve_poisson(affine(degree), Poisson(exact="x**2-2*y**2+x*z+y"), tolerance=1e-13).report
+    report = solve_problem(affine(degree), Poisson(exact="x**2-2*y**2+x*z+y"), tolerance=1e-13).report
     assert report.l2_relative < 1e-11
 
 
 def test_linear_solution_on_a_curved_map_is_limited_by_the_quadrature_only():
     """p Gauss points are not exact there: the error is far below that of the approximation, and vanishes fast."""
     errors = [
-        solve_poisson(benchmark_volume(4), Poisson(exact="x+y+z"), refine=k, tolerance=1e-13).report.l2
+        solve_problem(benchmark_volume(4), Poisson(exact="x+y+z"), refine=k, tolerance=1e-13).report.l2
         for k in range(2)
     ]
     assert errors[0] < 1e-6
@@ -43,7 +51,7 @@ def test_linear_solution_on_a_curved_map_is_limited_by_the_quadrature_only():
 
 @pytest.mark.parametrize(("n", "l2"), [(8, 1.434e-5), (27, 1.97e-7)])
 def test_reference_errors_of_the_benchmark_map(n, l2):
-    report = solve_poisson(benchmark_volume(n), WAVE).report
+    report = solve_problem(benchmark_volume(n), WAVE).report
     assert report.l2 == pytest.approx(l2, rel=0.05)
     assert report.dofs == (n + 3) ** 3
     assert report.iterations <= 23
@@ -51,7 +59,7 @@ def test_reference_errors_of_the_benchmark_map(n, l2):
 
 
 def test_solution_evaluates_to_the_exact_one():
-    solution = solve_poisson(benchmark_volume(6), WAVE, refine=1)
+    solution = solve_problem(benchmark_volume(6), WAVE, refine=1)
     parameters = np.random.default_rng(0).random((50, 3))
     x, y, z = solution.geometry(parameters).T
     exact = np.exp(x + z) * np.sin(y)
@@ -64,22 +72,22 @@ def test_source_alone_means_zero_on_the_boundary():
     """-Laplace u = 3 pi^2 s with s = sin sin sin on the unit cube has the solution s."""
     points = greville(open_uniform_knots(9, 3), 3)
     cube = BSplineVolume.uniform(np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1), 3)
-    solution = solve_poisson(cube, Poisson(source="3*pi**2*sin(pi*x)*sin(pi*y)*sin(pi*z)"))
+    solution = solve_problem(cube, Poisson(source="3*pi**2*sin(pi*x)*sin(pi*y)*sin(pi*z)"))
     assert solution([[0.5, 0.5, 0.5]])[0] == pytest.approx(1.0, abs=1e-3)
     assert np.all(solution.coefficients[0] == 0.0)
     assert "l2" not in solution.report.as_dict()
 
 
 def test_zero_as_exact_solution_has_no_relative_error():
-    report = solve_poisson(benchmark_volume(3), Poisson(exact="0")).report
+    report = solve_problem(benchmark_volume(3), Poisson(exact="0")).report
     assert report.l2 == 0.0
     assert report.iterations == 0
     assert "l2_relative" not in report.as_dict()
 
 
 def test_functions_as_data_agree_with_formulas():
-    formula = solve_poisson(benchmark_volume(4), WAVE)
-    function = solve_poisson(
+    formula = solve_problem(benchmark_volume(4), WAVE)
+    function = solve_problem(
         benchmark_volume(4),
         Poisson(exact=lambda x, y, z: np.exp(x + z) * np.sin(y), source=lambda x, y, z: -np.exp(x + z) * np.sin(y)),
     )
@@ -91,8 +99,8 @@ def test_functions_as_data_agree_with_formulas():
 
 def test_units_scale_the_errors():
     """On a map in millimetres h grows by 1000 and the L2 norm by 1000^(3/2); the relative error stays."""
-    small = solve_poisson(benchmark_volume(4), WAVE).report
-    large = solve_poisson(
+    small = solve_problem(benchmark_volume(4), WAVE).report
+    large = solve_problem(
         benchmark_volume(4).transformed(1000.0, [0, 0, 0]), Poisson(exact="exp((x+z)/1000)*sin(y/1000)")
     ).report
     assert large.h == pytest.approx(1000.0 * small.h)
@@ -101,11 +109,11 @@ def test_units_scale_the_errors():
 
 
 def test_report_entry_has_the_keys_of_report_json():
-    report = solve_poisson(benchmark_volume(3), WAVE).report
+    report = solve_problem(benchmark_volume(3), WAVE).report
     entry = report.as_dict()
     errors = {"l2", "l2_relative", "h1_seminorm", "h1_relative", "meaningful"}
     assert set(entry) == errors | {"elements", "dofs", "h", "iterations", "converged", "residual", "seconds"}
-    assert set(solve_poisson(benchmark_volume(3), WAVE, estimate=True).report.as_dict()) - set(entry) == {
+    assert set(solve_problem(benchmark_volume(3), WAVE, estimate=True).report.as_dict()) - set(entry) == {
         "error_estimate",
         "error_estimate_relative",
     }
@@ -117,7 +125,7 @@ def test_report_entry_has_the_keys_of_report_json():
 
 
 def test_round_trip_of_the_solution_file(tmp_path):
-    solution = solve_poisson(benchmark_volume(3), WAVE, degree=2)
+    solution = solve_problem(benchmark_volume(3), WAVE, degree=2)
     solution.save(tmp_path / "solution.npz")
     field = SplineField.load(tmp_path / "solution.npz")
     assert field.degrees == solution.degrees == (2, 2, 2)
@@ -127,7 +135,7 @@ def test_round_trip_of_the_solution_file(tmp_path):
 
 
 def test_a_file_that_does_not_fit_together_is_refused(tmp_path):
-    solution = solve_poisson(benchmark_volume(3), WAVE)
+    solution = solve_problem(benchmark_volume(3), WAVE)
     knots = {f"knots_{a}": k for a, k in zip("uvw", solution.knots, strict=True)}
     np.savez(tmp_path / "a.npz", degrees=np.array([3, 3, 3]), **knots, coefficients=np.zeros((6, 6, 5)))
     with pytest.raises(ValueError, match="direction w: 5 coefficients"):
@@ -138,28 +146,28 @@ def test_a_file_that_does_not_fit_together_is_refused(tmp_path):
 
 
 def test_no_convergence_is_reported_and_raised_on_request():
-    solution = solve_poisson(benchmark_volume(4), WAVE, max_iterations=3)
+    solution = solve_problem(benchmark_volume(4), WAVE, max_iterations=3)
     assert not solution.report.converged
     assert solution.report.iterations == 3
     assert "NOT CONVERGED" in str(solution.report)
     with pytest.raises(ConvergenceError, match="after 3 iterations") as caught:
-        solve_poisson(benchmark_volume(4), WAVE, max_iterations=3, strict=True)
+        solve_problem(benchmark_volume(4), WAVE, max_iterations=3, strict=True)
     assert np.array_equal(caught.value.solution.coefficients, solution.coefficients)
 
 
 def test_a_map_that_is_not_certified_is_said_loudly(caplog):
     with caplog.at_level(logging.WARNING, logger="solve"):
-        report = solve_poisson(benchmark_volume(3), WAVE, certified="undecided").report
+        report = solve_problem(benchmark_volume(3), WAVE, certified="undecided").report
     assert "undecided" in report.notices[0]
     assert "undecided" in caplog.text
-    assert solve_poisson(benchmark_volume(3), WAVE, certified="certified").report.notices == ()
+    assert solve_problem(benchmark_volume(3), WAVE, certified="certified").report.notices == ()
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("reaction", [None, "2"])
 def test_a_fold_seen_at_the_gauss_points_is_said(reaction):
     problem = Poisson(exact=WAVE.exact, reaction=reaction)
-    report = solve_poisson(benchmark_volume(8, amplitude=0.3), problem).report
+    report = solve_problem(benchmark_volume(8, amplitude=0.3), problem).report
     assert any("det J < 0 at" in notice for notice in report.notices)
     assert report.converged and report.iterations > 0 and report.l2 is not None  # with |det J| the form stays positive
 
@@ -176,15 +184,15 @@ def test_a_fold_seen_at_the_gauss_points_is_said(reaction):
 def test_data_that_are_not_finite_name_the_point(problem, name):
     """The benchmark map reaches x < 0."""
     with pytest.raises(ExpressionError, match=rf"{name}.* not finite at x=-?\d.*, y=.*, z="):
-        solve_poisson(benchmark_volume(3), problem)
+        solve_problem(benchmark_volume(3), problem)
     with pytest.raises(ExpressionError, match=rf"{name}.* not finite"):
-        check_data(benchmark_volume(3), problem)
+        check_problem(benchmark_volume(3), problem)
 
 
 @pytest.mark.parametrize("problem", [Poisson(source="1e300"), Poisson(source="0", boundary="1e300*x")])
 def test_data_whose_squares_overflow_are_refused(problem):
     with pytest.raises(ExpressionError, match="exceeds 1e\\+100 at x="):
-        solve_poisson(benchmark_volume(3), problem)
+        solve_problem(benchmark_volume(3), problem)
 
 
 def test_problems_without_a_source_are_refused_with_the_remedy():
@@ -204,26 +212,26 @@ def test_problems_without_a_source_are_refused_with_the_remedy():
 )
 def test_arguments_out_of_range_are_named(arguments, name):
     with pytest.raises(ValueError, match=name):
-        solve_poisson(benchmark_volume(3), WAVE, **arguments)
+        solve_problem(benchmark_volume(3), WAVE, **arguments)
 
 
 def test_a_space_without_interior_functions_is_refused():
     with pytest.raises(ValueError, match="raise refine or degree"):
-        solve_poisson(benchmark_volume(1), WAVE, degree=1)
+        solve_problem(benchmark_volume(1), WAVE, degree=1)
 
 
 def test_a_coarser_solution_to_start_from_saves_iterations():
     volume, problem = benchmark_volume(4, amplitude=0.16), Poisson(exact="exp(x+z)*sin(y)")
-    coarse = solve_poisson(volume, problem, refine=1)
-    cold, warm = (solve_poisson(volume, problem, refine=2, start=start) for start in (None, coarse))
+    coarse = solve_problem(volume, problem, refine=1)
+    cold, warm = (solve_problem(volume, problem, refine=2, start=start) for start in (None, coarse))
     assert warm.report.iterations <= 0.75 * cold.report.iterations
     assert np.allclose(warm.coefficients, cold.coefficients, atol=1e-8)
 
 
 def test_the_solution_is_the_same_for_any_number_of_threads():
     volume, problem = benchmark_volume(9), Poisson(exact="exp(x+z)*sin(y)", reaction="1+x")
-    one, three = (solve_poisson(volume, problem, threads=threads) for threads in (1, 3))
+    one, three = (solve_problem(volume, problem, threads=threads) for threads in (1, 3))
     assert np.array_equal(one.coefficients, three.coefficients)
     assert one.report.l2 == three.report.l2
     with pytest.raises(ValueError, match="threads must be at least 1"):
-        solve_poisson(volume, problem, threads=0)
+        solve_problem(volume, problem, threads=0)

@@ -91,7 +91,7 @@ def test_a_boundary_that_meets_itself_comes_first(result):
 def test_scene_holds_places_and_values(result):
     volume = benchmark_volume(2)
     problem = solve.Poisson(exact="x+2*y")
-    drawing = scene.scene_of(volume, solve.solve_poisson(volume, problem), problem)
+    drawing = scene.scene_of(volume, solve.solve_problem(volume, problem), problem)
     n = drawing["samples"]
     shares = np.frombuffer(base64.b64decode(drawing["places"]), "<u2").reshape(9, n, n, 3) / 65535
     low, high = np.array(drawing["low"]), np.array(drawing["high"])
@@ -108,5 +108,5 @@ def test_scene_holds_places_and_values(result):
 def test_scene_of_a_body_has_lengths(result):
     volume = benchmark_volume(1)
     body = solve.Elasticity(force=("0", "0", "-1"))
-    drawing = scene.scene_of(volume, solve.solve_elasticity(volume, body), body)
+    drawing = scene.scene_of(volume, solve.solve_problem(volume, body), body)
     assert [field["title"] for field in drawing["fields"]] == ["tanh(√ARAP / 2), volume 1", "|u|"]

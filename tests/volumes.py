@@ -3,7 +3,11 @@
 import numpy as np
 
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from solve import Poisson
+from solve.discretization.assembly import assemble
+from solve.discretization.operator import free_window
+from solve.discretization.space import trial_space
 
 
 def mapped(function, shape=(6, 6, 6), degrees=(3, 3, 3)):
@@ -22,6 +26,13 @@ def bent(turns, rise=0.0, shape=(24, 4, 4)):
         return radius * np.sin(angle), radius * np.cos(angle), 0.6 * (w - 0.5) + rise * u
 
     return mapped(place, shape)
+
+
+def scalar_system(volume, space=None, source=None, rule=None, *, kappa=None, reaction=None, dirichlet=FACE_NAMES):
+    """Operator and load of -div(kappa grad u) + c u = source on a space (default: the volume's own)."""
+    space = space or trial_space(volume)
+    law = Poisson(source=source or (lambda x, y, z: 0.0 * x), kappa=kappa, reaction=reaction)
+    return assemble(volume, space, law, law.source_at, rule, window=free_window(space, dirichlet))
 
 
 def spans_at(volume, points):

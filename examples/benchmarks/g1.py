@@ -30,7 +30,7 @@ from iga_nn.models import DATA_FOLDER
 from iga_nn.options import MapOptions
 from iga_nn.report import document as reports
 from parameterize.files import save_text
-from solve.forms.problem import DEFAULT_EXACT
+from solve.forms.poisson import DEFAULT_EXACT
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAPER_EXACT = {"conch": "exp(x+z)*sin(y)"}  # where the paper solves Poisson's equation (section 5.5)

@@ -73,9 +73,9 @@ def solution_on(solution: Solution, grid: Grid) -> Array:
 
 def error_at(found: Array, problem: Problem, points: Array) -> Array:
     """Return |u - u_h| at points (..., 3). found: u_h there, (...), or vectors (..., 3)."""
-    exact, _ = problem.exact_at(points[..., 0], points[..., 1], points[..., 2])
+    exact, _ = problem.exact_at(np.moveaxis(points, -1, 0))
     if found.ndim < points.ndim:
-        return np.abs(found - exact)
+        return np.abs(found - exact[0])
     return np.asarray(np.linalg.norm(found - np.moveaxis(exact, 0, -1), axis=-1))
 
 

@@ -110,12 +110,12 @@ def _check_data(equation: Poisson, surface: Surface) -> None:
     from solve.meaning import empty_formulas
 
     equation = equation.placed(_frame(surface))
-    x, y, z = surface.vertices.T
-    for evaluate in (equation.boundary_at, equation.source_at, equation.kappa_at, equation.reaction_at):
-        evaluate(x, y, z)
+    points = surface.vertices.T
+    for evaluate in (equation.boundary_at, equation.source_at, equation.tensor, equation.mass):
+        evaluate(points)
     if equation.exact is not None:
-        equation.exact_at(x, y, z)
-    for _, notice in empty_formulas(equation, surface.vertices.T):
+        equation.exact_at(points)
+    for _, notice in empty_formulas(equation, points):
         log.warning("%s", notice)
     normals = vertex_normals(surface.vertices, surface.faces)
     for face in equation.neumann:

@@ -5,7 +5,7 @@ Projection instead of interpolation at Greville points lowers the L2 error of th
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from itertools import product
 
 import numpy as np
@@ -15,7 +15,7 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation, gauss_points
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .operator import ScalarFunction
+from ..field import Points
 from .space import TrialSpace
 
 FREE = None
@@ -23,13 +23,18 @@ Entity = tuple[int | None, ...]  # per direction: the side 0 or 1, or FREE
 
 
 def boundary_coefficients(
-    volume: BSplineVolume, space: TrialSpace, values: ScalarFunction, faces: Collection[str] = FACE_NAMES
+    volume: BSplineVolume,
+    space: TrialSpace,
+    values: Callable[[Array], Array],
+    faces: Collection[str] = FACE_NAMES,
+    components: int = 1,
 ) -> Array:
-    """Coefficients (n_u, n_v, n_w) of the approximation of boundary data on the named faces, zero elsewhere.
+    """Return coefficients (c, n_u, n_v, n_w) of an approximation of boundary data on the named faces, zero elsewhere.
 
-    The 8 corners, 12 edges and 6 faces follow one another; each takes up what the smaller ones have fixed.
+    values: takes points (3, ...) and returns (c, ...), one row for each of the components. The 8 corners, 12 edges and
+    6 faces follow one another; each takes up what the smaller ones have fixed.
     """
-    coefficients = np.zeros(space.shape)
+    coefficients = np.zeros((components, *space.shape))
     for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
         if any(FACE_NAMES[2 * axis + side] in faces for axis, side in enumerate(entity) if side is not FREE):
             _project(volume, space, values, entity, coefficients)
@@ -37,7 +42,7 @@ def boundary_coefficients(
 
 
 def _project(
-    volume: BSplineVolume, space: TrialSpace, values: ScalarFunction, entity: Entity, coefficients: Array
+    volume: BSplineVolume, space: TrialSpace, values: Callable[[Array], Array], entity: Entity, coefficients: Array
 ) -> None:
     """Fill the coefficients that belong to the inside of one corner, edge or face."""
     points, rows = [], []
@@ -56,15 +61,15 @@ def _project(
         rows.append(weights)
     free = [a for a in range(3) if entity[a] is FREE]
     bases = {a: collocation(space.knots[a], space.degrees[a], points[a]) for a in free}
-    fixed = coefficients[tuple(face)]
+    fixed = coefficients[:, *face]
     for a in free:
-        fixed = apply_along(bases[a], fixed, a)
+        fixed = apply_along(bases[a], fixed, a + 1)
     u, v, w = points
-    where = volume.grid(u, v, w)  # (q_u, q_v, q_w, 3)
-    residual = values(where[..., 0], where[..., 1], where[..., 2]) - fixed
+    where = np.moveaxis(volume.grid(u, v, w), -1, 0)  # (3, q_u, q_v, q_w)
+    residual = values(Points.of(where, points)) - fixed
     for a in free:
-        residual = _solve_mass(bases[a][:, 1:-1].toarray(), rows[a], residual, a)
-    coefficients[tuple(inside)] = residual
+        residual = _solve_mass(bases[a][:, 1:-1].toarray(), rows[a], residual, a + 1)
+    coefficients[:, *inside] = residual
 
 
 def _solve_mass(basis: Array, weights: Array, field: Array, axis: int) -> Array:

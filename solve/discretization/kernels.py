@@ -7,23 +7,13 @@ The order of the six factors of a symmetric matrix is uu, uv, uw, vv, vw, ww.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
-
 import numpy as np
-from numba import njit
 
 from parameterize.arrays import Array, IntArray
 
+from ..compiled import compiled
+
 LANES = 32  # points of direction v in a block of factors
-Kernel = TypeVar("Kernel", bound=Callable[..., Any])
-
-
-def compiled(function: Kernel) -> Kernel:
-    """Compile on first use, keep the machine code on disk, and let other threads run meanwhile."""
-    options = {"cache": True, "nogil": True, "error_model": "numpy"}
-    kernel: Kernel = njit(fastmath={"contract", "reassoc", "nsz"}, **options)(function)
-    return kernel
 
 
 @compiled
@@ -154,39 +144,107 @@ def _block_factors(near: Array, factors: Array) -> None:
 
 
 @compiled
-def plane_tensor_factors(fields: Array, weights: Array, kappa: Array, factors: Array, measure: Array) -> None:
-    """As `plane_factors` with a symmetric tensor kappa (6, q_w, q_v): w det J J^-1 kappa J^-T."""
-    factors[:] = 0.0
+def plane_rows(fields: Array, weights: Array, rows: Array, measure: Array) -> None:
+    """Geometry of a plane from fields (3, 4, q_w, q_v): the rows of J^-1, times the root of w |det J|.
+
+    Writes rows (3, 3, q_w, q_v), the parametric direction first, and measure (q_w, q_v) = w det J.
+    """
     n_w, n_v = weights.shape
-    rows = np.empty((3, 3))  # of det J J^-1
-    fluxes = np.empty((3, 3))  # each row times kappa
     for q in range(n_w):
         for m in range(n_v):
             for a in range(3):
                 b, c = (a + 1) % 3, (a + 2) % 3
                 for i in range(3):
                     j, k = (i + 1) % 3, (i + 2) % 3
-                    rows[a, i] = (
+                    rows[a, i, q, m] = (
                         fields[j, b + 1, q, m] * fields[k, c + 1, q, m]
                         - fields[k, b + 1, q, m] * fields[j, c + 1, q, m]
                     )
-            xx, xy, xz = kappa[0, q, m], kappa[1, q, m], kappa[2, q, m]
-            yy, yz, zz = kappa[3, q, m], kappa[4, q, m], kappa[5, q, m]
-            for a in range(3):
-                x, y, z = rows[a, 0], rows[a, 1], rows[a, 2]
-                fluxes[a, 0] = xx * x + xy * y + xz * z
-                fluxes[a, 1] = xy * x + yy * y + yz * z
-                fluxes[a, 2] = xz * x + yz * y + zz * z
             det = 0.0
             for i in range(3):
-                det += fields[i, 1, q, m] * rows[0, i]
+                det += fields[i, 1, q, m] * rows[0, i, q, m]
+            scale = np.sqrt(weights[q, m] / abs(det))
+            for a in range(3):
+                for i in range(3):
+                    rows[a, i, q, m] *= scale if det > 0.0 else -scale
+            measure[q, m] = weights[q, m] * det
+
+
+@compiled
+def tensor_factors(rows: Array, kappa: Array, factors: Array) -> None:
+    """Write R kappa R^T to factors (v blocks, q_w, 6 or 7, LANES) from rows R (3, 3, q_w, q_v), kappa (6, q_w, q_v)."""
+    flux = np.empty(3)
+    for q in range(rows.shape[2]):
+        for m in range(rows.shape[3]):
+            xx, xy, xz = kappa[0, q, m], kappa[1, q, m], kappa[2, q, m]
+            yy, yz, zz = kappa[3, q, m], kappa[4, q, m], kappa[5, q, m]
             index = 0
             for a in range(3):
+                x, y, z = rows[a, 0, q, m], rows[a, 1, q, m], rows[a, 2, q, m]
+                flux[0], flux[1], flux[2] = xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
                 for b in range(a, 3):
-                    dot = rows[b, 0] * fluxes[a, 0] + rows[b, 1] * fluxes[a, 1] + rows[b, 2] * fluxes[a, 2]
-                    factors[m // LANES, q, index, m % LANES] = weights[q, m] / det * dot
+                    dot = rows[b, 0, q, m] * flux[0] + rows[b, 1, q, m] * flux[1] + rows[b, 2, q, m] * flux[2]
+                    factors[m // LANES, q, index, m % LANES] = dot
                     index += 1
-            measure[q, m] = weights[q, m] * det
+
+
+@compiled
+def turn(rows: Array, source: Array, result: Array, back: bool) -> None:
+    """Write R^T or, `back`, R times source (c, 3, q_w, q_v), with R the rows (3, 3, q_w, q_v) of `plane_rows`."""
+    for c in range(source.shape[0]):
+        for q in range(source.shape[2]):
+            for i in range(3):
+                for m in range(source.shape[3]):
+                    total = 0.0
+                    for a in range(3):
+                        total += (rows[i, a, q, m] if back else rows[a, i, q, m]) * source[c, a, q, m]
+                    result[c, i, q, m] = total
+
+
+@compiled
+def spread_plane(
+    field: Array,
+    first_u: int,
+    u: Array,
+    first_v: IntArray,
+    v: Array,
+    first_w: IntArray,
+    w: Array,
+    has_value: bool,
+    result: Array,
+) -> None:
+    """Transpose of `evaluate_plane`: adds field (4, q_w, q_v), its first entry only if `has_value`.
+
+    result: (n_u, n_v, n_w).
+    """
+    _, n_v, n_w = result.shape
+    lines = np.zeros((3, n_w, v.shape[1]))
+    for q in range(w.shape[1]):
+        row, row_u, row_v, row_w = field[0, q], field[1, q], field[2, q], field[3, q]
+        for k in range(w.shape[2]):
+            value, slope, at = w[0, q, k], w[1, q, k], first_w[q] + k
+            line, line_u, line_v = lines[0, at], lines[1, at], lines[2, at]
+            for m in range(row_u.size):
+                line[m] += slope * row_w[m]
+                line_u[m] += value * row_u[m]
+                line_v[m] += value * row_v[m]
+            if has_value:
+                for m in range(row_u.size):
+                    line[m] += value * row[m]
+    planes = np.zeros((2, n_v, n_w))
+    for q in range(v.shape[1]):
+        for j in range(v.shape[2]):
+            value, slope = v[0, q, j], v[1, q, j]
+            plane, plane_u = planes[0, first_v[q] + j], planes[1, first_v[q] + j]
+            for k in range(n_w):
+                plane[k] += value * lines[0, k, q] + slope * lines[2, k, q]
+                plane_u[k] += value * lines[1, k, q]
+    for i in range(u.shape[1]):
+        value, slope = u[0, i], u[1, i]
+        for j in range(n_v):
+            target, plane, plane_u = result[first_u + i, j], planes[0, j], planes[1, j]
+            for k in range(n_w):
+                target[k] += value * plane[k] + slope * plane_u[k]
 
 
 @compiled

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,7 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation, gauss_points
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .operator import Operator
+from ..field import Points
 from .space import TrialSpace
 
 
@@ -25,7 +24,7 @@ class FaceRule:
     layer: the face's coefficients in an array (n_u, n_v, n_w).
     """
 
-    points: Array
+    points: Points
     normal: Array
     measure: Array
     bases: tuple[csr_array, csr_array]
@@ -53,7 +52,7 @@ def face_rule(volume: BSplineVolume, space: TrialSpace, name: str) -> FaceRule:
     area = outward * np.moveaxis(np.cross(jacobian[..., ahead], jacobian[..., further]), -1, 0)
     size = np.linalg.norm(area, axis=0)
     return FaceRule(
-        points=np.moveaxis(np.squeeze(volume.grid(u, v, w), axis), -1, 0),
+        points=Points.of(np.moveaxis(np.squeeze(volume.grid(u, v, w), axis), -1, 0), (u, v, w), (b, c)),
         normal=area / np.where(size > 0.0, size, 1.0),  # a face may shrink to a point at a corner
         measure=size * np.multiply.outer(rows[b][1].ravel(), rows[c][1].ravel()),
         bases=(_basis(space, b, rows[b][0]), _basis(space, c, rows[c][0])),
@@ -82,27 +81,6 @@ class FaceMass:
     def mean(self) -> float:
         """Average over the face's parameters of alpha times the surface element."""
         return float(self.weights.sum())
-
-
-@dataclass(frozen=True, eq=False)
-class RobinOperator:
-    """An operator and the terms of its Robin faces."""
-
-    operator: Operator
-    faces: Sequence[FaceMass]
-
-    def apply(self, coefficients: Array) -> Array:
-        """The product with a coefficient array (n_u, n_v, n_w), rows and columns that are not free included."""
-        result = self.operator.apply(coefficients)
-        for face in self.faces:
-            face.add_product(coefficients, result)
-        return result
-
-    def apply_free(self, free: Array) -> Array:
-        """The product restricted to the free coefficients, an array of the window's shape."""
-        full = np.zeros(self.operator.space.shape)
-        full[self.operator.window] = free
-        return self.apply(full)[self.operator.window]
 
 
 def _basis(space: TrialSpace, axis: int, points: Array) -> csr_array:

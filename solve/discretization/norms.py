@@ -47,39 +47,31 @@ def error_norms(
     volume: BSplineVolume,
     space: TrialSpace,
     coefficients: Array,
-    exact: Callable[[Array, Array, Array], tuple[Array, Array | None]],
+    exact: Callable[[Array], tuple[Array, Array | None]],
     threads: int = 1,
 ) -> Errors:
-    """Error norms over the physical domain; arguments as in `squared_errors`."""
-    return Errors.from_squares(*squared_errors(volume, space, coefficients, exact, threads))
+    """Return error norms over the physical domain, over all components (c, n_u, n_v, n_w) together.
 
-
-def squared_errors(
-    volume: BSplineVolume,
-    space: TrialSpace,
-    coefficients: Array,
-    exact: Callable[[Array, Array, Array], tuple[Array, Array | None]],
-    threads: int = 1,
-) -> tuple[Array, bool]:
-    """The integrals that `Errors.from_squares` takes, slab by slab, and whether the gradient of u is known.
-
-    exact: takes x, y, z and returns u and grad u (3, ...), or None in the gradient's place.
+    exact: takes points (3, ...) and returns u (c, ...) and grad u (c, 3, ...), or None in the gradient's place.
     """
     rule = gauss_rule(space, tuple(p + 2 for p in space.degrees))  # type: ignore[arg-type]
-    spline = PlaneField(coefficients, rule.tabulate(space.degrees, space.knots))
+    tables = rule.tabulate(space.degrees, space.knots)
+    splines = [PlaneField(component, tables) for component in coefficients]
     sums = np.zeros((rule.shape[0], 4))  # plane by plane: the same total for any number of threads
     has_gradient = []
 
     def integrate(points: range) -> None:
         approximate, wanted = np.empty((4, *rule.plane_shape)), np.zeros((4, *rule.plane_shape))
-        for q, fields in map_planes(volume, rule, points):
-            spline.evaluate(q, approximate)
-            wanted[0], gradient = exact(*fields[:, 0])
-            has_gradient.append(gradient is not None)
-            if gradient is not None:
-                wanted[1:] = gradient
-            sums[q] = kernels.plane_errors(fields, rule.plane_weights(q), approximate, wanted)
+        for q, fields, x in map_planes(volume, rule, points):
+            values, gradients = exact(x)
+            has_gradient.append(gradients is not None)
+            for c, spline in enumerate(splines):
+                spline.evaluate(q, approximate)
+                wanted[0] = values[c]
+                if gradients is not None:
+                    wanted[1:] = gradients[c]
+                sums[q] += kernels.plane_errors(fields, rule.plane_weights(q), approximate, wanted)
 
     planes = range(rule.shape[0])
     in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
-    return sums.sum(axis=0), all(has_gradient)
+    return Errors.from_squares(sums.sum(axis=0), all(has_gradient))

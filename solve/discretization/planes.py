@@ -9,12 +9,13 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
+from ..field import Points
 from . import kernels
 from .quadrature import GaussRule, Table
 
 
 class PlaneField:
-    """A scalar spline with its basis tabulated at a Gauss rule.
+    """A scalar spline with its basis tabulated at a rule.
 
     coefficients: (n_u, n_v, n_w); tables: as `GaussRule.tabulate` returns them.
     """
@@ -32,18 +33,20 @@ class PlaneField:
 
 def map_planes(
     volume: BSplineVolume, rule: GaussRule, points: Iterable[int] | None = None
-) -> Iterator[tuple[int, Array]]:
-    """For every point q of direction u: q and the map on its plane, (3, 4, q_w, q_v): components x value and gradient.
+) -> Iterator[tuple[int, Array, Points]]:
+    """Yield for every point q of direction u: q, the map on its plane, and its points in space, (3, q_w, q_v).
 
-    points: the q wanted, default all. The array is reused from one step to the next.
+    The map is (3, 4, q_w, q_v): components x value and gradient. points: the q wanted, default all. The arrays are
+    reused from one step to the next.
     """
     tables = rule.tabulate(volume.degrees, volume.knots)
     components = [PlaneField(volume.control_points[..., c], tables) for c in range(3)]
     fields = np.empty((3, 4, *rule.plane_shape))
+    u, v, w = rule.points
     for q in range(rule.shape[0]) if points is None else points:
         for component, out in zip(components, fields, strict=True):
             component.evaluate(q, out)
-        yield q, fields
+        yield q, fields, Points.of(fields[:, 0], (u[q : q + 1], v, w), (2, 1))
 
 
 def count_folded(measure: Array, rule: GaussRule, q: int) -> int:

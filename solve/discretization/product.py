@@ -10,7 +10,8 @@ its own.
     planes          (2, w blocks, n_v, ROWS): value and u derivative at one point of u
     lines           (v blocks, n_w, 3, LANES): value, u and v derivative (B B, B' B, B B') at points of u and v
     factors         (q_u, v blocks, spans of w, Gauss points x 6 or 7 x LANES): uu, uv, uw, vv, vw, ww, mass
-    u, v, w         SpanTable of a direction; `values` of one span is a table (Gauss points, 2, degree + 1)
+    u               Table: functions and their first number, point by point
+    v, w            SpanTable of a direction; `values` of one span is a table (Gauss points, 2, degree + 1)
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 
-from .kernels import LANES, compiled
-from .quadrature import SpanTable
+from ..compiled import compiled
+from .kernels import LANES
+from .quadrature import SpanTable, Table
 
 ROWS = 16
 Sizes = tuple[int, ...]  # only its length counts
@@ -49,10 +51,10 @@ def unpack(packed: Array, start_u: int, start_v: int, start_w: int, values: Arra
 
 
 @compiled
-def multiply_layers(
+def multiply_planes(
     packed: Array,
-    layers: IntArray,
-    u: SpanTable,
+    points: IntArray,
+    u: Table,
     v: SpanTable,
     w: SpanTable,
     factors: Array,
@@ -60,10 +62,10 @@ def multiply_layers(
     n_w: int,
     result: Array,
 ) -> None:
-    """Add the product with the matrix of some layers of elements to `result`, which is packed as the coefficients are.
+    """Add the part of some points of u to the product with the matrix, `result`, packed as the coefficients are.
 
-    layers: (m,) the spans of u. At every point of u the coefficients are contracted in u, v and w, multiplied with the
-    factors, and spread in w, v and u.
+    points: (m,). At each the coefficients are contracted in u, v and w, multiplied with the factors, and spread in w,
+    v and u.
     """
     w_blocks, n_v = packed.shape[1], packed.shape[2]
     planes = np.empty((2, w_blocks * n_v * ROWS))
@@ -71,21 +73,19 @@ def multiply_layers(
     sums = np.empty(lines.shape)
     rows = np.empty(len(v.points) * 3 * ROWS)
     fluxes = np.empty(len(w.points) * 4 * LANES)
-    for span in layers:
-        for point in range(u.values.shape[1]):
-            table = u.values[span, point]
-            planes[:] = 0.0
-            for i in range(table.shape[1]):
-                _contract_u(packed[u.first[span] + i].reshape(-1), table[0, i], table[1, i], planes)
-            _contract_v(planes, w_blocks, v, rows, lines)
-            sums[:] = 0.0
-            here = factors[span * u.values.shape[1] + point]
-            for block in range(lines.shape[0]):
-                _multiply_w(lines[block].reshape(-1), here[block], w, terms, fluxes, sums[block].reshape(-1))
-            planes[:] = 0.0
-            _spread_v(sums, w_blocks, v, rows, planes)
-            for i in range(table.shape[1]):
-                _spread_u(planes, table[0, i], table[1, i], result[u.first[span] + i].reshape(-1))
+    for point in points:
+        first, values, slopes = u.first[point], u.values[0, point], u.values[1, point]
+        planes[:] = 0.0
+        for i in range(values.size):
+            _contract_u(packed[first + i].reshape(-1), values[i], slopes[i], planes)
+        _contract_v(planes, w_blocks, v, rows, lines)
+        sums[:] = 0.0
+        for block in range(lines.shape[0]):
+            _multiply_w(lines[block].reshape(-1), factors[point, block], w, terms, fluxes, sums[block].reshape(-1))
+        planes[:] = 0.0
+        _spread_v(sums, w_blocks, v, rows, planes)
+        for i in range(values.size):
+            _spread_u(planes, values[i], slopes[i], result[first + i].reshape(-1))
 
 
 @compiled

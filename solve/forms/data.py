@@ -1,113 +1,159 @@
-"""Data of a problem: formulas in x, y, z and X, Y, Z or functions of three arrays, checked at every point."""
+"""Data of a problem: formulas in x, y, z and X, Y, Z, functions or fields, checked at every point."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from copy import copy
-from typing import Self
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from parameterize.arrays import Array
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.volume import FACE_NAMES
 
-from .formula import Expression, ExpressionError
+from ..field import SplineField
 from .frame import UnitFrame
+from .jets import Jet
+from .parser import Expression, ExpressionError
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
 USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
-Data = str | Callable[[Array, Array, Array], ArrayLike]
-Parsed = Expression | Callable[[Array, Array, Array], ArrayLike]
+Scalar = str | SplineField | Callable[..., ArrayLike]
+Data = Scalar | Sequence[Scalar]  # a sequence has one entry a component
+Entry = Expression | SplineField | Callable[[Array], ArrayLike]
 
 
-class ProblemData:
-    """The parsed data of a problem by name, several entries for a vector or a tensor, and the meaning of X, Y, Z."""
+@dataclass(frozen=True)
+class OfCoordinates:
+    """A function of three arrays x, y, z as one of points (3, ...)."""
 
-    _parsed: dict[str, tuple[Parsed, ...]]
+    function: Callable[[Array, Array, Array], ArrayLike]
+
+    def __call__(self, x: Array) -> ArrayLike:
+        """Return the function's values."""
+        return self.function(*np.asarray(x))
+
+
+@dataclass(frozen=True)
+class Datum:
+    """One datum of a problem.
+
+    name: as messages call it. entries: one a component, or one function or field for all components.
+    face: the only face on which it acts; "" for the whole volume.
+    """
+
+    name: str
+    entries: tuple[Entry, ...]
+    components: int = 1
+    face: str = ""
 
     @property
-    def formulas(self) -> list[tuple[str, Expression]]:
-        """The names of the data that are formulas, and these; a vector's name comes with each of its formulas."""
-        named = [(name, entry) for name, entries in self._parsed.items() for entry in entries]
-        return [(name, entry) for name, entry in named if isinstance(entry, Expression)]
+    def formulas(self) -> list[Expression]:
+        """Its entries that are formulas."""
+        return [entry for entry in self.entries if isinstance(entry, Expression)]
 
     @property
-    def is_scaled(self) -> bool:
-        """Whether X, Y or Z occurs in a formula."""
-        return any(formula.is_scaled for _, formula in self.formulas)
+    def is_formula(self) -> bool:
+        """Whether all its derivatives are known."""
+        return len(self.formulas) == len(self.entries)
 
-    def on(self, volume: BSplineVolume) -> Self:
-        """The same problem with X, Y, Z measured in a volume: its size is 1 in them, the middle of its box 0."""
-        return self.placed(UnitFrame.of(volume)) if self.is_scaled else self
+    def placed(self, frame: UnitFrame) -> Datum:
+        """Return the same datum with X, Y, Z measured in a frame."""
+        return replace(self, entries=tuple(e.placed(frame) if isinstance(e, Expression) else e for e in self.entries))
 
-    def placed(self, frame: UnitFrame) -> Self:
-        """The same problem with X, Y, Z measured in a frame."""
-        other = copy(self)
-        parsed = {name: tuple(_placed(entry, frame) for entry in entries) for name, entries in self._parsed.items()}
-        object.__setattr__(other, "_parsed", parsed)
-        return other
+    def __call__(self, x: Array) -> Array:
+        """Return values (c, ...) at points (3, ...).
+
+        Raises ExpressionError where they are not finite, ValueError where a function's result has another shape.
+        """
+        each = x.shape[1:] if len(self.entries) == self.components else (self.components, *x.shape[1:])
+        parts = []
+        for entry in self.entries:
+            found = np.asarray(_evaluate(entry, x), dtype=np.float64)
+            try:
+                full = np.broadcast_to(found, each)
+            except ValueError:
+                raise ValueError(
+                    f"{self.name} must return shape {each} at points {x.shape}, got {found.shape}"
+                ) from None
+            parts.append(finite(self.name, full, x, entry))
+        return np.stack(parts).reshape(self.components, *x.shape[1:])
+
+    def jets(self, x: Sequence[Jet]) -> list[Jet]:
+        """Return the jets of its formulas from those of x, y, z. Raises TypeError for a function or a field."""
+        if not self.is_formula:
+            raise TypeError(f"{self.name} is a function or a field, whose derivatives are unknown")
+        return [entry.jet(x) for entry in self.formulas]
 
 
-def _placed(data: Parsed, frame: UnitFrame) -> Parsed:
-    return data.placed(frame) if isinstance(data, Expression) else data
+def _evaluate(entry: Entry, x: Array) -> ArrayLike:
+    if isinstance(entry, Expression):
+        return entry(*np.asarray(x))
+    return entry.at(x) if isinstance(entry, SplineField) else entry(x)
 
 
-def parse(name: str, data: Data) -> Parsed:
-    """A formula translated, a function as it is. Raises ExpressionError or ValueError that names the entry."""
-    if callable(data):
-        return data
-    if not isinstance(data, str):
-        raise ValueError(f"{name} must be a formula such as '1' or a function of x, y, z, got {data!r}")
+def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:
+    """Translate what a user gives for c components.
+
+    of_coordinates: functions take three arrays x, y, z instead of one array (3, ...).
+    Raises ExpressionError for a formula that is refused, ValueError for what is no datum; both name it.
+    """
+    is_vector = isinstance(data, Sequence) and not isinstance(data, str)
+    entries: list[Any] = list(data) if is_vector else [data]  # type: ignore[arg-type]
+    if len(entries) != components and (is_vector or isinstance(data, str)):
+        raise ValueError(f"{name} must have {components} entries, one a component, got {data!r}")
+    for entry in entries:
+        wanted = () if len(entries) == components else (components,)
+        if isinstance(entry, SplineField) and entry.coefficients.shape[3:] != wanted:
+            raise ValueError(f"{name}: the field must have {components if wanted else 1} component(s) here")
+        if not isinstance(entry, str) and not callable(entry):
+            raise ValueError(f"{name} must be a formula such as '1', a function of x or a field, got {entry!r}")
     try:
-        return Expression(data)
+        parsed = [Expression(entry) if isinstance(entry, str) else entry for entry in entries]
     except ExpressionError as error:
         raise ExpressionError(f"{name}: {error}") from None
+    is_opaque = [callable(e) and not isinstance(e, Expression | SplineField) for e in parsed]
+    wrapped = [
+        OfCoordinates(e) if of_coordinates and opaque else e for e, opaque in zip(parsed, is_opaque, strict=True)
+    ]
+    return Datum(name, tuple(wrapped), components, face)
 
 
-def values(name: str, data: Parsed, x: Array, y: Array, z: Array) -> Array:
-    """Values at points given by arrays of equal shape. Raises ExpressionError where they are not finite."""
-    found = np.asarray(data(x, y, z), dtype=np.float64)
-    try:
-        full = np.broadcast_to(found, x.shape)
-    except ValueError:
-        raise ValueError(f"{name} returned shape {found.shape} for points of shape {x.shape}") from None
-    return finite(name, full, x, y, z, data)
+def finite(name: str, found: Array, x: Array, entry: Entry | None = None) -> Array:
+    """Return values unchanged; raise ExpressionError at the first point where they are not finite, or beyond LARGEST.
 
-
-def finite(name: str, found: Array, x: Array, y: Array, z: Array, data: Parsed | None = None) -> Array:
-    """Values unchanged; ExpressionError naming the first point where they are not finite, or beyond LARGEST.
-
-    data: what the values come from, for the remedy.
+    x: points (3, ...). entry: what the values come from, for the remedy.
     """
     bad = ~(np.abs(found) <= LARGEST)  # NaN included
     if bad.any():
         fault = f"exceeds {LARGEST:.0e}" if np.isfinite(found[bad].flat[0]) else "is not finite"
         good = found[~bad]
         elsewhere = f"; elsewhere it runs from {good.min():.3g} to {good.max():.3g}" if good.size else ""
-        where = _first(bad, x, y, z)
-        raise ExpressionError(f"{name} {fault} at {where}, a point of the domain{elsewhere}{in_scaled(data, x, y, z)}")
+        raise ExpressionError(
+            f"{name} {fault} at {_first(bad, x)}, a point of the domain{elsewhere}{in_scaled(entry, x)}"
+        )
     return found
 
 
-def in_scaled(data: Parsed | None, x: Array, y: Array, z: Array) -> str:
-    """The remedy for a formula in x, y, z on a domain far from size 1 or from the origin: the same in X, Y, Z.
+def in_scaled(entry: Entry | None, x: Array) -> str:
+    """Return the remedy for a formula in x, y, z on a domain far from size 1 or from the origin: the same in X, Y, Z.
 
-    x, y, z: points of the domain, arrays of equal shape.
+    x: points (3, ...) of the domain.
     """
-    if not isinstance(data, Expression) or data.scaled_text is None:
+    if not isinstance(entry, Expression) or entry.scaled_text is None:
         return ""
-    size, away = max(float(np.ptp(c)) for c in (x, y, z)), max(float(np.abs(c).max()) for c in (x, y, z))
+    size, away = max(float(np.ptp(c)) for c in x), float(np.abs(x).max())
     if away < USUAL_SIZE and size > 1.0 / USUAL_SIZE:
         return ""
-    return f"; X, Y, Z are x, y, z scaled to volume 1 about the middle of the domain: try {data.scaled_text!r}"
+    return f"; X, Y, Z are x, y, z scaled to volume 1 about the middle of the domain: try {entry.scaled_text!r}"
 
 
-def demand(good: NDArray[np.bool_], name: str, must: str, x: Array, y: Array, z: Array) -> None:
-    """Raise ExpressionError naming the first point where a condition on the data does not hold."""
+def demand(good: NDArray[np.bool_], name: str, must: str, x: Array) -> None:
+    """Raise ExpressionError naming the first of the points (3, ...) where a condition on the data does not hold."""
     if not good.all():
-        raise ExpressionError(f"{name} must be {must}, and is not at {_first(~good, x, y, z)}, a point of the domain")
+        raise ExpressionError(f"{name} must be {must}, and is not at {_first(~good, x)}, a point of the domain")
 
 
 def check_faces(name: str, faces: Collection[str]) -> None:
@@ -117,6 +163,6 @@ def check_faces(name: str, faces: Collection[str]) -> None:
             raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
 
 
-def _first(bad: NDArray[np.bool_], x: Array, y: Array, z: Array) -> str:
-    at = tuple(np.argwhere(bad)[0][-x.ndim :]) if x.ndim else ()
-    return f"x={x[at]:.6g}, y={y[at]:.6g}, z={z[at]:.6g}"
+def _first(bad: NDArray[np.bool_], x: Array) -> str:
+    place = tuple(np.argwhere(bad)[0][bad.ndim - (x.ndim - 1) :])
+    return ", ".join(f"{axis}={row[place]:.6g}" for axis, row in zip("xyz", np.asarray(x), strict=True))

@@ -16,7 +16,6 @@ import numpy as np
 from scipy.linalg import eigh
 
 from parameterize.arrays import Array
-from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import FACE_NAMES
 
 from ..discretization.operator import Operator, from_blocks
@@ -42,8 +41,9 @@ class FastDiagonalization:
     threads: int = 1
 
     def __call__(self, residual: Array) -> Array:
-        """Return the preconditioned residual, both (n_u, n_v, n_w) over the free coefficients."""
+        """Return the preconditioned residual, both (n_u, n_v, n_w) or (1, n_u, n_v, n_w)."""
         u, v, w = self.vectors
+        shape, residual = residual.shape, residual.reshape(self.inverse.shape)
         if self.singular:
             residual = residual - residual.mean()
         spectral = self._transform(u.T, v.T, w.T, self.scaling * residual)
@@ -52,7 +52,7 @@ class FastDiagonalization:
         result *= self.scaling
         if self.singular:
             result -= result.mean()
-        return result
+        return result.reshape(shape)
 
     def _transform(self, u: Array, v: Array, w: Array, x: Array) -> Array:
         """Apply three small matrices along the three axes of x, which is overwritten."""
@@ -136,14 +136,14 @@ def _separable_coefficients(operator: Operator, rule: GaussRule) -> tuple[list[A
     """Return the weights a_d and b_d at the Gauss points of each direction: two lists of (q_d,).
 
     G_dd is close to a_d of its own parameter times b_e and b_f of the two others, in the sense of least squares of
-    logarithms. There the fit is additive, and its terms are averages of log G_dd over planes. One Gauss point a span,
-    the middle one, stands for the span.
+    logarithms. There the fit is additive, and its terms are averages of log G_dd over planes. One point a span, the
+    middle one, stands for the span.
     """
-    spans = [len(breakpoints(k)) - 1 for k in operator.space.knots]
-    counts = [q // s for q, s in zip(rule.shape, spans, strict=True)]  # Gauss points per span
-    lengths = [np.add.reduceat(w, np.arange(s) * c) for w, s, c in zip(rule.weights, spans, counts, strict=True)]
-    u, v, w = (np.arange(s) * c + c // 2 for s, c in zip(spans, counts, strict=True))  # the middle Gauss points
-    means = [[np.zeros(s) for s in spans] for _ in range(3)]  # means[d][axis]: of log G_dd over the two other axes
+    starts = [np.unique(table.first, return_index=True)[1] for table in operator.tables]  # of the spans
+    counts = [np.diff(s, append=q) for s, q in zip(starts, rule.shape, strict=True)]  # points per span
+    lengths = [np.add.reduceat(w, s) for w, s in zip(rule.weights, starts, strict=True)]
+    u, v, w = (s + c // 2 for s, c in zip(starts, counts, strict=True))  # the middle points
+    means = [[np.zeros(len(s)) for s in starts] for _ in range(3)]  # means[d][axis]: of log G_dd over the other axes
     for span, q in enumerate(u):
         weights = rule.plane_weights(int(q))[np.ix_(w, v)]
         for mean, index in zip(means, DIAGONAL, strict=True):

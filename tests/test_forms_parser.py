@@ -3,7 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from solve.forms.formula import PAIRS, Expression, ExpressionError
+from solve.forms.jets import PAIRS
+from solve.forms.parser import Expression, ExpressionError
 
 POINTS = np.random.default_rng(0).uniform(0.3, 1.2, (3, 20))
 

@@ -1,9 +1,8 @@
-"""Formulas a user types, such as "exp(X+Z)*sin(Y)": parsed by a whitelist, evaluated on arrays with derivatives.
+"""Formulas a user types, such as "exp(X+Z)*sin(Y)": parsed by a whitelist, evaluated on arrays and on jets.
 
 x, y, z are coordinates in the user's units; X, Y, Z are the same scaled to a body of volume 1 (`frame.UnitFrame`).
 Nothing is ever passed to eval or exec. Python's own parser makes the tree; every node is then checked against the few
-kinds allowed and translated. Value, gradient and Hessian follow together by forward automatic differentiation
-(Griewank and Walther, *Evaluating Derivatives*, 2nd ed., chapter 13), so a source -div(kappa grad u) is exact.
+kinds allowed and translated.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,10 +20,7 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array
 
 from .frame import UnitFrame
-
-Number = float | Array  # constants stay NumPy scalars (a kind of float): products with 0.0 and 1.0 are then free
-Numbers = tuple[Number, ...]
-PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six second derivatives
+from .jets import Jet, coordinates, stacked
 
 MAX_LENGTH = 1000
 MAX_DEPTH = 100
@@ -33,138 +30,22 @@ SCALED = ("X", "Y", "Z")
 VARIABLES = (*COORDINATES, *SCALED)
 CONSTANTS = {"pi": math.pi, "e": math.e}
 OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
+    "sin": Jet.sin,
+    "cos": Jet.cos,
+    "tan": Jet.tan,
+    "exp": Jet.exp,
+    "log": Jet.log,
+    "sqrt": Jet.sqrt,
+    "tanh": Jet.tanh,
+    "abs": abs,
+}
+
+Evaluator = Callable[[Sequence[Jet]], Jet]  # of the six variables
 
 
 class ExpressionError(ValueError):
     """A formula that is refused, or data that are not finite somewhere on the domain."""
-
-
-@dataclass(frozen=True, eq=False)
-class Jet:
-    """A function's value, gradient and Hessian (xx, xy, xz, yy, yz, zz) at the points of an array.
-
-    What is constant is a scalar. Variables seeded without Hessian carry none, and no work is spent on it.
-    """
-
-    value: Number
-    gradient: Numbers = (0.0, 0.0, 0.0)
-    hessian: Numbers = (0.0,) * 6
-
-
-def _plus(a: Number, b: Number) -> Number:
-    if isinstance(a, float) and a == 0.0:
-        return b
-    return a if isinstance(b, float) and b == 0.0 else a + b
-
-
-def _times(a: Number, b: Number) -> Number:
-    for known, other in ((a, b), (b, a)):
-        if isinstance(known, float) and known in (0.0, 1.0):
-            return 0.0 if known == 0.0 else other
-    return a * b
-
-
-def _combine(operation: Callable[..., Number], *rows: Numbers) -> Numbers:
-    """Apply an operation entry by entry; the shortest row, a Hessian left out, decides how many there are."""
-    return tuple(operation(*entries) for entries in zip(*rows, strict=False))
-
-
-def _add(a: Jet, b: Jet) -> Jet:
-    return Jet(a.value + b.value, _combine(_plus, a.gradient, b.gradient), _combine(_plus, a.hessian, b.hessian))
-
-
-def _scale(factor: float, a: Jet) -> Jet:
-    gradient, hessian = (_combine(lambda da: _times(factor, da), row) for row in (a.gradient, a.hessian))
-    return Jet(factor * a.value, gradient, hessian)
-
-
-def _multiply(a: Jet, b: Jet) -> Jet:
-    """Product rule: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
-
-    def product(da: Number, db: Number) -> Number:
-        return _plus(_times(a.value, db), _times(b.value, da))
-
-    def mixed(second_a: Number, second_b: Number, pair: tuple[int, int]) -> Number:
-        i, j = pair
-        one, other = _times(a.gradient[i], b.gradient[j]), _times(a.gradient[j], b.gradient[i])
-        return _plus(product(second_a, second_b), _plus(one, other))
-
-    hessian = tuple(mixed(*entries) for entries in zip(a.hessian, b.hessian, PAIRS, strict=False))
-    return Jet(a.value * b.value, _combine(product, a.gradient, b.gradient), hessian)
-
-
-def _chain(a: Jet, value: Number, first: Number, second: Number) -> Jet:
-    """Chain rule for h(a) from h, h' and h'' at a: h(a)_ij = h' a_ij + h'' a_i a_j."""
-
-    def entry(second_a: Number, pair: tuple[int, int]) -> Number:
-        i, j = pair
-        return _plus(_times(first, second_a), _times(second, _times(a.gradient[i], a.gradient[j])))
-
-    gradient = _combine(lambda da: _times(first, da), a.gradient)
-    return Jet(value, gradient, tuple(entry(*entries) for entries in zip(a.hessian, PAIRS, strict=False)))
-
-
-def _raise_to(a: Jet, n: float) -> Jet:
-    """Raise a to a constant power; the factors n and n (n - 1) that vanish keep 0 ** negative out."""
-    v = a.value
-    first = n * v ** (n - 1.0) if n != 0.0 else 0.0
-    second = n * (n - 1.0) * v ** (n - 2.0) if n not in (0.0, 1.0) else 0.0
-    return _chain(a, v**n, first, second)
-
-
-def _tanh(a: Jet) -> Jet:
-    t = np.tanh(a.value)
-    slope = 1.0 - t * t
-    return _chain(a, t, slope, -2.0 * t * slope)
-
-
-def _tan(a: Jet) -> Jet:
-    t = np.tan(a.value)
-    slope = 1.0 + t * t
-    return _chain(a, t, slope, 2.0 * t * slope)
-
-
-def _exp(a: Jet) -> Jet:
-    value = np.exp(a.value)
-    return _chain(a, value, value, value)
-
-
-def _sqrt(a: Jet) -> Jet:
-    root = np.sqrt(a.value)
-    return _chain(a, root, 0.5 / root, -0.25 / (root * a.value))
-
-
-def _sin(a: Jet) -> Jet:
-    sine = np.sin(a.value)
-    return _chain(a, sine, np.cos(a.value), -sine)
-
-
-def _cos(a: Jet) -> Jet:
-    cosine = np.cos(a.value)
-    return _chain(a, cosine, -np.sin(a.value), -cosine)
-
-
-def _log(a: Jet) -> Jet:
-    return _chain(a, np.log(a.value), 1.0 / a.value, -1.0 / (a.value * a.value))
-
-
-def _abs(a: Jet) -> Jet:
-    """Derivatives hold away from the zeros of the argument; the source of a kink is not a function."""
-    return _chain(a, np.abs(a.value), np.sign(a.value), 0.0)
-
-
-FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
-    "sin": _sin,
-    "cos": _cos,
-    "tan": _tan,
-    "exp": _exp,
-    "log": _log,
-    "sqrt": _sqrt,
-    "tanh": _tanh,
-    "abs": _abs,
-}
-
-Evaluator = Callable[[Sequence[Jet]], Jet]  # of the six variables
 
 
 @dataclass(frozen=True)
@@ -186,6 +67,10 @@ class Expression:
         object.__setattr__(self, "variables", frozenset(translator.variables))
         object.__setattr__(self, "_evaluate", translator.result)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the text, which is parsed again."""
+        return Expression, (self.text, self.frame)
+
     @property
     def is_scaled(self) -> bool:
         """Whether X, Y or Z occurs in the formula."""
@@ -199,63 +84,49 @@ class Expression:
         return re.sub(r"\b[xyz]\b", lambda match: match.group().upper(), self.text)
 
     def placed(self, frame: UnitFrame) -> Expression:
-        """The same formula with X, Y, Z measured in this frame."""
+        """Return the same formula with X, Y, Z measured in this frame."""
         return replace(self, frame=frame)
 
     def __call__(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
-        """Values at points given by arrays of equal shape."""
-        points = _coordinates(x, y, z)
-        with np.errstate(all="ignore"):
-            jet = self._evaluate(self._seeds([Jet(point) for point in points]))
-        return np.broadcast_to(np.asarray(jet.value), points[0].shape)
+        """Return values at points given by arrays of equal shape."""
+        points = _arrays(x, y, z)
+        return np.broadcast_to(np.asarray(self.jet([Jet(point, (), ()) for point in points]).value), points[0].shape)
 
     def gradient(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array]:
-        """Value (...) and gradient (3, ...) at points given by arrays of equal shape."""
-        value, gradient, _ = self._derivatives((), x, y, z)
-        return value, gradient
+        """Return value (...) and gradient (3, ...) at points given by arrays of equal shape."""
+        points = _arrays(x, y, z)
+        jet, shape = self.jet(coordinates(points)), points[0].shape
+        return np.broadcast_to(np.asarray(jet.value), shape), stacked(jet.gradient, shape)
 
     def hessian(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array, Array]:
-        """Value (...), gradient (3, ...) and Hessian (6, ...) at points given by arrays of equal shape.
+        """Return value (...), gradient (3, ...) and Hessian (6, ...) at points given by arrays of equal shape.
 
         The order of the second derivatives is xx, xy, xz, yy, yz, zz.
         """
-        return self._derivatives((0.0,) * 6, x, y, z)
-
-    def _derivatives(self, seconds: Numbers, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array, Array]:
-        points = _coordinates(x, y, z)
-        units = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        seeds = [Jet(point, unit, seconds) for point, unit in zip(points, units, strict=True)]
-        with np.errstate(all="ignore"):
-            jet = self._evaluate(self._seeds(seeds))
-        shape = points[0].shape
+        points = _arrays(x, y, z)
+        jet, shape = self.jet(coordinates(points, (0.0,) * 6)), points[0].shape
         value = np.broadcast_to(np.asarray(jet.value), shape)
-        return value, _stacked(jet.gradient, shape), _stacked(jet.hessian[: len(seconds)], shape)
+        return value, stacked(jet.gradient, shape), stacked(jet.hessian, shape)
 
-    def _seeds(self, coordinates: list[Jet]) -> list[Jet]:
-        """The jets of the variables: of X, Y, Z only where they occur. Raises ExpressionError where they mean nothing.
+    def jet(self, x: Sequence[Jet]) -> Jet:
+        """Return the formula's jet from those of x, y and z.
 
-        (x - c) / L has the gradient 1 / L.
+        Raises ExpressionError where X, Y, Z mean nothing.
         """
-        if not self.is_scaled:
-            return coordinates
-        if self.frame is None:
-            raise ExpressionError(
-                f"{_shorten(self.text)!r}: X, Y, Z are scaled by the size of a volume: name it with problem.on(volume)"
-            )
-        scale = np.float64(1.0 / self.frame.length)
-        shifted = [_add(x, Jet(np.float64(-c))) for x, c in zip(coordinates, self.frame.center, strict=True)]
-        return [*coordinates, *(_scale(scale, x) for x in shifted)]
+        variables = list(x)
+        if self.is_scaled:
+            if self.frame is None:
+                raise ExpressionError(
+                    f"{_shorten(self.text)!r}: X, Y, Z are scaled by the size of a volume: name it with "
+                    "problem.on(volume)"
+                )
+            scale = 1.0 / self.frame.length
+            variables += [scale * (c - middle) for c, middle in zip(x, self.frame.center, strict=True)]
+        with np.errstate(all="ignore"):
+            return self._evaluate(variables)
 
 
-def _stacked(rows: Numbers, shape: tuple[int, ...]) -> Array:
-    """Rows, constants among them, as one array (len(rows), *shape)."""
-    full = np.empty((len(rows), *shape))
-    for i, row in enumerate(rows):
-        full[i] = row
-    return full
-
-
-def _coordinates(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> list[Array]:
+def _arrays(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> list[Array]:
     return list(np.broadcast_arrays(*(np.asarray(c, dtype=np.float64) for c in (x, y, z))))
 
 
@@ -307,7 +178,7 @@ class _Translator:
             return self._name(node)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             inner = self._node(node.operand, depth + 1)
-            return lambda p: _scale(-1.0, inner(p))
+            return lambda p: -inner(p)
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
             return self._binary(node, depth)
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
@@ -340,7 +211,9 @@ class _Translator:
 
     def _call(self, node: ast.Call, depth: int) -> Evaluator:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
-            raise self._refuse(node.func, f"not a known function; the functions are {', '.join(FUNCTIONS)}")
+            meant = node.func.id.lower() if isinstance(node.func, ast.Name) else ""
+            remedy = f"write {meant}" if meant in FUNCTIONS else f"the functions are {', '.join(FUNCTIONS)}"
+            raise self._refuse(node.func, f"not a known function; {remedy}")
         if len(node.args) != 1 or node.keywords:
             raise self._refuse(node, f"{node.func.id} takes exactly one argument")
         function, inner = FUNCTIONS[node.func.id], self._node(node.args[0], depth + 1)
@@ -350,21 +223,21 @@ class _Translator:
         left, right = self._node(node.left, depth + 1), self._node(node.right, depth + 1)
         match OPERATORS[type(node.op)]:
             case "+":
-                return lambda p: _add(left(p), right(p))
+                return lambda p: left(p) + right(p)
             case "-":
-                return lambda p: _add(left(p), _scale(-1.0, right(p)))
+                return lambda p: left(p) - right(p)
             case "*":
-                return lambda p: _multiply(left(p), right(p))
+                return lambda p: left(p) * right(p)
             case "/":
-                return lambda p: _multiply(left(p), _raise_to(right(p), -1.0))
+                return lambda p: left(p) / right(p)
             case _:
                 return self._power(node, left, right)
 
     def _power(self, node: ast.BinOp, left: Evaluator, right: Evaluator) -> Evaluator:
         if any(isinstance(part, ast.Name) and part.id in VARIABLES for part in ast.walk(node.right)):
-            return lambda p: _exp(_multiply(right(p), _log(left(p))))  # valid for a positive base
+            return lambda p: left(p) ** right(p)
         with np.errstate(all="ignore"):
             exponent = float(right([]).value)  # no variable in it
         if not abs(exponent) <= MAX_EXPONENT:
             raise self._refuse(node.right, f"the exponent must lie between -{MAX_EXPONENT} and {MAX_EXPONENT}")
-        return lambda p: _raise_to(left(p), exponent)
+        return lambda p: left(p).power(exponent)

@@ -1,0 +1,158 @@
+"""Form: the law of a linear second-order PDE, from which all else follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from parameterize.arrays import Array
+
+from .jets import PAIRS, SYMMETRIC, Jet, Number, coordinates, stacked
+
+ROUNDING = 1e-8  # share of a law's size by which it may differ from a linear or symmetric one
+
+
+Fused = Callable[[Array, Array], None]  # turns fields (c, 4, q_w, q_v) in place, by rows (3, 3, q_w, q_v)
+
+
+class Form:
+    """The law of -div flux(u) + react(u) = f, in weak form
+
+        int flux : grad v + react . v  =  int f . v  +  int_boundary (flux . n) . v    for all tests v.
+
+    Subclass it and write `flux`, and `react` where there is one. Both take NumPy arrays or arrays of jets
+    (`forms.jets`), whose dimensions (...) are none: then the source of an exact solution and the estimate of the error
+    follow. Use arithmetic, indices, `np.stack` and sin, cos, tan, exp, log, sqrt, tanh and abs.
+
+    components: c, of u. symmetric: whether conjugate gradients solve it; else GMRES does.
+    """
+
+    components: int = 1
+    symmetric: bool = True
+    fused: Fused | None = None  # the law on a plane in compiled form, where it has one
+
+    def flux(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return the flux (c, 3, ...), linear in u (c, ...) and its gradient (c, 3, ...), at points x (3, ...)."""
+        raise NotImplementedError(f"{type(self).__name__} must define flux(self, u, grad, x)")
+
+    def react(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return the term (c, ...) without derivatives of the test, linear in u and grad; none here."""
+        return 0.0
+
+    @property
+    def has_reaction(self) -> bool:
+        """Whether the law has a term `react`."""
+        return type(self).react is not Form.react
+
+    def tensor(self, x: Array, component: int = 0) -> Array | None:
+        """Return the symmetric tensor (6, ...) from a component's gradient to its flux: xx, xy, xz, yy, yz, zz.
+
+        A law may return a scalar (...), or None for the identity, instead.
+        """
+        unit = np.zeros((3, self.components, 3, *x.shape[1:]))
+        for i in range(3):
+            unit[i, component, i] = 1.0
+        rows = [self.flux(np.zeros_like(unit[i, :, 0]), unit[i], x)[component] for i in range(3)]
+        return np.stack([0.5 * (rows[i][j] + rows[j][i]) for i, j in PAIRS])
+
+    def mass(self, x: Array, component: int = 0) -> Array:
+        """Return the factor (...) from a component to its reaction."""
+        unit = np.zeros((self.components, *x.shape[1:]))
+        unit[component] = 1.0
+        return reaction(self, unit, np.zeros((self.components, 3, *x.shape[1:])), x)[component]
+
+    def symbol(self, wave: Array, x: Array) -> Array:
+        """Return the least factor (...) by which the law multiplies waves exp(i k . x), k (3, ...)."""
+        columns = []
+        for d in range(self.components):
+            unit = np.zeros((self.components, *wave.shape[1:]))
+            unit[d] = 1.0
+            none = np.zeros_like(unit)
+            flux = self.flux(none, unit[:, None] * wave, x)
+            columns.append((flux * wave).sum(axis=1) + reaction(self, unit, none[:, None] * wave, x))
+        if self.components == 1:
+            return columns[0][0]
+        matrix = np.moveaxis(np.stack(columns), (0, 1), (-2, -1))
+        least: Array = np.linalg.eigvalsh(0.5 * (matrix + matrix.swapaxes(-1, -2)))[..., 0]
+        return least
+
+
+def reaction(form: Form, u: Array, grad: Array, x: Array) -> Array:
+    """Return a law's reaction as an array (c, ...), also where the law returns a number."""
+    return np.broadcast_to(np.asarray(form.react(u, grad, x), dtype=np.float64), u.shape)
+
+
+def strong_terms(form: Form, u: Sequence[Jet], x: Array) -> list[list[Number]]:
+    """Return for each of c functions the terms of -div flux + react at points x (3, ...): arrays (...) or numbers.
+
+    u: their jets, with second derivatives.
+    """
+    values = _objects([Jet(jet.value, jet.gradient, ()) for jet in u], (len(u),))
+    slopes = [
+        Jet(jet.gradient[i], tuple(jet.hessian[place] for place in SYMMETRIC[i]), ()) for jet in u for i in range(3)
+    ]
+    grad, where = _objects(slopes, (len(u), 3)), _objects(coordinates(x), (3,))
+    with np.errstate(all="ignore"):
+        flux = np.asarray(form.flux(values, grad, where), dtype=object)
+        react = np.broadcast_to(np.asarray(form.react(values, grad, where), dtype=object), values.shape)
+    if flux.shape != grad.shape:
+        raise ValueError(f"flux must return shape {grad.shape} on jets of that shape, got {flux.shape}")
+    found = []
+    for row, last in zip(flux, react, strict=True):
+        terms = [-entry.gradient[i] for i, entry in enumerate(row) if isinstance(entry, Jet)]
+        found.append([*terms, last.value if isinstance(last, Jet) else last])
+    return found
+
+
+def strong_form(form: Form, u: Sequence[Jet], x: Array) -> Array:
+    """Return -div flux + react (c, ...); arguments as in `strong_terms`."""
+    return stacked([sum(terms) for terms in strong_terms(form, u, x)], x.shape[1:])
+
+
+def _objects(jets: Sequence[Jet], shape: tuple[int, ...]) -> Any:
+    array = np.empty(len(jets), dtype=object)
+    array[:] = jets
+    return array.reshape(shape)
+
+
+def known_flux(form: Form, u: Sequence[Jet], x: Array) -> Array:
+    """Return the flux (c, 3, ...) of c functions at points x (3, ...); u: their jets."""
+    shape = x.shape[1:]
+    grad = np.stack([stacked(jet.gradient, shape) for jet in u])
+    return np.asarray(form.flux(stacked([jet.value for jet in u], shape), grad, x), dtype=np.float64)
+
+
+def check_law(form: Form, x: Array) -> bool:
+    """Check a law on random arguments at points x (3, m), and return whether it couples u with its gradient.
+
+    Raises ValueError where its results have wrong shapes, are not linear, not symmetric though `symmetric` says so, or
+    where a wave has no positive energy (the Legendre-Hadamard condition): no solver could do anything with it.
+    """
+    c, m, name = form.components, x.shape[1], type(form).__name__
+    rng = np.random.default_rng(0)
+    (u, v), (p, q) = rng.standard_normal((2, c, m)), rng.standard_normal((2, c, 3, m))
+
+    def law(u: Array, grad: Array) -> tuple[Array, Array]:
+        results = []
+        for part, shape in (("flux", (c, 3, m)), ("react", (c, m))):
+            found = np.asarray(getattr(form, part)(u, grad, x))
+            if found.shape != shape and (part == "flux" or found.shape != ()):
+                raise ValueError(f"{name}.{part} must return shape {shape} for u of shape {(c, m)}, got {found.shape}")
+            if found.dtype.kind not in "iuf" or not np.all(np.isfinite(found)):
+                raise ValueError(f"{name}.{part} must return finite real numbers")
+            results.append(np.broadcast_to(found, shape))
+        return results[0], results[1]
+
+    one, two, both = law(u, p), law(v, q), law(2.0 * u - 3.0 * v, 2.0 * p - 3.0 * q)
+    for part, a, b, mixed in zip(("flux", "react"), one, two, both, strict=True):
+        if np.abs(mixed - (2.0 * a - 3.0 * b)).max() > ROUNDING * np.abs([a, b]).max():
+            raise ValueError(f"{name}.{part} must be linear in u and grad")
+    energies = [(a[0] * grad).sum((0, 1)) + (a[1] * w).sum(0) for a, grad, w in ((one, q, v), (two, p, u))]
+    if form.symmetric and np.abs(energies[0] - energies[1]).max() > ROUNDING * np.abs(energies).max():
+        raise ValueError(f"{name} is not symmetric: set `symmetric = False`, and GMRES solves it")
+    wave = v[:, None] * q[0]
+    if not np.all((law(0.0 * u, wave)[0] * wave).sum((0, 1)) > 0.0):
+        raise ValueError(f"{name}.flux must be coercive: flux : grad must be positive for a gradient that is not zero")
+    return bool(np.abs(law(u, 0.0 * p)[0]).max() > 0.0 or np.abs(law(0.0 * u, p)[1]).max() > 0.0)

@@ -1,0 +1,188 @@
+"""Jets: values that carry their derivatives through formulas and laws.
+
+Value, gradient and Hessian follow together by forward automatic differentiation (Griewank and Walther, *Evaluating
+Derivatives*, 2nd ed., chapter 13), so a source -div flux(u) is exact. An array of jets is a NumPy array of objects:
+NumPy's arithmetic and its functions sin, cos, tan, exp, log, sqrt, tanh and abs then act on each jet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from parameterize.arrays import Array
+
+Number = float | Array  # constants stay NumPy scalars (a kind of float): products with 0.0 and 1.0 are then free
+Numbers = tuple[Number, ...]
+Jets = Any  # an array of jets, of dtype object
+PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six second derivatives
+SYMMETRIC = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # place of a symmetric tensor's entry (i, j) among its six
+UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Jet:
+    """A function's value, gradient and Hessian (xx, xy, xz, yy, yz, zz) at the points of an array.
+
+    What is constant is a scalar. Variables seeded without Hessian carry none, and no work is spent on it.
+    """
+
+    value: Number
+    gradient: Numbers = (0.0, 0.0, 0.0)
+    hessian: Numbers = (0.0,) * 6
+
+    def __add__(self, other: Any) -> Any:
+        if (b := _jet(other)) is None:
+            return NotImplemented
+        return Jet(
+            _plus(self.value, b.value), _each(_plus, self.gradient, b.gradient), _each(_plus, self.hessian, b.hessian)
+        )
+
+    def __mul__(self, other: Any) -> Any:
+        """Product rule: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
+        if (b := _jet(other)) is None:
+            return NotImplemented
+
+        def product(da: Number, db: Number) -> Number:
+            return _plus(_times(self.value, db), _times(b.value, da))
+
+        def mixed(second_a: Number, second_b: Number, pair: tuple[int, int]) -> Number:
+            i, j = pair
+            one, two = _times(self.gradient[i], b.gradient[j]), _times(self.gradient[j], b.gradient[i])
+            return _plus(product(second_a, second_b), _plus(one, two))
+
+        hessian = tuple(mixed(*entries) for entries in zip(self.hessian, b.hessian, PAIRS, strict=False))
+        return Jet(self.value * b.value, _each(product, self.gradient, b.gradient), hessian)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self) -> Any:
+        return self * _MINUS
+
+    def __sub__(self, other: Any) -> Any:
+        return NotImplemented if (b := _jet(other)) is None else self + -b
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self + other
+
+    def __truediv__(self, other: Any) -> Any:
+        return NotImplemented if (b := _jet(other)) is None else self * b.power(-1.0)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self.power(-1.0) * other
+
+    def __pow__(self, other: Any) -> Any:
+        if isinstance(other, int | float):
+            return self.power(float(other))
+        return NotImplemented if (b := _jet(other)) is None else (b * self.log()).exp()  # valid for a positive base
+
+    def __rpow__(self, other: Any) -> Any:
+        return NotImplemented if (base := _jet(other)) is None else (self * base.log()).exp()
+
+    def power(self, n: float) -> Jet:
+        """Raise to a constant power; the factors n and n (n - 1) that vanish keep 0 ** negative out."""
+        v = self.value
+        first = n * v ** (n - 1.0) if n != 0.0 else 0.0
+        second = n * (n - 1.0) * v ** (n - 2.0) if n not in (0.0, 1.0) else 0.0
+        return self._chain(v**n, first, second)
+
+    def __abs__(self) -> Jet:
+        """Derivatives hold away from the zeros of the argument; the source of a kink is not a function."""
+        return self._chain(np.abs(self.value), np.sign(self.value), 0.0)
+
+    def sin(self) -> Jet:
+        """Return the sine."""
+        sine = np.sin(self.value)
+        return self._chain(sine, np.cos(self.value), -sine)
+
+    def cos(self) -> Jet:
+        """Return the cosine."""
+        cosine = np.cos(self.value)
+        return self._chain(cosine, -np.sin(self.value), -cosine)
+
+    def tan(self) -> Jet:
+        """Return the tangent."""
+        t = np.tan(self.value)
+        slope = 1.0 + t * t
+        return self._chain(t, slope, 2.0 * t * slope)
+
+    def tanh(self) -> Jet:
+        """Return the hyperbolic tangent."""
+        t = np.tanh(self.value)
+        slope = 1.0 - t * t
+        return self._chain(t, slope, -2.0 * t * slope)
+
+    def exp(self) -> Jet:
+        """Return the exponential."""
+        value = np.exp(self.value)
+        return self._chain(value, value, value)
+
+    def log(self) -> Jet:
+        """Return the natural logarithm."""
+        return self._chain(np.log(self.value), 1.0 / self.value, -1.0 / (self.value * self.value))
+
+    def sqrt(self) -> Jet:
+        """Return the square root."""
+        root = np.sqrt(self.value)
+        return self._chain(root, 0.5 / root, -0.25 / (root * self.value))
+
+    def _chain(self, value: Number, first: Number, second: Number) -> Jet:
+        """Chain rule for h(a) from h, h' and h'' at a: h(a)_ij = h' a_ij + h'' a_i a_j."""
+
+        def entry(second_a: Number, pair: tuple[int, int]) -> Number:
+            i, j = pair
+            return _plus(_times(first, second_a), _times(second, _times(self.gradient[i], self.gradient[j])))
+
+        gradient = tuple(_times(first, da) for da in self.gradient)
+        return Jet(value, gradient, tuple(entry(*entries) for entries in zip(self.hessian, PAIRS, strict=False)))
+
+
+_MINUS = np.float64(-1.0)
+
+
+def _jet(other: Any) -> Jet | None:
+    """Return a number as a jet, a jet as it is, None for anything else."""
+    if isinstance(other, Jet):
+        return other
+    # unlike a Python float, NumPy's overflows to inf and never turns complex
+    return Jet(np.float64(other)) if isinstance(other, int | float | np.integer) else None
+
+
+def _plus(a: Number, b: Number) -> Number:
+    if isinstance(a, float) and a == 0.0:
+        return b
+    return a if isinstance(b, float) and b == 0.0 else a + b
+
+
+def _times(a: Number, b: Number) -> Number:
+    for known, other in ((a, b), (b, a)):
+        if isinstance(known, float) and known in (0.0, 1.0):
+            return 0.0 if known == 0.0 else other
+    return a * b
+
+
+def _each(operation: Callable[[Number, Number], Number], a: Numbers, b: Numbers) -> Numbers:
+    """Apply an operation entry by entry; the shorter row, a Hessian left out, decides how many there are."""
+    return tuple(operation(*entries) for entries in zip(a, b, strict=False))
+
+
+def jets_of(values: Array, gradients: Array, hessians: Array) -> list[Jet]:
+    """Return the jets of c functions from arrays (c, ...), (c, 3, ...) and (c, 6, ...)."""
+    rows = zip(values, gradients, hessians, strict=True)
+    return [Jet(value, tuple(gradient), tuple(hessian)) for value, gradient, hessian in rows]
+
+
+def coordinates(x: Sequence[Array] | Array, hessian: Numbers = ()) -> list[Jet]:
+    """Return the jets of x, y, z at points (3, ...); with second derivatives where `hessian` is six zeros."""
+    return [Jet(row, unit, hessian) for row, unit in zip(x, UNITS, strict=True)]
+
+
+def stacked(rows: Sequence[Number], shape: tuple[int, ...]) -> Array:
+    """Return rows, constants among them, as one array (len(rows), *shape)."""
+    full = np.empty((len(rows), *shape))
+    for i, row in enumerate(rows):
+        full[i] = row
+    return full

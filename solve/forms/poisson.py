@@ -1,0 +1,139 @@
+"""Poisson: the law and the data of -div(kappa grad u) + c u = f."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from parameterize.arrays import Array
+
+from ..field import SplineField
+from .data import Data, Datum, Scalar, demand
+from .form import Form
+from .jets import PAIRS, SYMMETRIC, Jet
+from .problem import BoundaryValueProblem
+
+DEFAULT_EXACT = "exp(X+Z)*sin(Y)"  # the paper's solution (section 5.5), at volume 1: it means the same in any unit
+
+
+@dataclass(frozen=True)
+class Poisson(BoundaryValueProblem, Form):
+    """-div(kappa grad u) + c u = f in the volume's own coordinates, with data on the images of the cube's six faces.
+
+    Each entry is a formula, a function of three arrays x, y, z of equal shape, or a field on the same volume
+    (`solution.field`). A formula knows x, y, z, in the volume's units, and X, Y, Z, the same scaled to volume 1 about
+    the middle of the volume's bounding box (`frame.UnitFrame`): X = (x - c_x) / V^(1/3).
+    exact: the solution, where it is known; DEFAULT_EXACT where neither it nor source nor boundary is given. As a
+        formula it gives source and boundary data, and the report's errors; a function needs them beside it, and leaves
+        the H1 seminorm out, for its derivatives are unknown.
+    source: f; overrides the one that follows from `exact`.
+    boundary: values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
+    kappa: a scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz or nine by rows; default 1.
+        Positive definite.
+    reaction: c, not negative; default 0.
+    neumann: face name ("u0", "u1", "v0", "v1", "w0", "w1") -> kappa grad u . n, n the outward unit normal.
+    robin: face name -> (alpha, g) of kappa grad u . n + alpha u = g; alpha not negative.
+        None in place of Neumann's data or of Robin's g: from `exact`.
+
+    Where no face and no reaction fix the solution's constant, its mean is that of `exact`, or zero.
+    Raises ExpressionError for a formula that is refused, ValueError where data cannot be known or do not fit.
+    """
+
+    exact: Data | None = None
+    source: Data | None = None
+    boundary: Data | None = None
+    kappa: Data | None = None
+    reaction: Scalar | None = None
+    neumann: Mapping[str, Data | None] = field(default_factory=dict)
+    robin: Mapping[str, tuple[Data, Data | None]] = field(default_factory=dict)
+
+    of_coordinates = True
+
+    def __post_init__(self) -> None:
+        if self.exact is None and self.source is None and self.boundary is None:
+            object.__setattr__(self, "exact", DEFAULT_EXACT)
+        given = {role: getattr(self, role) for role in ("exact", "source", "boundary", "reaction")}
+        self._set({**given, "kappa": _six(self.kappa)}, self.neumann, self.robin)
+
+    @property
+    def form(self) -> Form:  # type: ignore[override]
+        """The problem is its own law."""
+        return self
+
+    def _components(self, role: str) -> int:
+        kappa = _six(self.kappa)
+        return 6 if role == "kappa" and isinstance(kappa, list) and len(kappa) == 6 else 1
+
+    def flux(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return kappa grad u."""
+        if "kappa" not in self._data:
+            return grad
+        kappa = _coefficient(self._data["kappa"], x)
+        if len(kappa) == 1:
+            return kappa[0] * grad
+        rows = [sum(kappa[SYMMETRIC[i][j]] * grad[:, j] for j in range(3)) for i in range(3)]
+        return np.stack(rows, axis=1)
+
+    def react(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return c u."""
+        return _coefficient(self._data["reaction"], x)[0] * u if self.has_reaction else 0.0
+
+    @property
+    def has_reaction(self) -> bool:
+        """Whether there is a term c u."""
+        return "reaction" in self._data
+
+    @property
+    def not_differentiable(self) -> str:
+        """Why the derivatives of kappa, or the values of c on jets, are unknown; "" where they are known."""
+        if "kappa" in self._data and not self._data["kappa"].is_formula:
+            return "kappa is a function or a field, whose derivatives are unknown"
+        return "reaction is a field" if isinstance(self.reaction, SplineField) else ""
+
+    def tensor(self, x: Array, component: int = 0) -> Array | None:
+        """Return kappa: None for the identity, (...) or (6, ...). Raises ExpressionError where it is not positive."""
+        if "kappa" not in self._data:
+            return None
+        found = self._data["kappa"](x)
+        if len(found) == 1:
+            demand(found[0] > 0.0, "kappa", "positive", x)
+            return found[0]
+        xx, xy, xz, yy, yz, zz = found
+        minor = xx * yy - xy * xy
+        determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+        demand((xx > 0.0) & (minor > 0.0) & (determinant > 0.0), "kappa", "positive definite", x)
+        return found
+
+    def mass(self, x: Array, component: int = 0) -> Array:
+        """Return the reaction c. Raises ExpressionError where it is negative."""
+        found: Array = self._data["reaction"](x)[0] if self.has_reaction else np.zeros(x.shape[1:])
+        demand(found >= 0.0, "reaction", "zero or positive", x)
+        return found
+
+
+def _six(kappa: Data | None) -> Data | None:
+    """Return the six entries of a symmetric tensor in place of its nine. Raises ValueError for any other number."""
+    if kappa is None or not isinstance(kappa, Sequence) or isinstance(kappa, str):
+        return kappa
+    entries = list(kappa)
+    if len(entries) == 9:
+        if any(entries[3 * i + j] != entries[3 * j + i] for i, j in PAIRS):
+            raise ValueError("kappa is not symmetric: its entries above and below the diagonal must be the same")
+        entries = [entries[3 * i + j] for i, j in PAIRS]
+    if len(entries) not in (1, 6):
+        raise ValueError(
+            f"kappa has {len(entries)} entries: give one, the six xx, xy, xz, yy, yz, zz of a symmetric tensor, or nine"
+        )
+    return entries
+
+
+def _coefficient(datum: Datum, x: Any) -> Any:
+    """Return a coefficient (c, ...) at points, or on jets: there a function's derivatives are not numbers."""
+    if x.dtype != object:
+        return datum(x)
+    if datum.is_formula:
+        return datum.jets(list(x))
+    return [Jet(value, (np.nan,) * 3, ()) for value in datum(np.stack(np.broadcast_arrays(*(jet.value for jet in x))))]
