@@ -73,6 +73,7 @@ class System:
     faces: Mapping[str, FaceMass]  # Robin's terms
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
+    right: Array  # b as an array of the free coefficients' shape
     threads: int
     setup: float  # process seconds
 
@@ -115,29 +116,18 @@ class System:
         """(c, m_u, m_v, m_w) of the free coefficients."""
         return self.known[self.window].shape
 
-    @cached_property
-    def right(self) -> Array:
-        """B as an array of the free coefficients' shape."""
-        right = (self.assembled.load - self._apply(self.known))[self.window]
-        return balanced(right) if self.blocks[0].singular else right
-
     def multiply(self, free: Array) -> Array:
         """Return A times the free coefficients (c, m_u, m_v, m_w)."""
         if not self.faces:
             return self.assembled.operator.apply_free(free)
         full = np.zeros(self.known.shape)
         full[self.window] = free
-        return self._apply(full)[self.window]
-
-    def _apply(self, coefficients: Array) -> Array:
-        result = self.assembled.operator.apply(coefficients)
-        for face in self.faces.values():
-            for component, total in zip(coefficients, result, strict=True):
-                face.add_product(component, total)
-        return result
+        return apply_all(self.assembled, self.faces, full)[self.window]
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
+        if len(self.blocks) == 1:
+            return self.blocks[0](residual)
         return np.stack([block(part) for block, part in zip(self.blocks, residual, strict=True)])
 
     def _linear(self, apply: Callable[[Array], Array]) -> LinearOperator:
@@ -231,7 +221,19 @@ def build(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpac
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
                 "solution open: give one face to boundary or robin"
             )
-        return System(volume, problem, space, assembled, faces, known, inverses, threads, time.process_time() - start)
+        right = (assembled.load - apply_all(assembled, faces, known))[:, *operator.window]
+        right = balanced(right) if inverses[0].singular else right
+        setup = time.process_time() - start
+    return System(volume, problem, space, assembled, faces, known, inverses, right, threads, setup)
+
+
+def apply_all(assembled: Assembled, faces: Mapping[str, FaceMass], coefficients: Array) -> Array:
+    """Return operator and Robin's terms times coefficients (c, n_u, n_v, n_w)."""
+    result = assembled.operator.apply(coefficients)
+    for face in faces.values():
+        for component, total in zip(coefficients, result, strict=True):
+            face.add_product(component, total)
+    return result
 
 
 def assemble_data(

@@ -5,11 +5,13 @@ Projection instead of interpolation at Greville points lowers the L2 error of th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation, gauss_points
@@ -35,47 +37,56 @@ def boundary_coefficients(
     6 faces follow one another; each takes up what the smaller ones have fixed.
     """
     coefficients = np.zeros((components, *space.shape))
+    directions = [_Direction.of(knots, degree) for knots, degree in zip(space.knots, space.degrees, strict=True)]
     for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
         if any(FACE_NAMES[2 * axis + side] in faces for axis, side in enumerate(entity) if side is not FREE):
-            _project(volume, space, values, entity, coefficients)
+            _project(volume, directions, values, entity, coefficients)
     return coefficients
 
 
+class _Direction(NamedTuple):
+    """Gauss points (q,) of one direction, its functions there, and those that vanish at both ends.
+
+    basis: (q, n). inner: (q, n - 2), weights included. mass: the Cholesky factor of the inner functions' mass matrix.
+    """
+
+    points: Array
+    basis: csr_array
+    inner: Array
+    mass: tuple[Array, bool]
+
+    @classmethod
+    def of(cls, knots: Array, degree: int) -> _Direction:
+        points, weights = (part.ravel() for part in gauss_points(knots, degree + 2))
+        basis = collocation(knots, degree, points)
+        inside = basis[:, 1:-1].toarray()
+        inner = weights[:, None] * inside
+        return cls(points, basis, inner, cho_factor(inner.T @ inside))
+
+    def project(self, field: Array, axis: int) -> Array:
+        """Return the L2 projection along one axis: of length q, it becomes one of length n - 2."""
+        moved = np.moveaxis(field, axis, 0)
+        right = self.inner.T @ moved.reshape(moved.shape[0], -1)
+        return np.moveaxis(cho_solve(self.mass, right).reshape(-1, *moved.shape[1:]), 0, axis)
+
+
 def _project(
-    volume: BSplineVolume, space: TrialSpace, values: Callable[[Array], Array], entity: Entity, coefficients: Array
+    volume: BSplineVolume,
+    directions: Sequence[_Direction],
+    values: Callable[[Array], Array],
+    entity: Entity,
+    coefficients: Array,
 ) -> None:
     """Fill the coefficients that belong to the inside of one corner, edge or face."""
-    points, rows = [], []
-    face: list[slice] = []  # the coefficients on the closed entity: its ends are fixed already
-    inside: list[slice] = []
-    for knots, degree, side in zip(space.knots, space.degrees, entity, strict=True):
-        if side is FREE:
-            nodes, weights = (part.ravel() for part in gauss_points(knots, degree + 2))
-            face.append(slice(None))
-            inside.append(slice(1, -1))
-        else:
-            nodes, weights = np.array([float(side)]), np.ones(1)
-            face.append(slice(0, 1) if side == 0 else slice(-1, None))
-            inside.append(face[-1])
-        points.append(nodes)
-        rows.append(weights)
     free = [a for a in range(3) if entity[a] is FREE]
-    bases = {a: collocation(space.knots[a], space.degrees[a], points[a]) for a in free}
-    fixed = coefficients[:, *face]
+    u, v, w = (directions[a].points if side is FREE else np.array([float(side)]) for a, side in enumerate(entity))
+    ends = [slice(None) if side is FREE else slice(-side, 1 - side or None) for side in entity]
+    inside = [slice(1, -1) if side is FREE else end for side, end in zip(entity, ends, strict=True)]
+    residual = values(Points.of(np.moveaxis(volume.grid(u, v, w), -1, 0), (u, v, w)))  # (c, q_u, q_v, q_w)
+    fixed = coefficients[:, *ends]  # on the closed entity: its own ends are known already
     for a in free:
-        fixed = apply_along(bases[a], fixed, a + 1)
-    u, v, w = points
-    where = np.moveaxis(volume.grid(u, v, w), -1, 0)  # (3, q_u, q_v, q_w)
-    residual = values(Points.of(where, points)) - fixed
+        fixed = apply_along(directions[a].basis, fixed, a + 1)
+    residual = residual - fixed
     for a in free:
-        residual = _solve_mass(bases[a][:, 1:-1].toarray(), rows[a], residual, a + 1)
+        residual = directions[a].project(residual, a + 1)
     coefficients[:, *inside] = residual
-
-
-def _solve_mass(basis: Array, weights: Array, field: Array, axis: int) -> Array:
-    """L2 projection along one axis: basis (q, n); the axis of length q becomes one of length n."""
-    weighted = weights[:, None] * basis
-    moved = np.moveaxis(field, axis, 0)
-    right = weighted.T @ moved.reshape(moved.shape[0], -1)
-    solved = cho_solve(cho_factor(weighted.T @ basis), right)
-    return np.moveaxis(solved.reshape(-1, *moved.shape[1:]), 0, axis)

@@ -65,6 +65,10 @@ class Operator:
     def _spans(self) -> tuple[SpanTable, SpanTable, SpanTable]:
         return span_tables(self.space, self.tables)
 
+    @cached_property
+    def _pieces(self) -> tuple[list[IntArray], list[IntArray]]:
+        return colours(self.tables[0].first, self.space.degrees[0])
+
     def apply(self, coefficients: Array) -> Array:
         """Return the product with coefficients of shape `space.shape`, those that are not free included."""
         return self._multiply(coefficients, (0, 0, 0))
@@ -80,7 +84,7 @@ class Operator:
         packed = np.zeros((n_u, -(-n_w // product.ROWS), n_v, product.ROWS))
         total, box = np.zeros_like(packed), values.shape[-3:]
         product.pack(values.reshape(box), *start, packed)
-        for pieces in colours(self.tables[0].first, self.space.degrees[0]):
+        for pieces in self._pieces:
             in_parallel(lambda points: self.multiply_planes(points, packed, total), pieces, self.threads)
         result = np.empty(box)
         product.unpack(total, *start, result)
@@ -114,7 +118,7 @@ class Operator:
                     twice = 2.0 if len(set(pair)) == 2 else 1.0
                     result[window] += twice * np.multiply.outer(in_u[q], plane)
 
-        for pieces in colours(u.first, self.space.degrees[0]):
+        for pieces in self._pieces:
             in_parallel(add, pieces, self.threads)
         return result
 
