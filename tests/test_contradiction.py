@@ -2,7 +2,7 @@
 
 import pytest
 
-from solve import Poisson, benchmark_volume, solve_problem
+from solve import Elasticity, Poisson, benchmark_volume, solve_problem
 from solve.contradiction import contradictions
 
 VOLUME = benchmark_volume(4)
@@ -22,6 +22,17 @@ def test_data_that_contradict_the_exact_solution_are_named(data, notice):
     notices = solve_problem(VOLUME, Poisson(**data)).report.notices
     assert len(notices) == 1
     assert notices[0].startswith(notice)
+
+
+def test_force_and_displacement_that_contradict_are_named():
+    body = Elasticity(exact=("x*x", "y", "0"), force=("1", "0", "0"), displacement=("x", "y", "0"))
+    notices = solve_problem(VOLUME, body).report.notices
+    assert notices == (
+        f"force is not that of exact: {TWO_PROBLEMS}",
+        f"displacement differs from exact: {TWO_PROBLEMS}",
+    )
+    fits = Elasticity(exact=("x*x", "y", "0"), force=(str(-2.0 * 3.5 / 2.6), "0", "0"))  # -2 (lambda + 2 mu), nu = 0.3
+    assert contradictions(VOLUME, fits) == ()
 
 
 @pytest.mark.parametrize(

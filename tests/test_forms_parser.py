@@ -165,6 +165,11 @@ def test_errors_name_the_place(text, place):
     assert place in str(caught.value)
 
 
+def test_functions_in_capitals_are_named():
+    with pytest.raises(ExpressionError, match="'Sin': not a known function; write sin"):
+        Expression("2*Sin(x)")
+
+
 def test_messages_stay_short_and_on_one_line():
     with pytest.raises(ExpressionError) as caught:
         Expression("+".join(["x"] * 400))

@@ -48,6 +48,25 @@ def test_coefficients_and_fluxes_that_do_not_vary_are_named_and_the_numbers_hold
     assert "means nothing here" in notices
 
 
+FLUX = "exp(0-(x+134)**2)"
+
+
+@pytest.mark.parametrize("data", [{"neumann": {"u0": FLUX}}, {"robin": {"u0": ("1", FLUX)}}])
+def test_data_of_a_face_are_judged_there(data):
+    """The flux is 1 at a corner of u1, where it does not act, and underflows on u0, where it does."""
+    report, notices = said(MILLIMETRES, Poisson(source="1", **data))
+    assert f"{FLUX!r} runs from 0 to 0 on face u0: it underflows" in notices and report.meaningful
+    body = Elasticity(force=("0", "0", "1"), traction={"u0": (FLUX, "0", "0")})
+    assert f"traction u0 {FLUX!r} runs from 0 to 0" in " ".join(solve_problem(MILLIMETRES, body).report.notices)
+
+
+def test_data_may_be_constant_on_a_face_because_it_is_flat():
+    """On x = 0 the formulas are 0 and 7 by intent: nothing else of them varies there."""
+    box = benchmark_volume(2, amplitude=0.0)
+    _, notices = said(box, Poisson(source="1", neumann={"u0": "x*y", "v1": "7*y"}, robin={"w1": ("Z+1", "z")}))
+    assert notices == ""
+
+
 def test_an_estimate_of_a_solution_not_resolved_is_named():
     report, notices = said(MILLIMETRES, Poisson(source="sin(x)"))
     assert report.error_estimate_relative > 0.5 and not report.meaningful

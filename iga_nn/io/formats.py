@@ -175,6 +175,8 @@ def _load_solution(path: Path, volume: BSplineVolume, section: tuple[str, dict[s
 
     with input_errors():
         field = SplineField.load(path)
+    if field.coefficients.shape[3:] not in ((), (3,)):
+        raise InputError(f"{path}: coefficients must have shape (m_u, m_v, m_w) or (.., 3)")
     if not all(np.isin(own, finer).all() for own, finer in zip(volume.knots, field.knots, strict=True)):
         raise InputError(f"{path}: belongs to another volume: its knots are not those of the map, refined")
     there = _mesh_size(section[1], field) if section else None

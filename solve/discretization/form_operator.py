@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -58,9 +58,13 @@ class FormOperator:
                 for field, total in zip(fields, result, strict=True):
                     kernels.spread_plane(field, u.first[q], weights, *v, *w, self.form.has_reaction, total)
 
-        for pieces in colours(u.first, self.space.degrees[0]):
+        for pieces in self._pieces:
             in_parallel(add, pieces, self.threads)
         return result
+
+    @cached_property
+    def _pieces(self) -> tuple[list[IntArray], list[IntArray]]:
+        return colours(self.tables[0].first, self.space.degrees[0])
 
     def _laws(self, points: IntArray) -> Iterator[tuple[int, Array, Fused]]:
         """Yield q, R and what turns values and gradients by the parameters into reactions and fluxes, in place."""
@@ -98,7 +102,7 @@ class FormOperator:
                 if self.form.has_reaction:
                     factors[:, :, 6] = to_blocks(self.form.mass(x, component) * measure)
 
-        for pieces in colours(self.tables[0].first, self.space.degrees[0]):
+        for pieces in self._pieces:
             in_parallel(fill, pieces, self.threads)
         return operator
 

@@ -17,15 +17,15 @@ LANES = 32  # points of direction v in a block of factors
 
 
 @compiled
-def contract_uv(
-    coefficients: Array, first_u: int, u: Array, first_v: IntArray, v: Array, planes: Array, out: Array
+def evaluate_plane(
+    coefficients: Array, first_u: int, u: Array, first_v: IntArray, v: Array, first_w: IntArray, w: Array, out: Array
 ) -> None:
-    """Contract directions u and v: out (3, n_w, q_v) = value, u derivative, v derivative.
+    """Evaluate a spline and its parametric gradient on a plane: out (4, q_w, q_v) = value, d/du, d/dv, d/dw.
 
-    u: (2, degree_u + 1) at the one point; planes (2, n_v, n_w) is workspace.
+    u: (2, degree_u + 1) at the one point.
     """
-    _, n_v, n_w = planes.shape
-    planes[:] = 0.0
+    _, n_v, n_w = coefficients.shape
+    planes = np.zeros((2, n_v, n_w))
     for i in range(u.shape[1]):
         value, slope = u[0, i], u[1, i]
         for j in range(n_v):
@@ -33,7 +33,7 @@ def contract_uv(
             for k in range(n_w):
                 row[k] += value * source[k]
                 row_u[k] += slope * source[k]
-    rows = np.empty((3, n_w))
+    lines, rows = np.empty((3, n_w, v.shape[1])), np.empty((3, n_w))
     row, row_u, row_v = rows[0], rows[1], rows[2]
     for q in range(v.shape[1]):
         rows[:] = 0.0
@@ -45,17 +45,7 @@ def contract_uv(
                 row_u[k] += value * plane_u[k]
                 row_v[k] += slope * plane[k]
         for k in range(n_w):
-            out[0, k, q], out[1, k, q], out[2, k, q] = row[k], row_u[k], row_v[k]
-
-
-@compiled
-def evaluate_plane(
-    coefficients: Array, first_u: int, u: Array, first_v: IntArray, v: Array, first_w: IntArray, w: Array, out: Array
-) -> None:
-    """A spline and its parametric gradient on a plane: out (4, q_w, q_v) = value, d/du, d/dv, d/dw."""
-    _, n_v, n_w = coefficients.shape
-    lines = np.empty((3, n_w, v.shape[1]))
-    contract_uv(coefficients, first_u, u, first_v, v, np.empty((2, n_v, n_w)), lines)
+            lines[0, k, q], lines[1, k, q], lines[2, k, q] = row[k], row_u[k], row_v[k]
     out[:] = 0.0
     for q in range(w.shape[1]):
         row, row_u, row_v, row_w = out[0, q], out[1, q], out[2, q], out[3, q]
@@ -220,7 +210,7 @@ def spread_plane(
     _, n_v, n_w = result.shape
     lines = np.zeros((3, n_w, v.shape[1]))
     for q in range(w.shape[1]):
-        row, row_u, row_v, row_w = field[0, q], field[1, q], field[2, q], field[3, q]
+        row_u, row_v, row_w = field[1, q], field[2, q], field[3, q]
         for k in range(w.shape[2]):
             value, slope, at = w[0, q, k], w[1, q, k], first_w[q] + k
             line, line_u, line_v = lines[0, at], lines[1, at], lines[2, at]
@@ -228,9 +218,12 @@ def spread_plane(
                 line[m] += slope * row_w[m]
                 line_u[m] += value * row_u[m]
                 line_v[m] += value * row_v[m]
-            if has_value:
-                for m in range(row_u.size):
-                    line[m] += value * row[m]
+    for q in range(w.shape[1] if has_value else 0):
+        row = field[0, q]
+        for k in range(w.shape[2]):
+            line, value = lines[0, first_w[q] + k], w[0, q, k]
+            for m in range(row.size):
+                line[m] += value * row[m]
     planes = np.zeros((2, n_v, n_w))
     for q in range(v.shape[1]):
         for j in range(v.shape[2]):

@@ -72,6 +72,7 @@ class Datum:
         parts = []
         for entry in self.entries:
             found = np.asarray(_evaluate(entry, x), dtype=np.float64)
+            found = found[0] if found.shape == (1, *each) else found  # one component, written as (c, ...)
             try:
                 full = np.broadcast_to(found, each)
             except ValueError:

@@ -111,11 +111,6 @@ class BoundaryValueProblem:
         return self._natural
 
     @property
-    def mixed(self) -> tuple[str, ...]:
-        """The faces with Robin's condition."""
-        return self._robin
-
-    @property
     def not_differentiable(self) -> str:
         """Why the derivatives of the law's coefficients are unknown; "" where they are known."""
         try:
