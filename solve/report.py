@@ -11,6 +11,11 @@ from .estimate import Estimate
 NORMS = ("l2_relative", "l2", "h1_relative", "h1_seminorm", "error_estimate_relative", "error_estimate")  # as shown
 
 
+def _known(part: str, norm: str) -> property:
+    """Return a property: a norm of a report's errors or estimate, None where it is unknown."""
+    return property(lambda report: getattr(getattr(report, part), norm, None))
+
+
 @dataclass(frozen=True)
 class SolveReport:
     """One entry of `poisson.levels` in report.json.
@@ -18,7 +23,8 @@ class SolveReport:
     elements, dofs: totals; the unknowns fixed by boundary data count as dofs.
     h: longest straight edge of a mapped element, in the volume's units.
     errors: the norms, None without an exact solution; `l2_relative`, `l2`, `h1_relative` and `h1_seminorm` are its.
-    estimate: of the L2 error, from the residual; where there is no exact solution, or on request.
+    estimate: of the L2 error, from the residual, where there is no exact solution, or on request; `error_estimate` and
+        `error_estimate_relative` are its.
     residual: |r| / |b| at the end; residuals: the same before the first and after every iteration.
     seconds: process CPU seconds of setup, solve and errors.
     notices: what the reader of these numbers must know, one line each.
@@ -38,35 +44,12 @@ class SolveReport:
     meaningful: bool = True
     residuals: tuple[float, ...] = field(default=(), repr=False)
 
-    @property
-    def l2(self) -> float | None:
-        """L2 norm of the error."""
-        return self.errors.l2 if self.errors else None
-
-    @property
-    def l2_relative(self) -> float | None:
-        """L2 norm of the error over that of the exact solution; None where the latter is zero."""
-        return self.errors.l2_relative if self.errors else None
-
-    @property
-    def h1_relative(self) -> float | None:
-        """H1 seminorm of the error over that of the exact solution; None where the latter is zero or unknown."""
-        return self.errors.h1_relative if self.errors else None
-
-    @property
-    def h1_seminorm(self) -> float | None:
-        """L2 norm of the error's gradient; None where the exact gradient is unknown."""
-        return self.errors.h1_seminorm if self.errors else None
-
-    @property
-    def error_estimate(self) -> float | None:
-        """Estimated L2 norm of the error."""
-        return self.estimate.l2 if self.estimate else None
-
-    @property
-    def error_estimate_relative(self) -> float | None:
-        """The same over the L2 norm of the solution; None where the latter is zero."""
-        return self.estimate.l2_relative if self.estimate else None
+    l2 = _known("errors", "l2")
+    l2_relative = _known("errors", "l2_relative")
+    h1_relative = _known("errors", "h1_relative")
+    h1_seminorm = _known("errors", "h1_seminorm")
+    error_estimate = _known("estimate", "l2")
+    error_estimate_relative = _known("estimate", "l2_relative")
 
     def as_dict(self) -> dict[str, Any]:
         """The entry as report.json holds it; errors that are not known are absent."""

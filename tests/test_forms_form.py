@@ -10,7 +10,6 @@ from parameterize.spline.volume import FACE_NAMES
 from solve import benchmark_volume, convergence, solve_problem
 from solve.field import Points
 from solve.forms.form import check_law
-from solve.forms.jets import Jet
 
 WAVE = "exp(x+z)*sin(y)"
 MATRIX = np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.2], [0.0, 0.2, 3.0]])
@@ -203,11 +202,3 @@ def test_problems_are_pickled():
     for problem in (iga_nn.Poisson(kappa="1+X*X"), iga_nn.Elasticity(exact=("x", "Y", "0")), PROBLEMS["drift"]):
         there = pickle.loads(pickle.dumps(problem))
         assert np.array_equal(solve_problem(volume, there).coefficients, solve_problem(volume, problem).coefficients)
-
-
-def test_jets_mix_with_numbers_and_arrays():
-    """(2 / (3 - x))^2 - x^x + 2 - x at x = 1: first derivatives 8 / (3 - x)^3 = 1, log x + 1 = 1 and -1."""
-    x = Jet(np.ones(1), (np.ones(1), 0.0, 0.0))
-    jet = (np.float64(2.0) / (3 - x)) ** 2 - x**x + np.array([0.0, 1.0]) @ np.array([x, 2 - x])
-    assert jet.value == pytest.approx(1.0) and jet.gradient[0] == pytest.approx(-1.0)
-    assert jet.hessian[0] == pytest.approx(24.0 / 16.0 - 2.0)
