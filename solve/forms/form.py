@@ -117,13 +117,6 @@ def _objects(jets: Sequence[Jet], shape: tuple[int, ...]) -> Any:
     return array.reshape(shape)
 
 
-def known_flux(form: Form, u: Sequence[Jet], x: Array) -> Array:
-    """Return the flux (c, 3, ...) of c functions at points x (3, ...); u: their jets."""
-    shape = x.shape[1:]
-    grad = np.stack([stacked(jet.gradient, shape) for jet in u])
-    return np.asarray(form.flux(stacked([jet.value for jet in u], shape), grad, x), dtype=np.float64)
-
-
 def check_law(form: Form, x: Array) -> bool:
     """Check a law on random arguments at points x (3, m), and return whether it couples u with its gradient.
 

@@ -186,3 +186,12 @@ def stacked(rows: Sequence[Number], shape: tuple[int, ...]) -> Array:
     for i, row in enumerate(rows):
         full[i] = row
     return full
+
+
+def known(jets: Sequence[Jet], shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return values (c, *shape) and gradients (c, 3, *shape) of c jets as arrays."""
+    gradients = np.empty((len(jets), 3, *shape))
+    for rows, jet in zip(gradients, jets, strict=True):
+        for row, slope in zip(rows, jet.gradient, strict=True):
+            row[...] = slope
+    return stacked([jet.value for jet in jets], shape), gradients

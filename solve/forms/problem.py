@@ -13,9 +13,9 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .data import Data, Datum, check_faces, demand, finite, parse
-from .form import Form, known_flux, strong_form, strong_terms
+from .form import Form, strong_form, strong_terms
 from .frame import UnitFrame
-from .jets import Jet, coordinates, stacked
+from .jets import Jet, coordinates, known
 from .parser import Expression
 
 Natural = Mapping[str, Data | None]
@@ -171,7 +171,8 @@ class BoundaryValueProblem:
         return alpha, self._flux_of_exact(role, x, normal) + alpha * self._data["exact"](x)
 
     def _flux_of_exact(self, role: str, x: Array, normal: Array) -> Array:
-        flux = known_flux(self.form, self._data["exact"].jets(coordinates(np.asarray(x))), x)
+        u, grad = known(self._data["exact"].jets(coordinates(np.asarray(x))), x.shape[1:])
+        flux = np.asarray(self.form.flux(u, grad, x), dtype=np.float64)
         return finite(f"{self.label(role)} (from exact)", (flux * normal).sum(axis=1), x, self._first_formula)
 
     def exact_at(self, x: Array) -> tuple[Array, Array | None]:
@@ -179,9 +180,8 @@ class BoundaryValueProblem:
         exact = self._data["exact"]
         if not exact.is_formula:
             return exact(x), None
-        jets, shape = exact.jets(coordinates(np.asarray(x))), x.shape[1:]
-        value = finite("exact", stacked([jet.value for jet in jets], shape), x, self._first_formula)
-        gradient = np.stack([stacked(jet.gradient, shape) for jet in jets])
+        value, gradient = known(exact.jets(coordinates(np.asarray(x))), x.shape[1:])
+        finite("exact", value, x, self._first_formula)
         return value, finite("gradient of exact", gradient, x, self._first_formula)
 
     @property
