@@ -68,9 +68,9 @@ from .forms.poisson import Poisson
 from .forms.problem import Problem
 from .report import SolveReport
 from .solution import Solution
-from .solver import check_device, check_problem, discretize, solve_problem
+from .solver import check_problem, discretize, solve_problem
 from .study import ConvergenceRow, benchmark_volume, convergence, rates
-from .system import System
+from .system import System, check_device
 
 __all__ = [
     "ConvergenceError",

@@ -22,10 +22,8 @@ from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .options import SolverOptions
 from .solution import Solution
-from .system import MassForm, System, assemble_data, build
+from .system import MassForm, System, assemble_data, build, check_device
 from .threads import checked_threads
-
-DEVICES = ("cpu", "cuda")
 
 log = logging.getLogger(__name__)
 
@@ -84,20 +82,6 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem) -> None:
     if problem.exact is not None:
         for _, _, x in map_planes(volume, rule):
             problem.exact_at(x)
-
-
-def check_device(device: str, problem: BoundaryValueProblem) -> None:
-    """Raise ValueError for a device that is unknown or absent, or that cannot solve the problem."""
-    if device not in DEVICES:
-        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
-    if device != "cpu":
-        if not isinstance(problem, Poisson):
-            raise ValueError(f"{type(problem).__name__.lower()} runs on device='cpu' only, got device={device!r}")
-        if problem.robin:
-            raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
-        from .linear.cuda import check_available  # torch comes in here only
-
-        check_available(device)
 
 
 def _check_types(volume: object, problem: object) -> None:

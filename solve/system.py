@@ -28,6 +28,7 @@ from .estimate import error_estimate
 from .failure import announce, solve_notices
 from .field import Points, SplineField
 from .forms.form import Form, check_law
+from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .linear.cg import LinearResult, conjugate_gradients
 from .linear.gmres import generalized_residuals
@@ -38,7 +39,22 @@ from .report import SolveReport
 from .solution import Solution
 from .threads import one_blas_thread
 
+DEVICES = ("cpu", "cuda")
 SAMPLES = (0.07, 0.35, 0.62, 0.91)  # parameters a direction at which a user's law is checked
+
+
+def check_device(device: str, problem: BoundaryValueProblem) -> None:
+    """Raise ValueError for a device that is unknown or absent, or that cannot solve the problem."""
+    if device not in DEVICES:
+        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
+    if device != "cpu":
+        if not isinstance(problem, Poisson):
+            raise ValueError(f"{type(problem).__name__.lower()} runs on device='cpu' only, got device={device!r}")
+        if problem.robin:
+            raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
+        from .linear.cuda import check_available  # torch comes in here only
+
+        check_available(device)
 
 
 class MassForm(Form):
@@ -63,7 +79,8 @@ class System:
 
     A vector (N,) holds the free coefficients in C order of (c, m_u, m_v, m_w): components, and functions a direction,
     those that Dirichlet data fix left out. `operator`, `mass` and `preconditioner` are SciPy LinearOperators (N, N),
-    `load` is b, (N,), `field` makes a spline of x, `solve` a Solution with its report.
+    `load` is b, (N,), `field` makes a spline of a vector and `vector` a vector of a spline, `solve` a Solution with its
+    report.
     """
 
     volume: BSplineVolume
@@ -91,7 +108,7 @@ class System:
 
     @property
     def load(self) -> Array:
-        """B (N,): source and data on faces, less A times the coefficients that are fixed."""
+        """The right-hand side b (N,): source and data on faces, less A times the coefficients that are fixed."""
         return self.right.ravel()
 
     @property
@@ -105,6 +122,14 @@ class System:
         full[self.window] = np.reshape(x, self.shape)
         spline = full[0] if len(full) == 1 else np.moveaxis(full, 0, -1)
         return SplineField(self.space.degrees, self.space.knots, spline)
+
+    def vector(self, field: SplineField) -> Array:
+        """Return the free coefficients (N,) of a field of this space, or of one that it contains.
+
+        Raises ValueError for any other field.
+        """
+        full = embedded(field.coefficients, field.degrees, field.knots, self.space)
+        return (full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))[self.window].ravel()
 
     @property
     def window(self) -> tuple[slice, ...]:
@@ -145,6 +170,7 @@ class System:
         Raises ConvergenceError where the linear solver fails and `strict` is asked for.
         """
         options = SolverOptions(**how)
+        check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
         announce(solution, options.strict)
@@ -188,7 +214,8 @@ class System:
 
     def iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
-        limits, guess = (options.tolerance, options.max_iterations), self._first_guess(options.start)
+        limits = options.tolerance, options.max_iterations
+        guess = None if options.start is None else self.vector(options.start).reshape(self.shape)
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
@@ -196,12 +223,6 @@ class System:
             return solve_on_device(self.assembled.operator, self.blocks[0], self.right, *limits, options.device, guess)
         iterate = conjugate_gradients if self.problem.form.symmetric else generalized_residuals
         return iterate(self.multiply, self.right, self.precondition, *limits, guess)
-
-    def _first_guess(self, start: SplineField | None) -> Array | None:
-        if start is None:
-            return None
-        full = embedded(start.coefficients, start.degrees, start.knots, self.space)
-        return (full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))[self.window]
 
 
 def build(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, threads: int = 1) -> System:

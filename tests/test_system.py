@@ -46,7 +46,8 @@ def test_a_step_of_the_heat_equation_by_the_mass_is_the_one_by_a_field():
     law = {"reaction": str(1.0 / dt), "boundary": "0"}
     by_field = solve_problem(volume, iga_nn.Poisson(source=_scaled(start.field, 1.0 / dt), **law), tolerance=1e-13)
     system = iga_nn.discretize(volume, iga_nn.Poisson(source="0", **law))
-    old = start.coefficients[1:-1, 1:-1, 1:-1].ravel()
+    old = system.vector(start)
+    assert np.array_equal(old, start.coefficients[1:-1, 1:-1, 1:-1].ravel())
     new, _ = cg(system.operator, system.mass @ old / dt, rtol=1e-13, M=system.preconditioner)
     assert np.allclose(system.field(new).coefficients, by_field.coefficients, atol=1e-10)
     assert 0.3 < np.abs(new).max() / np.abs(old).max() < 0.95
@@ -92,6 +93,16 @@ def test_a_law_may_read_a_field():
     assert found.report.error_estimate is None
     with pytest.raises(ValueError, match="at the points x that the solver hands out"):
         field.at(np.zeros((3, 4)))
+
+
+def test_a_vector_of_a_coarser_field_is_the_same_spline():
+    """Zero on the boundary on both levels: knot insertion changes nothing."""
+    body = iga_nn.Elasticity(force=("1", "x", "y"))
+    coarse, fine = (iga_nn.discretize(benchmark_volume(2), body, refine=level) for level in (0, 1))
+    field, where = coarse.solve().field, ([0.3, 0.9], [0.5], [0.6])
+    assert np.allclose(fine.field(fine.vector(field)).grid(*where), field.grid(*where), rtol=1e-12)
+    with pytest.raises(ValueError, match="not contained in the trial space"):
+        coarse.vector(fine.solve())
 
 
 def test_a_field_of_other_components_is_refused():
