@@ -161,8 +161,8 @@ def test_no_convergence_is_raised_on_request():
     [
         ({"exact": WAVE, "young": 0.0}, "young"),
         ({"exact": WAVE, "poisson_ratio": 0.5}, "between -1 and 1/2"),
-        ({"exact": "x"}, "3 entries"),
-        ({"exact": ("x", "y")}, "3 entries"),
+        ({"exact": "x"}, "three entries"),
+        ({"exact": ("x", "y")}, "three entries"),
         ({"exact": ("x", "y", "q")}, "exact: expression"),
         ({"displacement": WAVE}, "force has no data"),
         ({"force": WAVE, "traction": {"u0": None}}, "traction u0 has no data"),

@@ -149,8 +149,8 @@ def test_laws_that_cannot_be_solved_are_refused_with_one_line(law, says):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ({"source": ("1", "2", "3")}, "source must have 2 entries, one a component"),
-        ({"source": "1"}, "source must have 2 entries"),
+        ({"source": ("1", "2", "3")}, "source must have two entries, one a component"),
+        ({"source": "1"}, "source must have two entries"),
         ({}, r"source has no data: give source=\(\"0\", \.\.\.\)"),
         ({"exact": lambda x: x[:2]}, "source has no data: exact is a function or a field"),
         ({"source": ("1", "1"), "neumann": {"top": None}}, "'top' is no face"),

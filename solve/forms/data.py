@@ -18,6 +18,7 @@ from .jets import Jet
 from .parser import Expression, ExpressionError
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
+WORDS = {2: "two", 3: "three"}
 USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
 Scalar = str | SplineField | Callable[..., ArrayLike]
@@ -104,7 +105,8 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
     is_vector = isinstance(data, Sequence) and not isinstance(data, str)
     entries: list[Any] = list(data) if is_vector else [data]  # type: ignore[arg-type]
     if len(entries) != components and (is_vector or isinstance(data, str)):
-        raise ValueError(f"{name} must have {components} entries, one a component, got {data!r}")
+        count = WORDS.get(components, str(components))
+        raise ValueError(f"{name} must have {count} entries, one a component, got {data!r}")
     for entry in entries:
         wanted = () if len(entries) == components else (components,)
         if isinstance(entry, SplineField) and entry.coefficients.shape[3:] != wanted:
