@@ -96,8 +96,8 @@ class FormOperator:
             for q, rows, measure, x in self._geometry(points):
                 factors = operator.factors[q]
                 factors[-1] = 0.0  # the last block may exceed the plane
-                tensor = self.form.tensor(x, component)
-                assert tensor is not None  # which only a law of six factors returns
+                tensor = Form.tensor(self.form, x, component)  # six entries, whatever shorter form the law has
+                assert tensor is not None
                 kernels.tensor_factors(rows, tensor, factors)
                 if self.form.has_reaction:
                     factors[:, :, 6] = to_blocks(self.form.mass(x, component) * measure)
