@@ -32,6 +32,7 @@ from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 
+import formulas
 import meshio
 import numpy as np
 import torch
@@ -247,7 +248,7 @@ def read_formula(path):
     except ExpressionError as error:
         raise InputError(f"{path}: {error}") from None
     points = np.linspace(-1.0, 2.0, 12).reshape(3, 4)
-    value, gradient, hessian = expression.hessian(*points)
+    value, gradient, hessian = formulas.hessian(expression, *points)
     assert value.shape == (4,) and gradient.shape == (3, 4) and hessian.shape == (6, 4)
 
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array
 
 from .frame import UnitFrame
-from .jets import Jet, coordinates, stacked
+from .jets import Jet
 
 MAX_LENGTH = 1000
 MAX_DEPTH = 100
@@ -91,22 +91,6 @@ class Expression:
         """Return values at points given by arrays of equal shape."""
         points = _arrays(x, y, z)
         return np.broadcast_to(np.asarray(self.jet([Jet(point, (), ()) for point in points]).value), points[0].shape)
-
-    def gradient(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array]:
-        """Return value (...) and gradient (3, ...) at points given by arrays of equal shape."""
-        points = _arrays(x, y, z)
-        jet, shape = self.jet(coordinates(points)), points[0].shape
-        return np.broadcast_to(np.asarray(jet.value), shape), stacked(jet.gradient, shape)
-
-    def hessian(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Array, Array, Array]:
-        """Return value (...), gradient (3, ...) and Hessian (6, ...) at points given by arrays of equal shape.
-
-        The order of the second derivatives is xx, xy, xz, yy, yz, zz.
-        """
-        points = _arrays(x, y, z)
-        jet, shape = self.jet(coordinates(points, (0.0,) * 6)), points[0].shape
-        value = np.broadcast_to(np.asarray(jet.value), shape)
-        return value, stacked(jet.gradient, shape), stacked(jet.hessian, shape)
 
     def jet(self, x: Sequence[Jet]) -> Jet:
         """Return the formula's jet from those of x, y and z.
