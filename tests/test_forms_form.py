@@ -7,7 +7,7 @@ import pytest
 
 import iga_nn
 from parameterize.spline.volume import FACE_NAMES
-from solve import benchmark_volume, convergence, solve_problem
+from solve import ExpressionError, benchmark_volume, convergence, solve_problem
 from solve.field import Points
 from solve.forms.form import check_law
 
@@ -144,6 +144,13 @@ def test_laws_that_cannot_be_solved_are_refused_with_one_line(law, says):
     with pytest.raises((ValueError, NotImplementedError), match=says) as caught:
         iga_nn.solve(benchmark_volume(2), problem)
     assert "\n" not in str(caught.value)
+
+
+def test_a_law_that_is_not_coercive_somewhere_is_refused_with_the_place():
+    """Its sign changes next to a corner, where no sample lies but a quadrature point does."""
+    law = refused(flux=lambda s, u, grad, x: np.where(np.abs(x).sum(axis=0) > 0.2, 1.0, -1.0) * grad)
+    with pytest.raises(ExpressionError, match=r"Own\.flux must be positive definite.* at x=0\.0"):
+        iga_nn.solve(benchmark_volume(4), iga_nn.Problem(law, source="1"))
 
 
 @pytest.mark.parametrize(

@@ -159,6 +159,14 @@ def demand(good: NDArray[np.bool_], name: str, must: str, x: Array) -> None:
         raise ExpressionError(f"{name} must be {must}, and is not at {_first(~good, x)}, a point of the domain")
 
 
+def demand_definite(tensor: Array, name: str, x: Array) -> None:
+    """Raise ExpressionError at the first point (3, ...) where a symmetric tensor (6, ...) is not positive definite."""
+    xx, xy, xz, yy, yz, zz = tensor
+    minor = xx * yy - xy * xy
+    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    demand((xx > 0.0) & (minor > 0.0) & (determinant > 0.0), name, "positive definite", x)
+
+
 def check_faces(name: str, faces: Collection[str]) -> None:
     """Raise ValueError for a name that is no face of the cube."""
     for face in faces:

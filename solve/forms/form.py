@@ -9,6 +9,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 
+from .data import demand_definite
 from .jets import PAIRS, SYMMETRIC, Jet, Number, coordinates, stacked
 
 ROUNDING = 1e-8  # share of a law's size by which it may differ from a linear or symmetric one
@@ -50,12 +51,15 @@ class Form:
         """Return the symmetric tensor (6, ...) from a component's gradient to its flux: xx, xy, xz, yy, yz, zz.
 
         A law may return a scalar (...), or None for the identity, instead.
+        Raises ExpressionError where it is not positive definite: there the law is not coercive.
         """
         unit = np.zeros((3, self.components, 3, *x.shape[1:]))
         for i in range(3):
             unit[i, component, i] = 1.0
         rows = [self.flux(np.zeros_like(unit[i, :, 0]), unit[i], x)[component] for i in range(3)]
-        return np.stack([0.5 * (rows[i][j] + rows[j][i]) for i, j in PAIRS])
+        tensor = np.stack([0.5 * (rows[i][j] + rows[j][i]) for i, j in PAIRS])
+        demand_definite(tensor, f"the factor from grad to {type(self).__name__}.flux", x)
+        return tensor
 
     def mass(self, x: Array, component: int = 0) -> Array:
         """Return the factor (...) from a component to its reaction."""

@@ -11,7 +11,7 @@ import numpy as np
 from parameterize.arrays import Array
 
 from ..field import SplineField
-from .data import Data, Datum, Scalar, demand
+from .data import Data, Datum, Scalar, demand, demand_definite
 from .form import Form
 from .jets import PAIRS, SYMMETRIC, Jet
 from .problem import BoundaryValueProblem
@@ -101,10 +101,7 @@ class Poisson(BoundaryValueProblem, Form):
         if len(found) == 1:
             demand(found[0] > 0.0, "kappa", "positive", x)
             return found[0]
-        xx, xy, xz, yy, yz, zz = found
-        minor = xx * yy - xy * xy
-        determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-        demand((xx > 0.0) & (minor > 0.0) & (determinant > 0.0), "kappa", "positive definite", x)
+        demand_definite(found, "kappa", x)
         return found
 
     def mass(self, x: Array, component: int = 0) -> Array:
