@@ -200,7 +200,7 @@ class Problem(BoundaryValueProblem):
     form: the law. exact: the solution, where it is known; as formulas it gives the source and all data on faces.
     source: f. boundary: values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
     neumann: face name ("u0", ..., "w1") -> flux . n, n the outward unit normal; None: from `exact`.
-    robin: face name -> (alpha, g) of flux . n + alpha u = g; alpha a number, not negative; None for g: from `exact`.
+    robin: face name -> (alpha, g) of flux . n + alpha u = g; alpha one entry, not negative; None for g: from `exact`.
 
     Raises ExpressionError for a formula that is refused, ValueError where data cannot be known or do not fit.
     """
