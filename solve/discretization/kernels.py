@@ -17,15 +17,15 @@ LANES = 32  # points of direction v in a block of factors
 
 
 @compiled
-def evaluate_plane(
-    coefficients: Array, first_u: int, u: Array, first_v: IntArray, v: Array, first_w: IntArray, w: Array, out: Array
+def contract_uv(
+    coefficients: Array, first_u: int, u: Array, first_v: IntArray, v: Array, planes: Array, out: Array
 ) -> None:
-    """Evaluate a spline and its parametric gradient on a plane: out (4, q_w, q_v) = value, d/du, d/dv, d/dw.
+    """Contract directions u and v: out (3, n_w, q_v) = value, u derivative, v derivative.
 
-    u: (2, degree_u + 1) at the one point.
+    u: (2, degree_u + 1) at the one point; planes (2, n_v, n_w) is workspace.
     """
-    _, n_v, n_w = coefficients.shape
-    planes = np.zeros((2, n_v, n_w))
+    _, n_v, n_w = planes.shape
+    planes[:] = 0.0
     for i in range(u.shape[1]):
         value, slope = u[0, i], u[1, i]
         for j in range(n_v):
@@ -33,7 +33,7 @@ def evaluate_plane(
             for k in range(n_w):
                 row[k] += value * source[k]
                 row_u[k] += slope * source[k]
-    lines, rows = np.empty((3, n_w, v.shape[1])), np.empty((3, n_w))
+    rows = np.empty((3, n_w))
     row, row_u, row_v = rows[0], rows[1], rows[2]
     for q in range(v.shape[1]):
         rows[:] = 0.0
@@ -45,7 +45,17 @@ def evaluate_plane(
                 row_u[k] += value * plane_u[k]
                 row_v[k] += slope * plane[k]
         for k in range(n_w):
-            lines[0, k, q], lines[1, k, q], lines[2, k, q] = row[k], row_u[k], row_v[k]
+            out[0, k, q], out[1, k, q], out[2, k, q] = row[k], row_u[k], row_v[k]
+
+
+@compiled
+def evaluate_plane(
+    coefficients: Array, first_u: int, u: Array, first_v: IntArray, v: Array, first_w: IntArray, w: Array, out: Array
+) -> None:
+    """Evaluate a spline and its parametric gradient on a plane: out (4, q_w, q_v) = value, d/du, d/dv, d/dw."""
+    _, n_v, n_w = coefficients.shape
+    lines = np.empty((3, n_w, v.shape[1]))
+    contract_uv(coefficients, first_u, u, first_v, v, np.empty((2, n_v, n_w)), lines)
     out[:] = 0.0
     for q in range(w.shape[1]):
         row, row_u, row_v, row_w = out[0, q], out[1, q], out[2, q], out[3, q]
