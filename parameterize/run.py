@@ -226,7 +226,7 @@ def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> 
     mapped = map_points(network, task.vertices, task.device, task.dtype)
     layout = _layout(mapped, corners, task)
     return SurfaceFit(
-        SlidingParameters(task.knots, spline.degree, layout.places, layout.faces, device=task.device),
+        SlidingParameters(task.knots, spline.degree, layout.places, layout.faces),
         layout.vertices,
         vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
         vertex_weights(layout.vertices, layout.faces, task.own),
@@ -267,7 +267,6 @@ def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Te
         task.knots,
         spline.degree,
         fairness=spline.fit_fairness,
-        device=task.device,
     )
 
 

@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import functools
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from parameterize.arrays import IntArray
+from parameterize.threads import default_threads, in_parallel
 
-Piece = TypeVar("Piece")
+__all__ = ["checked_threads", "colours", "default_threads", "in_parallel", "one_blas_thread"]
+
 LAYERS = 4  # of elements in a piece of work, where the degree allows so few
-
-
-def default_threads() -> int:
-    """NUMBA_NUM_THREADS or OMP_NUM_THREADS where set, else the cores this process may use."""
-    for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS"):
-        text = os.environ.get(name, "")
-        if text.isdigit() and int(text) > 0:
-            return int(text)
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def checked_threads(threads: int | None) -> int:
@@ -43,20 +33,6 @@ def colours(first: IntArray, degree: int) -> tuple[list[IntArray], list[IntArray
     layers = np.unique(first, return_inverse=True)[1]
     pieces = np.split(np.arange(len(first)), np.flatnonzero(np.diff(layers // max(degree, LAYERS))) + 1)
     return pieces[0::2], pieces[1::2]
-
-
-def in_parallel(task: Callable[[Piece], Any], pieces: Sequence[Piece], threads: int) -> None:
-    """Run the task on every piece; the first exception raised comes through."""
-    if threads == 1 or len(pieces) < 2:
-        for piece in pieces:
-            task(piece)
-    else:
-        list(_pool(threads).map(task, pieces))
-
-
-@functools.cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads, thread_name_prefix="solve")
 
 
 @functools.cache

@@ -7,8 +7,6 @@ from parameterize.optimization.determinant_penalty import SpanBarrier, edge_span
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
-CPU = torch.device("cpu")
-
 
 def setting(degree, amplitude, seed=0, n=(6, 5, 7)):
     knots = tuple(open_uniform_knots(m, degree) for m in n)
@@ -25,7 +23,7 @@ def all_spans(volume):
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_energy_is_the_shortfall_of_the_certificates_coefficients(degree):
     knots, control, volume = setting(degree, 0.1)
-    barrier = SpanBarrier(knots, degree, 0.8, device=CPU)
+    barrier = SpanBarrier(knots, degree, 0.8)
     spans = all_spans(volume)
     chosen = spans[::3]
     barrier.activate(chosen)
@@ -38,7 +36,7 @@ def test_energy_is_the_shortfall_of_the_certificates_coefficients(degree):
 
 def test_gradient_against_finite_differences():
     knots, control, volume = setting(3, 0.08)
-    barrier = SpanBarrier(knots, 3, 0.8, device=CPU)
+    barrier = SpanBarrier(knots, 3, 0.8)
     barrier.activate(all_spans(volume))
     _, gradient = barrier.energy_and_gradient(control)
     for seed in range(3):
@@ -50,7 +48,7 @@ def test_gradient_against_finite_differences():
 
 def test_nothing_to_pay_above_the_floor_or_without_spans():
     knots, control, volume = setting(3, 0.0)
-    barrier = SpanBarrier(knots, 3, 0.5, device=CPU)
+    barrier = SpanBarrier(knots, 3, 0.5)
     for spans in (np.zeros((0, 3), dtype=np.int64), all_spans(volume)):
         barrier.activate(spans)
         energy, gradient = barrier.energy_and_gradient(control)
@@ -59,7 +57,7 @@ def test_nothing_to_pay_above_the_floor_or_without_spans():
 
 def test_activating_twice_counts_once():
     knots, control, volume = setting(3, 0.1)
-    once, twice = (SpanBarrier(knots, 3, 0.8, device=CPU) for _ in range(2))
+    once, twice = (SpanBarrier(knots, 3, 0.8) for _ in range(2))
     spans = all_spans(volume)
     once.activate(spans)
     twice.activate(spans[:30])
@@ -79,7 +77,7 @@ def test_edge_spans():
 
 def test_curvature_is_gauss_newton():
     knots, control, volume = setting(3, 0.1)
-    barrier = SpanBarrier(knots, 3, 0.8, device=CPU)
+    barrier = SpanBarrier(knots, 3, 0.8)
     spans = all_spans(volume)
     barrier.activate(spans)
     step = torch.randn(control.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)

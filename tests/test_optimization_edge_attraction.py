@@ -19,7 +19,7 @@ def anchors_on_a_ball(radius=0.5, given_corners=None):
     points, faces = ball(2000)
     points = 0.5 + radius * points
     fit = SurfaceFit(
-        SlidingParameters(KNOTS, 3, snap(points), faces, device=torch.device("cpu")),
+        SlidingParameters(KNOTS, 3, snap(points), faces),
         points,
         vertex_quadrics(points, faces, TANGENTIAL),
         vertex_weights(points, faces, len(points)),

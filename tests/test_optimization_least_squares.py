@@ -6,7 +6,6 @@ from parameterize.optimization.least_squares import fit_pairs
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
-CPU = torch.device("cpu")
 DEGREE = 3
 KNOTS = (open_uniform_knots(5, DEGREE), open_uniform_knots(6, DEGREE), open_uniform_knots(4, DEGREE))
 
@@ -27,7 +26,7 @@ def samples(count):
 
 def fit(parameters, points, fairness, weights=None):
     weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
-    control = fit_pairs(parameters, points, weights, KNOTS, DEGREE, fairness=fairness, device=CPU)
+    control = fit_pairs(parameters, points, weights, KNOTS, DEGREE, fairness=fairness)
     assert control.is_contiguous()
     return BSplineVolume((DEGREE,) * 3, KNOTS, control.permute(1, 2, 3, 0).numpy())
 

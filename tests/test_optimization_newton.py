@@ -11,7 +11,8 @@ from parameterize.config import SplineConfig
 from parameterize.cube.cube import project_radially
 from parameterize.history import History
 from parameterize.optimization import newton
-from parameterize.optimization.energy import DistortionEnergy, SplineEnergy
+from parameterize.optimization.distortion import DistortionEnergy
+from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.newton import Optimized, optimize
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
@@ -20,7 +21,6 @@ from parameterize.spline.bspline import gauss_points, greville, open_uniform_kno
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
-CPU = torch.device("cpu")
 CONFIG = SplineConfig(control_points=7, steps=5, penalties=(20.0, 100.0, 500.0, 2500.0), rounds=6)
 KNOTS = (open_uniform_knots(7, 3),) * 3
 
@@ -45,7 +45,7 @@ def surface_fit():
         vertex_weights(vertices, faces, len(vertices)),
     )
     return SurfaceFit(
-        SlidingParameters(KNOTS, 3, 0.5 + project_radially(centred), faces, device=CPU), vertices, quadrics, weights
+        SlidingParameters(KNOTS, 3, 0.5 + project_radially(centred), faces), vertices, quadrics, weights
     )
 
 
@@ -58,7 +58,7 @@ def mean_arap(volume, n_gauss=3):
 def test_distortion_is_the_quadrature_of_the_arap_energy():
     control = wavy_control(0.02)
     config = replace(CONFIG, inner_gauss=CONFIG.gauss)
-    energy, _, folded = DistortionEnergy(KNOTS, config, device=CPU).energy_and_gradient(control, penalty=0.0)
+    energy, _, folded = DistortionEnergy(KNOTS, config).energy_and_gradient(control, penalty=0.0)
     assert energy == pytest.approx(mean_arap(as_volume(control), CONFIG.gauss), rel=1e-9)
     assert folded == 0
 
@@ -66,14 +66,14 @@ def test_distortion_is_the_quadrature_of_the_arap_energy():
 def test_folded_points_are_counted():
     control = wavy_control(0.0)
     control[0] *= -1.0
-    _, _, folded = DistortionEnergy(KNOTS, CONFIG, device=CPU).energy_and_gradient(control, penalty=1.0)
+    _, _, folded = DistortionEnergy(KNOTS, CONFIG).energy_and_gradient(control, penalty=1.0)
     assert folded == (2 * CONFIG.gauss + 2 * CONFIG.inner_gauss) ** 3  # four spans a direction
 
 
 @pytest.mark.parametrize("amplitude", [0.02, 0.12])
 def test_gradients_against_finite_differences(amplitude):
     control = wavy_control(amplitude)
-    energy = SplineEnergy(CONFIG, KNOTS, surface_fit(), device=CPU)
+    energy = SplineEnergy(CONFIG, KNOTS, surface_fit())
     energy.barrier.activate(np.indices((4, 4, 4)).reshape(3, -1).T)
     _, inner, _ = energy.volume_part(control)
     _, outer = energy.surface_part(control)
@@ -91,7 +91,7 @@ def test_gradients_against_finite_differences(amplitude):
 
 @pytest.mark.parametrize("limit", [100.0, 0.3])  # nothing above it; most points above it
 def test_curvature_is_the_second_derivative_where_the_map_stretches(limit):
-    distortion = DistortionEnergy(KNOTS, replace(CONFIG, arap_limit=limit), device=CPU)
+    distortion = DistortionEnergy(KNOTS, replace(CONFIG, arap_limit=limit))
     control, step = 1.6 * wavy_control(0.02), wavy_control(0.5, seed=4) - wavy_control(0.0)
     ahead, behind = (distortion.energy_and_gradient(control + s * 1e-5 * step, 0.0)[1] for s in (1.0, -1.0))
     expected = (ahead - behind) / 2e-5
@@ -100,14 +100,14 @@ def test_curvature_is_the_second_derivative_where_the_map_stretches(limit):
 
 
 def test_curvature_stays_positive_where_the_energy_bends_down():
-    distortion, control = DistortionEnergy(KNOTS, CONFIG, device=CPU), 0.4 * wavy_control(0.05)
+    distortion, control = DistortionEnergy(KNOTS, CONFIG), 0.4 * wavy_control(0.05)
     for seed in range(5):
         step = (wavy_control(0.5, seed) - wavy_control(0.0)).float()
         assert float((step * distortion.curvature(control, 20.0)(step)).sum()) > 0.0
 
 
 def test_newton_direction_leads_down():
-    energy = SplineEnergy(CONFIG, KNOTS, surface_fit(), device=CPU)
+    energy = SplineEnergy(CONFIG, KNOTS, surface_fit())
     control = wavy_control(0.1, seed=3)
     value, gradient, _ = energy.volume_part(control)
     outer, pulled = energy.surface_part(control)

@@ -9,7 +9,6 @@ from parameterize.optimization.tensor_product import ControlRows
 from parameterize.spline.bspline import greville, open_uniform_knots, sparse_rows
 from parameterize.surface.geometry import vertex_normals
 
-CPU = torch.device("cpu")
 FLOOR = 0.3
 KNOTS = (open_uniform_knots(6, 3),) * 3
 
@@ -20,7 +19,7 @@ def random_penalty(points=40, controls=50):
     slopes = rng.normal(size=(2, points, 16))
     normals = rng.normal(size=(points, 3))
     weights = rng.uniform(0.5, 1.5, points)
-    along_a, along_b = (ControlRows.of(sparse_rows(slope, indices, controls), CPU) for slope in slopes)
+    along_a, along_b = (ControlRows.of(sparse_rows(slope, indices, controls)) for slope in slopes)
     penalty = FacingPenalty((along_a, along_b), torch.as_tensor(normals.T), torch.as_tensor(weights), FLOOR)
     control = torch.as_tensor(rng.normal(size=(3, 5, 10, 1)))
 
@@ -61,7 +60,7 @@ def box_fit(triangle_at):
         corners.extend(piece)
     points, faces = np.array(corners), np.array(faces)
     quadrics, weights = np.tile(np.eye(3), (18, 1, 1)), np.full(18, 1.0 / 18.0)
-    return SurfaceFit(SlidingParameters(KNOTS, 3, points, faces, device=CPU), points, quadrics, weights), control
+    return SurfaceFit(SlidingParameters(KNOTS, 3, points, faces), points, quadrics, weights), control
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

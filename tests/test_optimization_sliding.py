@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from shapes import rounded_cube
-from wavy import CPU, DEGREE, KNOTS, as_volume, on_the_cube, wavy_control
+from wavy import DEGREE, KNOTS, as_volume, on_the_cube, wavy_control
 
 from parameterize.cube.cube import snap
 from parameterize.cube.flips import flipped
@@ -9,7 +9,7 @@ from parameterize.optimization.sliding import SlidingParameters, fold_over_edges
 
 
 def parameters_at(start, triangles=((0, 1, 2),)):
-    return SlidingParameters(KNOTS, DEGREE, start, np.array(triangles), device=CPU)
+    return SlidingParameters(KNOTS, DEGREE, start, np.array(triangles))
 
 
 def distances(places, control, points):

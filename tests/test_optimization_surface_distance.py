@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 from shapes import ball, rounded_cube
-from wavy import CPU, DEGREE, KNOTS, as_volume, on_the_cube, wavy_control
+from wavy import DEGREE, KNOTS, as_volume, on_the_cube, wavy_control
 
 from iga_nn.samples import sample
 from parameterize.optimization.sliding import SlidingParameters
@@ -16,7 +16,7 @@ def make_fit(points, parameters, tangential=0.02):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     quadrics = normals[:, :, None] * normals[:, None, :] + tangential * np.eye(3)
     weights = rng.uniform(0.5, 1.5, len(points))
-    places = SlidingParameters(KNOTS, DEGREE, parameters, np.array([[0, 1, 2]]), device=CPU)
+    places = SlidingParameters(KNOTS, DEGREE, parameters, np.array([[0, 1, 2]]))
     weights /= weights.sum()
     return SurfaceFit(places, points, quadrics, weights), quadrics * weights[:, None, None]
 

@@ -8,7 +8,6 @@ from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from parameterize.training.target_shapes import nearest_on_cube
 
-CPU = torch.device("cpu")
 DEGREE = 3
 KNOTS = (open_uniform_knots(6, DEGREE), open_uniform_knots(5, DEGREE), open_uniform_knots(7, DEGREE))
 

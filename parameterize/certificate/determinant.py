@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..spline.bernstein import add_products, binomials, extraction
+from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
+from ..threads import in_parallel
 
-CHUNK = 256  # spans at a time: a few MB, near the cache
+CHUNK = 64  # spans at a time: what they need fits into the cache
 
 _UNIT_ROUNDOFF = 2.0**-53
 _UNDERFLOW = 1e-280  # more than a coefficient can lose to underflow (_roundings)
@@ -53,28 +54,23 @@ class DeterminantForm:
 
     def survey(self) -> tuple[Array, Array, Array]:
         """For all spans: lower bound of det J, least value at the 8 corners, mean; (n_spans in all,) each."""
-        total = self.span_count
-        bounds, corners, means = np.empty(total), np.empty(total), np.empty(total)
-        for start in range(0, total, CHUNK):
-            chunk = np.arange(start, min(start + CHUNK, total))
+
+        def part(chunk: IntArray) -> tuple[Array, Array, Array]:
             values, permanents = self.coefficients(self.numbers(chunk))
-            bounds[chunk] = values.min(axis=(0, 1, 2)) - self.errors(permanents)
-            corners[chunk] = corners_of(values).min(axis=(0, 1, 2))
-            means[chunk] = values.mean(axis=(0, 1, 2))
+            bounds = values.min(axis=(0, 1, 2)) - self.errors(permanents)
+            return bounds, corners_of(values).min(axis=(0, 1, 2)), values.mean(axis=(0, 1, 2))
+
+        chunks = [np.arange(i, min(i + CHUNK, self.span_count)) for i in range(0, self.span_count, CHUNK)]
+        bounds, corners, means = (np.concatenate(parts) for parts in zip(*in_parallel(part, chunks), strict=True))
         return bounds, corners, means
 
     def coefficients(self, spans: IntArray) -> tuple[Array, Array]:
         """Bernstein coefficients on spans (k, 3): (d_u, d_v, d_w, k); and the permanents (k,) that bound them."""
         local, sizes = zip(*(self._derivative(b, spans) for b in range(3)), strict=True)
         f_u, f_v, f_w = local  # (3, n_0, n_1, n_2, k) each, scaled Bernstein form
-        k = len(spans)
-        u, v, w = self.degrees
-        cross = np.zeros((3, 2 * u + 1, 2 * v, 2 * w, k))
-        determinant = np.zeros((3 * u, 3 * v, 3 * w, k))
+        cross = cross_products(f_v, f_w)
+        determinant = np.zeros((*(3 * p for p in self.degrees), len(spans)))
         for a in range(3):
-            a1, a2 = (a + 1) % 3, (a + 2) % 3
-            add_products(f_v[a1], f_w[a2], 1.0, cross[a])
-            add_products(f_v[a2], f_w[a1], -1.0, cross[a])
             add_products(f_u[a], cross[a], 1.0, determinant)
         determinant *= self.unscale
         return determinant, _permanent(np.stack(sizes, axis=1))

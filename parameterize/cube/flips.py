@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from ..arrays import Array, IntArray
 from ..config import LAYOUT
@@ -51,20 +50,19 @@ def untangle(parameters: Array, faces: IntArray, sweeps: int = LAYOUT.sweeps) ->
     are flipped at the time move; where they stay so, rings of neighbours join, one after every `patience` sweeps. After
     `sweeps` some may be left.
     """
-    n = len(parameters)
     i, j = faces.ravel(), faces[:, [1, 2, 0]].ravel()  # closed surface: both directions appear
-    adjacency = csr_array((np.ones(len(i)), (i, j)), shape=(n, n))
     direction = parameters - 0.5
     direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     for sweep in range(sweeps):
         bad = flipped(0.5 + direction, faces)
         if not bad.any():
             break
-        free = np.zeros(n, dtype=bool)
+        free = np.zeros(len(parameters), dtype=bool)
         free[faces[bad].ravel()] = True
         for _ in range(sweep // LAYOUT.patience):
-            free |= (adjacency @ free.astype(float)) > 0.0
-        mean = adjacency[free] @ direction
-        moved = direction[free] + mean / np.linalg.norm(mean, axis=1, keepdims=True)
+            free[i[free[j]]] = True
+        used = free[i]
+        total = np.stack([np.bincount(i[used], direction[j[used], c], len(free)) for c in range(3)], axis=1)[free]
+        moved = direction[free] + total / np.linalg.norm(total, axis=1, keepdims=True)
         direction[free] = moved / np.linalg.norm(moved, axis=1, keepdims=True)
     return snap(0.5 + direction)

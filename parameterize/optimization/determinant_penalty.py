@@ -3,23 +3,54 @@
 Penalties on sampled determinants leave folds between the samples, above all along the 12 edges of the cube: there the
 surface is smooth, so the three tangents of an exact fit lie in one plane and det J vanishes. What gives way is the fit:
 within the first spans next to an edge F keeps a small crease, as large as the floor on the coefficients asks for.
+
+Few coefficients fall short of the floor. A coefficient is linear in each of the three derivatives, so its own
+derivative is read from the product of the other two: one row of 3 (p + 1)^3 numbers in the span's Bezier points.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numba
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ..arrays import Array
-from ..spline.bernstein import extraction
-from ..spline.bspline import basis_derivatives, breakpoints, sparse_rows, window_numbers
+from ..arrays import Array, IntArray
+from ..spline.bernstein import add_products, binomials, cross_products, extraction
+from ..spline.bspline import breakpoints
+from ..threads import in_parallel
 from .cg import Operator
-from .polar import cofactor_and_determinant
-from .tensor_product import ControlRows, TensorGrid, along
 
 _BLOCK = 32  # spans at a time: what they need fits into the cache
+
+
+@dataclass(frozen=True, eq=False)
+class _Spans:
+    """k spans: their first control points (k, 3), extraction weights (k, 3, p + 1, p + 1), parametric volumes (k,)."""
+
+    first: IntArray
+    weights: Array
+    volumes: Array
+
+    def bezier_points(self, control: Tensor) -> Array:
+        """Return the Bezier points (k, 3, p + 1, p + 1, p + 1)."""
+        return np.asarray(_bezier_points(np.ascontiguousarray(control.numpy()), self.first, self.weights))
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Coefficients below the floor, span by span: by how much (r,), and their derivatives (r, 3, p + 1, ...).
+
+    starts (k + 1,): the first row of each span.
+    """
+
+    spans: _Spans
+    shortfall: Array
+    rows: Array
+    starts: IntArray
 
 
 class SpanBarrier:
@@ -28,109 +59,163 @@ class SpanBarrier:
     knots: the same degree p in the three directions; floor in units of det J.
     """
 
-    def __init__(self, knots: tuple[Array, Array, Array], degree: int, floor: float, *, device: torch.device) -> None:
-        self.knots, self.degree, self.floor, self.device = knots, degree, floor, device
-        self.sizes = tuple(len(k) - degree - 1 for k in knots)
-        order = 3 * degree  # coefficients of det J a direction
-        nodes: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(order) + 0.5) / order)  # Chebyshev points of [0, 1]
-        _, tables = basis_derivatives(np.repeat([0.0, 1.0], degree + 1), degree, nodes, 1)  # a single span: Bernstein
-        values, slopes = self._tensor(tables[0]), self._tensor(tables[1])  # (3 p, p + 1) each
-        self._grid = TensorGrid((values,) * 3, (slopes,) * 3, order=(2, 1, 0))  # J on unit spans at the nodes
-        # From values at the nodes to Bernstein coefficients along one direction, (3 p, 3 p).
-        self._interpolation = self._tensor(np.linalg.inv(_bernstein(order - 1, nodes)).astype(np.float64))
+    def __init__(self, knots: tuple[Array, Array, Array], degree: int, floor: float) -> None:
+        self.floor = floor
         self._extractions = [extraction(k, degree) for k in knots]
         self._widths = [np.diff(breakpoints(k)) for k in knots]
-        n_spans = int(np.prod([len(w) for w in self._widths]))
-        self._share = 1.0 / (n_spans * order**3)
+        whole, lowered = binomials(degree), degree * binomials(degree - 1)
+        self._scales = [  # from differences of Bezier points to derivatives in scaled Bernstein form
+            np.einsum("i,j,k->ijk", *(lowered if d == axis else whole for d in range(3))) for axis in range(3)
+        ]
+        self._unscale = np.einsum("i,j,k->ijk", *(1.0 / binomials(3 * degree - 1),) * 3)
+        self._share = 1.0 / (self._unscale.size * np.prod([len(w) for w in self._widths]))
         self.active = np.zeros((0, 3), dtype=np.int64)
+        self._pieces: list[_Spans] = []
 
     def activate(self, spans: NDArray[np.int64]) -> None:
         """Add spans (k, 3) to the active ones."""
         self.active = np.unique(np.concatenate([self.active, spans]), axis=0)
-        if len(self.active) == 0:
-            return
-        windows, weights = [], []
-        for d, (first, weight) in enumerate(self._extractions):
-            windows.append(first[self.active[:, d]][:, None] + np.arange(self.degree + 1))
-            weights.append(weight[self.active[:, d]])
-        columns = window_numbers(windows, self.sizes)  # (k, (p + 1)^3)
-        rows = np.einsum("kax,kby,kcz->abckxyz", *weights, optimize=True).reshape(-1, columns.shape[1])
-        bezier = sparse_rows(rows, np.tile(columns, (columns.shape[1], 1)), int(np.prod(self.sizes)))
-        bezier.eliminate_zeros()
-        self._rows = ControlRows.of(bezier, self.device)
-        volumes = np.prod([w[self.active[:, d]] for d, w in enumerate(self._widths)], axis=0)
-        self._per_volume = self._tensor(1.0 / volumes)  # (k,)
+        first = np.stack([e[0][s] for e, s in zip(self._extractions, self.active.T, strict=True)], axis=1)
+        weights = np.stack([e[1][s] for e, s in zip(self._extractions, self.active.T, strict=True)], axis=1)
+        volumes = np.prod([w[s] for w, s in zip(self._widths, self.active.T, strict=True)], axis=0)
+        blocks = [slice(start, start + _BLOCK) for start in range(0, len(first), _BLOCK)]
+        self._pieces = [_Spans(first[block], weights[block], volumes[block]) for block in blocks]
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """The penalty at control points (3, n_u, n_v, n_w), and its gradient."""
-        if len(self.active) == 0:
-            return 0.0, torch.zeros_like(control)
-        bezier = self._bezier_points(self._rows, control)
-        pushed, energy = torch.empty_like(bezier), 0.0
-        for block in self._blocks():
-            cofactors, shortfall = self._shortfall(bezier[..., block], self._per_volume[block])
-            energy += float(shortfall.square().sum())
-            dual = _on_all_axes(self._interpolation.T, -2.0 * shortfall * self._per_volume[block])
-            pushed[..., block] = self._grid.adjoint(cofactors * dual)
-        return self._share * energy, self._share * self._rows.adjoint(pushed.reshape(3, -1).T, control)
+
+        def part(spans: _Spans) -> tuple[float, Array]:
+            found = self._short_rows(control, spans)
+            energy = self._share * float(found.shortfall @ found.shortfall)
+            return energy, _combine(found.rows, found.starts, -2.0 * self._share * found.shortfall, spans.weights)
+
+        parts = in_parallel(part, self._pieces)
+        return sum(energy for energy, _ in parts), self._collect([pushed for _, pushed in parts], control)
 
     def curvature(self, control: Tensor) -> Operator:
         """The Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
-        if len(self.active) == 0:
-            return torch.zeros_like
-        bezier = self._bezier_points(self._rows, control).float()
-        per_volume, rows, grid = self._per_volume.float(), self._rows.to(torch.float32), self._grid.to(torch.float32)
-        interpolation = self._interpolation.float()
-        parts = []
-        for block in self._blocks():
-            cofactors, shortfall = self._shortfall(bezier[..., block], per_volume[block])
-            busy = torch.nonzero((shortfall > 0.0).flatten(0, 2).any(0))[:, 0]
-            mask = (2.0 * self._share) * ((shortfall > 0.0) * per_volume[block] ** 2)[..., busy]
-            parts.append((busy + block.start, cofactors[..., busy], mask))
+        pieces = in_parallel(lambda spans: self._short_rows(control, spans, np.float32), self._pieces)
 
-        def product(x: Tensor) -> Tensor:
-            local = self._bezier_points(rows, x)
-            pushed = torch.zeros_like(local)
-            for busy, cofactors, mask in parts:
-                if len(busy) == 0:
-                    continue
-                change = (cofactors * grid.jacobian(local[..., busy])).sum(dim=(0, 1))
-                dual = _on_all_axes(interpolation.T, mask * _on_all_axes(interpolation, change))
-                pushed[..., busy] = grid.adjoint(cofactors * dual)
-            return rows.adjoint(pushed.reshape(3, -1).T, x)
+        def part(piece: _Rows, x: Tensor) -> Array:
+            changes = _changes(piece.rows, piece.starts, piece.spans.bezier_points(x))
+            return np.asarray(_combine(piece.rows, piece.starts, 2.0 * self._share * changes, piece.spans.weights))
 
-        return product
+        return lambda x: self._collect(in_parallel(lambda piece: part(piece, x), pieces), x)
 
-    def _blocks(self) -> list[slice]:
-        return [slice(start, start + _BLOCK) for start in range(0, len(self.active), _BLOCK)]
+    def _short_rows(self, control: Tensor, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
+        """Return the coefficients that fall short on some spans."""
+        bezier = np.ascontiguousarray(np.moveaxis(spans.bezier_points(control), 0, -1))  # (3, p + 1, ..., k)
+        nets = [np.diff(bezier, axis=1 + d) * scale[..., None] for d, scale in enumerate(self._scales)]
+        crosses = [cross_products(nets[(d + 1) % 3], nets[(d + 2) % 3]) for d in range(3)]
+        determinant = np.zeros((*self._unscale.shape, len(spans.first)))
+        for component in range(3):
+            add_products(nets[0][component], crosses[0][component], 1.0, determinant)
+        shares = self._unscale[..., None] / spans.volumes
+        short = np.moveaxis(self.floor - determinant * shares, -1, 0)
+        place = np.argwhere(short > 0.0)  # (r, 4): span and coefficient, span by span
+        rows = np.zeros((len(place), *np.roll(bezier.shape, 1)[1:]), dtype=dtype)
+        for direction, (cross, scale) in enumerate(zip(crosses, self._scales, strict=True)):
+            _add_derivatives(place, cross, scale, np.moveaxis(shares, -1, 0), direction, rows)
+        starts = np.searchsorted(place[:, 0], np.arange(len(spans.first) + 1))
+        return _Rows(spans, short[tuple(place.T)], rows, starts)
 
-    def _bezier_points(self, rows: ControlRows, control: Tensor) -> Tensor:
-        """Return the Bezier points of the active spans: (3, p + 1, p + 1, p + 1, k)."""
-        width = self.degree + 1
-        return rows(control).T.reshape(3, width, width, width, -1)
-
-    def _shortfall(self, bezier: Tensor, per_volume: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the cofactors of J at the nodes (3, 3, n, n, n, k), and how far coefficients are below the floor."""
-        jacobian = self._grid.to(bezier.dtype).jacobian(bezier.contiguous())
-        cofactors, det = cofactor_and_determinant(jacobian.flatten(2))
-        coefficients = _on_all_axes(self._interpolation.to(bezier.dtype), det.view(jacobian.shape[2:]))
-        return cofactors.view(jacobian.shape), (self.floor - coefficients * per_volume).clamp_min(0.0)
-
-    def _tensor(self, values: Array) -> Tensor:
-        return torch.as_tensor(values, dtype=torch.float64, device=self.device)
+    def _collect(self, parts: list[Array], like: Tensor) -> Tensor:
+        """Add what the pieces say of their windows (k, 3, p + 1, p + 1, p + 1), in their order."""
+        total = torch.zeros_like(like)
+        for spans, windows in zip(self._pieces, parts, strict=True):
+            _add_windows(windows, spans.first, total.numpy())
+        return total
 
 
-def _on_all_axes(table: Tensor, field: Tensor) -> Tensor:
-    """Apply a square table along the three axes of a field (n, n, n, k)."""
-    for axis in range(3):
-        field = along(table, field, axis)
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _along_axes(field: Array, u: Array, v: Array, w: Array) -> Array:
+    """Apply matrices (n, n) along the three axes of a field (n, n, n): each makes the first axis the last one."""
+    n = len(u)
+    for matrix in (u, v, w):
+        flat = field.reshape(n, n * n)
+        applied = np.zeros_like(flat)
+        for i in range(n):
+            for x in range(n):
+                for r in range(n * n):
+                    applied[i, r] += matrix[i, x] * flat[x, r]
+        field = applied.T.copy().reshape(n, n, n)
     return field
 
 
-def _bernstein(degree: int, x: Array) -> Array:
-    """Bernstein polynomials at x: (m, degree + 1); they are the B-splines of a single span."""
-    knots = np.repeat([0.0, 1.0], degree + 1)
-    return basis_derivatives(knots, degree, x)[1][0]
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
+    """Bezier points (k, 3, n, n, n) of spans with their first control points (k, 3) and weights (k, 3, n, n)."""
+    spans, n = len(first), weights.shape[2]
+    points = np.empty((spans, 3, n, n, n), control.dtype)
+    for s in range(spans):
+        i, j, k = first[s]
+        for c in range(3):
+            window = control[c, i : i + n, j : j + n, k : k + n].copy()
+            points[s, c] = _along_axes(window, weights[s, 0], weights[s, 1], weights[s, 2])
+    return points
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _add_derivatives(
+    place: IntArray, cross: Array, scale: Array, shares: Array, direction: int, rows: Array
+) -> None:
+    """Add to rows (r, 3, n, n, n) the derivatives of coefficients (r, 4) in the Bezier points, by one derivative of F.
+
+    cross (3, ..., k): the product of the two other derivatives; scale: from differences to that derivative's net.
+    """
+    step = np.zeros(3, np.int64)
+    step[direction] = 1
+    for r in range(len(place)):
+        s, a, b, c = place[r]
+        share = shares[s, a, b, c]
+        for i in range(max(0, a - cross.shape[1] + 1), min(scale.shape[0], a + 1)):
+            for j in range(max(0, b - cross.shape[2] + 1), min(scale.shape[1], b + 1)):
+                for k in range(max(0, c - cross.shape[3] + 1), min(scale.shape[2], c + 1)):
+                    factor = share * scale[i, j, k]
+                    for component in range(3):
+                        change = factor * cross[component, a - i, b - j, c - k, s]
+                        rows[r, component, i, j, k] -= change
+                        rows[r, component, i + step[0], j + step[1], k + step[2]] += change
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})  # type: ignore[untyped-decorator]
+def _changes(rows: Array, starts: IntArray, points: Array) -> Array:
+    """Products (r,) of the rows of each span with its Bezier points (k, 3, n, n, n)."""
+    flat, place = rows.reshape(len(rows), -1), points.reshape(len(points), -1)
+    changes = np.empty(len(rows), rows.dtype)
+    for s in range(len(points)):
+        for r in range(starts[s], starts[s + 1]):
+            change = rows.dtype.type(0.0)
+            for i in range(flat.shape[1]):
+                change += flat[r, i] * place[s, i]
+            changes[r] = change
+    return changes
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _combine(rows: Array, starts: IntArray, factors: Array, weights: Array) -> Array:
+    """Sum the rows of each span with their factors (r,), as windows of control points: (k, 3, n, n, n)."""
+    spans = len(starts) - 1
+    windows = np.zeros((spans, *rows.shape[1:]), rows.dtype)
+    for s in range(spans):
+        total = windows[s].reshape(-1)
+        for r in range(starts[s], starts[s + 1]):
+            row, factor = rows[r].reshape(-1), factors[r]
+            for i in range(row.size):
+                total[i] += factor * row[i]
+        u, v, w = weights[s, 0].T.copy(), weights[s, 1].T.copy(), weights[s, 2].T.copy()
+        for c in range(3):
+            windows[s, c] = _along_axes(windows[s, c], u, v, w)
+    return windows
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
+    """Add windows (k, 3, n, n, n) to control points (3, n_u, n_v, n_w), each from its first one on."""
+    n = windows.shape[2]
+    for s in range(len(first)):
+        i, j, k = first[s]
+        total[:, i : i + n, j : j + n, k : k + n] += windows[s]
 
 
 def edge_spans(n_spans: tuple[int, int, int]) -> NDArray[np.int64]:

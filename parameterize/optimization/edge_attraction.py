@@ -38,9 +38,9 @@ class EdgeAnchors:
 
     def __init__(self, surface: SurfaceFit, config: SplineConfig) -> None:
         self._surface, self._config = surface, config
-        knots, degree, device = surface.places.knots, surface.places.degree, surface.places.device
+        knots, degree = surface.places.knots, surface.places.degree
         points, no_triangles = edge_points(knots), np.zeros((0, 3), dtype=np.int64)
-        places = SlidingParameters(knots, degree, points, no_triangles, device=device)
+        places = SlidingParameters(knots, degree, points, no_triangles)
         self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
     def near(self, control: Tensor) -> bool:

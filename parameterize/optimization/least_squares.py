@@ -10,7 +10,7 @@ from torch import Tensor
 from ..arrays import Array
 from ..spline.bspline import basis_derivatives, sparse_rows, window_numbers
 from .cg import conjugate_gradients
-from .tensor_product import BendingOperator, FastDiagonalization, grams, to_torch
+from .tensor_product import BendingOperator, ControlRows, FastDiagonalization, grams
 
 
 def fit_pairs(
@@ -21,27 +21,25 @@ def fit_pairs(
     degree: int,
     *,
     fairness: float,
-    device: torch.device,
 ) -> Tensor:
     """Control points (3, n_u, n_v, n_w) that minimise sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
 
     parameters (m, 3) in the unit cube, points (m, 3), weights (m,) that sum to 1: the discrete form of the paper's
     least squares on G(F(x)) = x. Where no sample lies, the smoothing term alone decides.
     """
-    rows = _collocation_3d(parameters, knots, degree)
-    scaled = csr_array(rows * weights[:, None])
-    matrix, transposed = (to_torch(m, device) for m in (rows, csr_array(scaled.T)))
-    mass, slope, curve = grams(knots, degree, device)
+    rows = ControlRows.of(_collocation_3d(parameters, knots, degree))
+    scale = torch.as_tensor(weights)[:, None]
+    mass, slope, curve = grams(knots, degree)
     smooth = BendingOperator(mass, slope, curve, fairness)
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
     shape = (3, *(len(k) - degree - 1 for k in knots))
 
     def operator(x: Tensor) -> Tensor:
-        return (transposed @ (matrix @ x.reshape(3, -1).T)).T.reshape(shape) + smooth(x)
+        return rows.adjoint(scale * rows(x), x) + smooth(x)
 
-    right = (transposed @ torch.as_tensor(points, dtype=torch.float64, device=device)).T.reshape(shape)
+    right = rows.adjoint(scale * torch.as_tensor(points), torch.zeros(shape))
     control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
-    return control.contiguous()  # components first also in memory, as a checkpoint gives them back
+    return control
 
 
 def _collocation_3d(parameters: Array, knots: tuple[Array, Array, Array], degree: int) -> csr_array:

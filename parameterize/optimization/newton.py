@@ -81,7 +81,7 @@ def optimize(
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with _one_thread_an_operation():
-        energy = SplineEnergy(config, knots, surface, device=control.device)
+        energy = SplineEnergy(config, knots, surface)
         energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
         first = Optimized.of(control, knots, config)
         rounds = _Rounds(energy, knots, control, first, near=energy.anchors.near(control))
@@ -177,13 +177,13 @@ class _Rounds:
 
     def restore(self, tensors: dict[str, Tensor], state: dict[str, Any], history: History) -> None:
         """Continue from a checkpoint that `save` has kept."""
-        device, energy = self.control.device, self.energy
+        energy = self.energy
         energy.surface.places.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
         energy.surface.give_way(tensors["yielding"].numpy())
         energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
         energy.barrier.activate(tensors["active"].numpy())
-        self.control, best = tensors["control"].to(device), tensors["best"].to(device)
-        self.best = Optimized.of(best, self.knots, energy.config)
+        self.control = tensors["control"]
+        self.best = Optimized.of(tensors["best"], self.knots, energy.config)
         self.number, self.parting, self.polished = (int(state[name]) for name in ("number", "parting", "polished"))
         if self.parting:
             energy.watch_contact(self.control)

@@ -73,18 +73,18 @@ def facing_penalty(fit: SurfaceFit, control: Tensor, floor: float, margin: float
 
     With a margin above 1 it also holds points that could fall below the floor in the next step.
     """
-    window = fit.places.window()
+    window = fit.places.window
     _, tangent_a, tangent_b = window.derivatives(control)
     outward = axis_and_side(fit.places.cube_faces)[1] == 1
     normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
     low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < margin * floor
     along_a, along_b = (
-        ControlRows.of(sparse_rows(weights[low], window.indices[low], control[0].numel()), control.device)
+        ControlRows.of(sparse_rows(weights[low], window.indices[low], control[0].numel()))
         for weights in (window.weights(1, 0), window.weights(0, 1))
     )
     return FacingPenalty(
         (along_a, along_b),
-        torch.as_tensor(np.ascontiguousarray(normals[low].T), device=control.device),
-        torch.as_tensor(fit.weights[low], device=control.device),
+        torch.as_tensor(np.ascontiguousarray(normals[low].T)),
+        torch.as_tensor(fit.weights[low]),
         floor,
     )

@@ -8,8 +8,15 @@ Matrices come as (3, 3, m): row, column, sample. Batched this way every operatio
 
 from __future__ import annotations
 
+import numba
+import numpy as np
 import torch
 from torch import Tensor
+
+from ..arrays import Array
+
+_BLOCK = 256  # matrices at a time
+_STEPS = 8
 
 
 def determinant(j: Tensor) -> Tensor:
@@ -46,29 +53,45 @@ def least_eigenvalue(s: Tensor) -> Tensor:
 
 
 @torch.no_grad()
-def closest_rotation(j: Tensor, iterations: int = 7) -> Tensor:
+def closest_rotation(j: Tensor) -> Tensor:
     """The rotation closest to each matrix of (3, 3, m), detached.
 
-    Scaled Newton steps R <- (g R + R^-T / g) / 2 (Higham 1986) where det J is safely positive, in single precision
-    but for the last step. Elsewhere Newton would end at a reflection or divide by zero; those few are done by SVD with
-    the smallest direction flipped. A matrix that is not finite gets some rotation: the energy made of both tells.
+    Scaled Newton steps (Higham 1986) where det J is safely positive. Elsewhere these would end at a reflection or
+    divide by zero; those few are done by SVD with the smallest direction flipped. A matrix that is not finite gets some
+    rotation: the energy made of both tells.
     """
     size = j.square().sum(dim=(0, 1)).sqrt().clamp_min(torch.finfo(j.dtype).tiny)
     regular = determinant(j) > 1e-3 * size**3
     identity = torch.eye(3, dtype=j.dtype, device=j.device)[:, :, None]
-    r = torch.where(regular, j / size, identity).float()
-    for _ in range(iterations - 2):
-        cofactors, det = cofactor_and_determinant(r)
-        inverse_t = cofactors.div_(det)
-        g = (inverse_t.square().sum(dim=(0, 1)) / r.square().sum(dim=(0, 1))).sqrt().sqrt()
-        r = r.mul_(g).add_(inverse_t.div_(g)).mul_(0.5)
-    for kind in (torch.float32, j.dtype):  # close to the rotation g is 1
-        r = r.to(kind)
-        r = (cofactor(r) / determinant(r)).add_(r).mul_(0.5)
+    start = torch.where(regular, j / size, identity).cpu().numpy()
+    r = torch.from_numpy(_polar_factors(start.reshape(9, -1)).reshape(start.shape)).to(j.device)
     if not bool(regular.all()):
         rest = ~regular
         r[:, :, rest] = _rotation_by_svd(torch.nan_to_num(j[:, :, rest], 0.0, 0.0, 0.0))
     return r
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _polar_factors(matrices: Array) -> Array:
+    """Rotations (9, m) closest to matrices (9, m): R <- (g R + R^-T / g) / 2 with g = (|R^-1| / |R|)^(1/2)."""
+    out = matrices.copy()
+    for begin in range(0, out.shape[1], _BLOCK):
+        r = out[:, begin : begin + _BLOCK]
+        for _ in range(_STEPS):
+            for i in range(r.shape[1]):
+                a, b, c, d, e, f, g, h, k = r[0, i], r[1, i], r[2, i], r[3, i], r[4, i], r[5, i], r[6, i], r[7, i], r[8, i]
+                ca, cb, cc = e * k - f * h, f * g - d * k, d * h - e * g
+                cd, ce, cf = c * h - b * k, a * k - c * g, b * g - a * h
+                cg, ch, ck = b * f - c * e, c * d - a * f, a * e - b * d
+                det = a * ca + b * cb + c * cc
+                size = a * a + b * b + c * c + d * d + e * e + f * f + g * g + h * h + k * k
+                turned = ca * ca + cb * cb + cc * cc + cd * cd + ce * ce + cf * cf + cg * cg + ch * ch + ck * ck
+                scale = np.sqrt(np.sqrt(turned / size) / det)
+                left, right = scale / 2, 1 / (2 * scale * det)
+                r[0, i], r[1, i], r[2, i] = left * a + right * ca, left * b + right * cb, left * c + right * cc
+                r[3, i], r[4, i], r[5, i] = left * d + right * cd, left * e + right * ce, left * f + right * cf
+                r[6, i], r[7, i], r[8, i] = left * g + right * cg, left * h + right * ch, left * k + right * ck
+    return out
 
 
 def _rotation_by_svd(j: Tensor) -> Tensor:

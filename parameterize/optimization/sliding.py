@@ -8,9 +8,10 @@ boundary error and distortion together.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+import numba
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from torch import Tensor
@@ -19,11 +20,13 @@ from ..arrays import Array, IntArray
 from ..cube.closest_point import damped_fit
 from ..cube.cube import axis_and_side, face_number, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, untangle
-from ..spline.bspline import basis_derivatives, breakpoints, sparse_rows
+from ..spline.bspline import breakpoints, fill_basis, sparse_rows
+from ..threads import in_parallel
 from .tensor_product import ControlRows
 
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3
+_POINTS = 4096  # in a piece of work
 
 
 class SlidingParameters:
@@ -38,23 +41,20 @@ class SlidingParameters:
         degree: int,
         parameters: Array,
         triangles: IntArray,
-        *,
-        device: torch.device,
     ) -> None:
-        self.knots, self.degree, self.device = knots, degree, device
+        self.knots, self.degree = knots, degree
         self.triangles = triangles
         self.place(parameters, nearest_faces(parameters))
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
         """Take these parameters (N, 3) on these cube faces (N,)."""
         self.parameters, self.cube_faces = parameters, cube_faces
-        window = self.window()
-        count = int(np.prod([len(k) - self.degree - 1 for k in self.knots]))
-        self.rows = ControlRows.of(sparse_rows(window.weights(0, 0), window.indices, count), self.device)
+        for known in ("window", "rows"):
+            self.__dict__.pop(known, None)
 
     def values(self, control: Tensor) -> Array:
         """Return F at the parameters: (N, 3)."""
-        return np.asarray(self.rows(control).cpu())
+        return self.window.derivatives(control)[0]
 
     def near_spans(self, spans: IntArray) -> NDArray[np.bool_]:
         """Return which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
@@ -76,7 +76,7 @@ class SlidingParameters:
         that would end up farther away stay where they are; with `keep_layout` steps that would flip a triangle are
         shortened.
         """
-        values, ta, tb = self.window().derivatives(control)
+        values, ta, tb = self.window.derivatives(control)
         residual = values - points
         step = -np.stack(damped_fit(ta, tb, residual, _DAMPING), axis=1)
         step *= np.minimum(1.0, max_step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
@@ -115,22 +115,19 @@ class SlidingParameters:
             np.where(chosen[:, None], parameters, self.parameters), np.where(chosen, cube_faces, self.cube_faces)
         )
 
+    @cached_property
     def window(self) -> FaceWindow:
-        """Return the basis functions that are not zero at the points."""
-        tables = [basis_derivatives(k, self.degree, self.parameters[:, d], 1) for d, k in enumerate(self.knots)]
-        first = np.stack([t[0] for t in tables])  # (3, N)
-        values = np.stack([t[1] for t in tables])  # (3, 2, N, p + 1)
-        sizes = [len(k) - self.degree - 1 for k in self.knots]
-        stride = np.array([sizes[1] * sizes[2], sizes[2], 1])
-        axis, side = axis_and_side(self.cube_faces)
-        a, b = tangent_axes(axis)
-        rows = np.arange(len(axis))
-        window = np.arange(self.degree + 1)
-        base = side * (np.array(sizes)[axis] - 1) * stride[axis]
-        along_a = (first[a, rows][:, None] + window) * stride[a][:, None]
-        along_b = (first[b, rows][:, None] + window) * stride[b][:, None]
-        indices = base[:, None, None] + along_a[:, :, None] + along_b[:, None, :]
-        return FaceWindow(indices.reshape(len(rows), (self.degree + 1) ** 2), values[a, :, rows], values[b, :, rows])
+        """The basis functions that are not zero at the points."""
+        knots, parameters, faces = tuple(self.knots), self.parameters, self.cube_faces
+        pieces = [slice(begin, begin + _POINTS) for begin in range(0, max(len(faces), 1), _POINTS)]
+        found = in_parallel(lambda piece: _face_windows(knots, self.degree, parameters[piece], faces[piece]), pieces)
+        return FaceWindow(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+    @cached_property
+    def rows(self) -> ControlRows:
+        """The rows that yield F at the points."""
+        count = int(np.prod([len(k) - self.degree - 1 for k in self.knots]))
+        return ControlRows.of(sparse_rows(self.window.weights(0, 0), self.window.indices, count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +144,52 @@ class FaceWindow:
 
     def derivatives(self, control: Tensor) -> tuple[Array, Array, Array]:
         """Return F and its tangents t_a and t_b at the points: (N, 3) each."""
-        local = np.asarray(control.cpu()).reshape(3, -1).T[self.indices]  # (N, k, 3)
-        weights = (self.weights(0, 0), self.weights(1, 0), self.weights(0, 1))
-        value, along_a, along_b = (np.einsum("nk,nkc->nc", w, local) for w in weights)
+        value, along_a, along_b = _tangents(self.indices, self.in_a, self.in_b, control.reshape(3, -1).numpy())
         return value, along_a, along_b
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _face_windows(
+    knots: tuple[Array, Array, Array], degree: int, parameters: Array, cube_faces: IntArray
+) -> tuple[IntArray, Array, Array]:
+    """What a FaceWindow holds, for points (N, 3) on cube faces (N,)."""
+    count, width = len(parameters), degree + 1
+    sizes = np.array([len(k) - degree - 1 for k in knots])
+    stride = np.array([sizes[1] * sizes[2], sizes[2], 1])
+    indices = np.empty((count, width * width), np.int64)
+    tables = np.zeros((2, 2, count, width))
+    first, span = np.empty(2, np.int64), np.empty(1, np.int64)
+    for n in range(count):
+        axis, side = cube_faces[n] // 2, cube_faces[n] % 2
+        for d in range(2):
+            along = (axis + 1 + d) % 3
+            row, x = knots[along], parameters[n, along : along + 1]
+            span[0] = min(max(np.searchsorted(row, x[0], side="right") - 1, degree), len(row) - degree - 2)
+            fill_basis(row, degree, x, span, tables[d, :, n : n + 1])
+            first[d] = span[0] - degree
+        base = side * (sizes[axis] - 1) * stride[axis]
+        step_a, step_b = stride[(axis + 1) % 3], stride[(axis + 2) % 3]
+        for i in range(width):
+            for j in range(width):
+                indices[n, i * width + j] = base + (first[0] + i) * step_a + (first[1] + j) * step_b
+    return indices, tables[0].transpose(1, 0, 2).copy(), tables[1].transpose(1, 0, 2).copy()
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _tangents(indices: IntArray, in_a: Array, in_b: Array, control: Array) -> Array:
+    """F, t_a and t_b of control points (3, n) at the points of a FaceWindow: (3, N, 3)."""
+    width = in_a.shape[2]
+    out = np.zeros((3, len(indices), 3))
+    for n in range(len(indices)):
+        for i in range(width):
+            for j in range(width):
+                column = indices[n, i * width + j]
+                for c in range(3):
+                    point = control[c, column]
+                    out[0, n, c] += in_a[n, 0, i] * in_b[n, 0, j] * point
+                    out[1, n, c] += in_a[n, 1, i] * in_b[n, 0, j] * point
+                    out[2, n, c] += in_a[n, 0, i] * in_b[n, 1, j] * point
+    return out
 
 
 def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:

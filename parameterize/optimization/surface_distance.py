@@ -42,14 +42,14 @@ class SurfaceFit:
     def aim(self, points: Array, quadrics: Array) -> None:
         """Take other points (N, 3) and quadrics (N, 3, 3)."""
         self.points, self._quadrics = points, quadrics
-        self._points = torch.as_tensor(points, device=self.places.device)
+        self._points = torch.as_tensor(points)
         self.give_way(self.yielding)
 
     def give_way(self, yielding: Array) -> None:
         """Multiply the points' weights by `yielding` (N,), in place of earlier such factors."""
         self.yielding = yielding
         self.weights = yielding * self._weights
-        self._metric = torch.as_tensor(self.weights[:, None, None] * self._quadrics, device=self.places.device)
+        self._metric = torch.as_tensor(self.weights[:, None, None] * self._quadrics)
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """Return the sum of r^T Q r at the present parameters and its gradient (3, n_u, n_v, n_w)."""
@@ -60,11 +60,7 @@ class SurfaceFit:
     def hessian(self, dtype: torch.dtype) -> Operator:
         """Return the second derivative of the energy, parameters held, as an operator on (3, n_u, n_v, n_w)."""
         rows, metric = self.places.rows.to(dtype), 2.0 * self._metric.to(dtype)
-
-        def product(direction: Tensor) -> Tensor:
-            return rows.adjoint((metric @ rows(direction)[:, :, None])[:, :, 0], direction)
-
-        return product
+        return lambda direction: rows.squared(metric.numpy(), direction)
 
     def residuals(self, control: Tensor) -> Array:
         """Return F(p) - v: (N, 3)."""

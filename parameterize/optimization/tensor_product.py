@@ -5,19 +5,23 @@ Control points are held as (3, n_u, n_v, n_w), component first, so that every co
 
 from __future__ import annotations
 
-import warnings
 from copy import copy
 from dataclasses import dataclass
+from typing import Any
 
+import numba
 import numpy as np
 import torch
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..spline.bspline import collocation, gauss_points
+from ..threads import in_parallel
 
 _END_SPANS = 1
+_ROWS = 4096  # of a sparse matrix in a piece of work
+_PLANES = 4  # of quadrature points in one
 
 
 def along(matrix: Tensor, field: Tensor, axis: int) -> Tensor:
@@ -28,104 +32,218 @@ def along(matrix: Tensor, field: Tensor, axis: int) -> Tensor:
     return (matrix @ field.reshape(-1, field.shape[axis], after.numel())).view(*before, len(matrix), *after)
 
 
-def to_torch(matrix: csr_array, device: torch.device) -> Tensor:
-    """A scipy CSR matrix as a torch CSR tensor, float64."""
-    starts, columns = (
-        torch.as_tensor(part.astype(np.int64), device=device) for part in (matrix.indptr, matrix.indices)
-    )
-    data = torch.as_tensor(matrix.data, device=device)
-    with warnings.catch_warnings():  # torch calls its CSR tensors beta, once a process
-        warnings.simplefilter("ignore", UserWarning)
-        return torch.sparse_csr_tensor(starts, columns, data, size=matrix.shape)
-
-
 @dataclass(frozen=True, eq=False)
 class ControlRows:
-    """A sparse matrix (N, n_u n_v n_w) that applies to control points (3, n_u, n_v, n_w), and its transpose."""
+    """A sparse matrix (N, n_u n_v n_w) that applies to control points (3, n_u, n_v, n_w), and its transpose.
 
-    matrix: Tensor
-    transposed: Tensor
+    Row i has the entries values[starts[i] : starts[i + 1]] in these columns.
+    """
+
+    starts: IntArray
+    columns: IntArray
+    values: Array
 
     @classmethod
-    def of(cls, rows: csr_array, device: torch.device) -> ControlRows:
+    def of(cls, rows: csr_array) -> ControlRows:
         """Take the rows of a scipy matrix."""
-        return cls(to_torch(rows, device), to_torch(csr_array(rows.T), device))
+        return cls(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data)
 
     def to(self, dtype: torch.dtype) -> ControlRows:
         """Return the same rows in another precision."""
-        return ControlRows(self.matrix.to(dtype), self.transposed.to(dtype))
+        return ControlRows(self.starts, self.columns, torch.from_numpy(self.values).to(dtype).numpy())
 
     def __call__(self, control: Tensor) -> Tensor:
         """Return the values (N, 3) at control points."""
-        return self.matrix @ control.reshape(3, -1).T
+        field = control.reshape(3, -1).numpy()
+        found = in_parallel(lambda piece: _times(piece, self.columns, self.values, field), self._pieces())
+        return torch.from_numpy(np.concatenate(found))
 
     def adjoint(self, dual: Tensor, like: Tensor) -> Tensor:
         """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
-        return (self.transposed @ dual).T.reshape(like.shape)
+        flat, count = np.ascontiguousarray(dual.numpy()), like.numel() // 3
+        found = in_parallel(lambda piece: _spread(piece, self.columns, self.values, flat, count), self._pieces())
+        return torch.from_numpy(sum(found[1:], start=found[0])).view(like.shape)
+
+    def squared(self, metric: Array, field: Tensor) -> Tensor:
+        """Apply the rows, matrices (N, 3, 3) on what they yield, and the transpose of the rows."""
+        flat = field.reshape(3, -1).numpy()
+        found = in_parallel(lambda piece: _squared(piece, self.columns, self.values, metric, flat), self._pieces())
+        return torch.from_numpy(sum(found[1:], start=found[0])).view(field.shape)
+
+    def _pieces(self) -> list[tuple[int, IntArray]]:
+        """Where the rows of each piece of work lie: the number of the first, and its entries' places (m + 1,)."""
+        count = max(len(self.starts) - 1, 1)
+        return [(begin, self.starts[begin : begin + _ROWS + 1]) for begin in range(0, count, _ROWS)]
 
 
-@dataclass(frozen=True, eq=False)
-class TensorGrid:
-    """Basis values and derivatives (m, n) at the grid's points, one pair of matrices a direction.
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _times(piece: tuple[int, IntArray], columns: IntArray, values: Array, field: Array) -> Array:
+    """Rows of a sparse matrix times a field (3, n): (m, 3)."""
+    _, starts = piece
+    out = np.zeros((len(starts) - 1, 3), field.dtype)
+    for row in range(len(out)):
+        for entry in range(starts[row], starts[row + 1]):
+            column, value = columns[entry], values[entry]
+            for c in range(3):
+                out[row, c] += value * field[c, column]
+    return out
 
-    order: the directions in the order of their contraction. Fields may have further axes behind the three of the grid;
-    there the contractions are fastest from the last direction to the first.
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _spread(piece: tuple[int, IntArray], columns: IntArray, values: Array, dual: Array, count: int) -> Array:
+    """The transpose of some rows times what all rows have (N, 3): (3, count)."""
+    begin, starts = piece
+    out = np.zeros((3, count), dual.dtype)
+    for row in range(len(starts) - 1):
+        for entry in range(starts[row], starts[row + 1]):
+            column, value = columns[entry], values[entry]
+            for c in range(3):
+                out[c, column] += value * dual[begin + row, c]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _squared(piece: tuple[int, IntArray], columns: IntArray, values: Array, metric: Array, field: Array) -> Array:
+    """The transpose of some rows times metrics (N, 3, 3) times the rows times a field (3, n): (3, n)."""
+    begin, starts = piece
+    out, at = np.zeros_like(field), np.empty(3, field.dtype)
+    for row in range(len(starts) - 1):
+        at[:] = 0.0
+        for entry in range(starts[row], starts[row + 1]):
+            for c in range(3):
+                at[c] += values[entry] * field[c, columns[entry]]
+        pulled = (
+            metric[begin + row, :, 0] * at[0] + metric[begin + row, :, 1] * at[1] + metric[begin + row, :, 2] * at[2]
+        )
+        for entry in range(starts[row], starts[row + 1]):
+            for c in range(3):
+                out[c, columns[entry]] += values[entry] * pulled[c]
+    return out
+
+
+Band = tuple[Any, ...]  # see _band
+
+
+class GaussGrid:
+    """A grid of quadrature points, where Jacobians are taken and their duals pulled back plane by plane.
+
+    Points lie in planes of constant u; in a plane they are in the order of w, then v. weights (planes, points).
     """
 
-    values: tuple[Tensor, Tensor, Tensor]
-    slopes: tuple[Tensor, Tensor, Tensor]
-    order: tuple[int, int, int] = (0, 1, 2)
+    def __init__(
+        self, knots: tuple[Array, ...], degrees: tuple[int, ...], n_gauss: int, *, inner: int | None = None
+    ) -> None:
+        """Take `n_gauss` points a span and direction.
 
-    def to(self, dtype: torch.dtype) -> TensorGrid:
-        """Return the same grid in another precision."""
-        values, slopes = (tuple(m.to(dtype) for m in part) for part in (self.values, self.slopes))
-        return TensorGrid(values, slopes, self.order)  # type: ignore[arg-type]
+        inner: points on all spans but the first and last. One is enough there for smooth splines, which have one basis
+        function a span (the half-point rule of Hughes, Reali, Sangalli, CMAME 199, 2010).
+        """
+        points, (u, v, w) = zip(
+            *(_graded_points(k, n_gauss, n_gauss if inner is None else inner) for k in knots), strict=True
+        )
+        self.weights = u[:, None] * (w[:, None] * v).ravel()
+        tables = [
+            [collocation(k, p, x, d).toarray() for d in range(2)]
+            for k, p, x in zip(knots, degrees, points, strict=True)
+        ]
+        self._bands: dict[Any, tuple[tuple[Band, ...], tuple[Band, ...]]] = {}
+        for dtype in (np.float32, np.float64):
+            forward = tuple(_band(*(m.astype(dtype) for m in pair)) for pair in tables)
+            self._bands[np.dtype(dtype)] = forward, tuple(_band(*(m.T.astype(dtype) for m in pair)) for pair in tables)
 
-    def jacobian(self, control: Tensor) -> Tensor:
-        """Return J (component, direction, grid): (3, n_u, n_v, n_w, ...) -> (3, 3, m_u, m_v, m_w, ...)."""
-        i, j, k = self.order
-        values, slopes = self.values, self.slopes
-        plain, by_i = along(values[i], control, i + 1), along(slopes[i], control, i + 1)
-        by_i = along(values[j], by_i, j + 1)
-        plain, by_j = along(values[j], plain, j + 1), along(slopes[j], plain, j + 1)
-        columns = {
-            i: along(values[k], by_i, k + 1),
-            j: along(values[k], by_j, k + 1),
-            k: along(slopes[k], plain, k + 1),
-        }
-        return torch.stack([columns[direction] for direction in range(3)], dim=1)
+    def planes(self) -> list[slice]:
+        """Return the planes of each piece of work."""
+        return [slice(begin, begin + _PLANES) for begin in range(0, len(self.weights), _PLANES)]
 
-    def adjoint(self, dual: Tensor) -> Tensor:
-        """Apply the transpose of `jacobian`: (3, 3, m_u, m_v, m_w, ...) -> (3, n_u, n_v, n_w, ...)."""
-        i, j, k = self.order
-        values, slopes = ([m.T for m in part] for part in (self.values, self.slopes))
-        by_i = along(values[j], along(values[k], dual[:, i], k + 1), j + 1)
-        by_j = along(slopes[j], along(values[k], dual[:, j], k + 1), j + 1)
-        plain = by_j + along(values[j], along(slopes[k], dual[:, k], k + 1), j + 1)
-        return along(slopes[i], by_i, i + 1) + along(values[i], plain, i + 1)
+    def jacobian(self, control: Tensor, planes: slice) -> Tensor:
+        """Return J (component, direction, point) on some planes: (3, n_u, n_v, n_w) -> (3, 3, m)."""
+        field = np.ascontiguousarray(control.numpy())
+        (first, values, slopes), *across = self._bands[field.dtype][0]
+        band = first[planes], values[planes], slopes[planes]
+        return torch.from_numpy(_jacobian((band, *across), field))
+
+    def adjoint(self, dual: Tensor, planes: slice) -> tuple[int, Array]:
+        """Apply the transpose of `jacobian`: the first layer of control points, and what all layers get from it."""
+        field = np.ascontiguousarray(dual.numpy())
+        forward, (_, *across) = self._bands[field.dtype]
+        first, values, slopes = (part[planes] for part in forward[0])
+        band = first - first[0], values, slopes
+        return int(first[0]), _jacobian_adjoint((band, *across), field)
+
+    def collect(self, parts: list[tuple[int, Array]], like: Tensor) -> Tensor:
+        """Add what the pieces of work give to the layers of control points, in their order."""
+        total = torch.zeros_like(like)
+        for first, layers in parts:
+            total[:, first : first + layers.shape[1]] += torch.from_numpy(layers)
+        return total
 
 
-def gauss_grid(
-    knots: tuple[Array, ...],
-    degrees: tuple[int, ...],
-    n_gauss: int,
-    *,
-    inner: int | None = None,
-    device: torch.device,
-    dtype: torch.dtype,
-) -> tuple[TensorGrid, tuple[Tensor, ...]]:
-    """Grid of Gauss points and the three weight vectors: `n_gauss` points a span and direction.
+def _band(*matrices: Array) -> Any:
+    """Store matrices (m, n) with few entries a row: the first columns (m,), the entries from there on (m, k) each."""
+    used = np.any([matrix != 0.0 for matrix in matrices], axis=0)
+    low, high = used.argmax(axis=1), used.shape[1] - used[:, ::-1].argmax(axis=1)
+    width = int((high - low).max())
+    first = np.minimum(low, used.shape[1] - width)
+    columns = first[:, None] + np.arange(width)
+    return first, *(np.take_along_axis(matrix, columns, axis=1) for matrix in matrices)
 
-    inner: points on all spans but the first and last. One is enough there for smooth splines, which have one basis
-    function a span (the half-point rule of Hughes, Reali, Sangalli, CMAME 199, 2010).
-    """
-    values, slopes, weights = [], [], []
-    for k, p in zip(knots, degrees, strict=True):
-        points, weight = _graded_points(k, n_gauss, n_gauss if inner is None else inner)
-        values.append(_dense(k, p, points, 0, device, dtype))
-        slopes.append(_dense(k, p, points, 1, device, dtype))
-        weights.append(torch.as_tensor(weight, dtype=dtype, device=device))
-    return TensorGrid(tuple(values), tuple(slopes)), tuple(weights)  # type: ignore[arg-type]
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _apply(first: IntArray, entries: Array, field: Array, out: Array) -> None:
+    """Add a banded matrix times a field (n, r) to out (m, r)."""
+    for m in range(len(first)):
+        for k in range(entries.shape[1]):
+            entry, row = entries[m, k], first[m] + k
+            for i in range(out.shape[1]):
+                out[m, i] += entry * field[row, i]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
+    """Derivatives (3, 3, points) of control points (3, n_u, n_v, n_w) at all points of the bands, in planes."""
+    (first_u, values_u, slopes_u), (first_v, values_v, slopes_v), (first_w, values_w, slopes_w) = bands
+    _, n_u, n_v, n_w = control.shape
+    planes, m_v, m_w = len(first_u), len(first_v), len(first_w)
+    out = np.zeros((3, 3, planes, m_w, m_v), control.dtype)
+    for c in range(3):
+        field = control[c].reshape(n_u, n_v * n_w)
+        plain, steep = np.zeros((planes, n_v * n_w), control.dtype), np.zeros((planes, n_v * n_w), control.dtype)
+        _apply(first_u, values_u, field, plain)
+        _apply(first_u, slopes_u, field, steep)
+        for m in range(planes):
+            flat, upright = plain[m].reshape(n_v, n_w), steep[m].reshape(n_v, n_w)
+            part = np.zeros((3, m_v, n_w), control.dtype)
+            _apply(first_v, values_v, upright, part[0])
+            _apply(first_v, slopes_v, flat, part[1])
+            _apply(first_v, values_v, flat, part[2])
+            for direction in range(3):
+                entries = slopes_w if direction == 2 else values_w
+                _apply(first_w, entries, part[direction].T.copy(), out[c, direction, m])
+    return out.reshape(3, 3, planes * m_w * m_v)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
+    """The transpose; the bands of v and w are transposed already. All layers (3, layers, n_v, n_w)."""
+    (first_u, values_u, slopes_u), (first_v, values_v, slopes_v), (first_w, values_w, slopes_w) = bands
+    planes, n_v, n_w, width = len(first_u), len(first_v), len(first_w), values_u.shape[1]
+    m_w = max(first_w) + values_w.shape[1]
+    m_v = dual.shape[2] // (planes * m_w)
+    field = dual.reshape(3, 3, planes, m_w, m_v)
+    out = np.zeros((3, first_u[-1] + width, n_v, n_w), dual.dtype)
+    for c in range(3):
+        for m in range(planes):
+            part = np.zeros((3, n_w, m_v), dual.dtype)
+            for direction in range(3):
+                entries = slopes_w if direction == 2 else values_w
+                _apply(first_w, entries, field[c, direction, m], part[direction])
+            plain, steep = np.zeros((n_v, n_w), dual.dtype), np.zeros((n_v, n_w), dual.dtype)
+            _apply(first_v, values_v, part[0].T.copy(), steep)
+            _apply(first_v, slopes_v, part[1].T.copy(), plain)
+            _apply(first_v, values_v, part[2].T.copy(), plain)
+            for k in range(width):
+                out[c, first_u[m] + k] += values_u[m, k] * plain + slopes_u[m, k] * steep
+    return out
 
 
 def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
@@ -140,45 +258,71 @@ def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
     return points, weights
 
 
-def _dense(knots: Array, degree: int, x: Array, derivative: int, device: torch.device, dtype: torch.dtype) -> Tensor:
-    return torch.as_tensor(collocation(knots, degree, x, derivative).toarray(), dtype=dtype, device=device)
-
-
-def gram(knots: Array, degree: int, derivative: int, *, device: torch.device, dtype: torch.dtype) -> Tensor:
+def gram(knots: Array, degree: int, derivative: int) -> Tensor:
     """1-D matrix of integrals of products of `derivative`-th derivatives (n, n): mass, stiffness, bending."""
     points, weights = gauss_points(knots, degree + 1)
-    table = _dense(knots, degree, points.ravel(), derivative, device, dtype)
-    return table.T @ (torch.as_tensor(weights.ravel(), dtype=dtype, device=device)[:, None] * table)
+    table = collocation(knots, degree, points.ravel(), derivative).toarray()
+    return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
 
 
-def grams(knots: tuple[Array, ...], degree: int, device: torch.device) -> list[tuple[Tensor, ...]]:
-    """Mass, stiffness and bending matrices, each for the three directions; float64."""
-    return [tuple(gram(k, degree, d, device=device, dtype=torch.float64) for k in knots) for d in range(3)]
+def grams(knots: tuple[Array, ...], degree: int) -> list[tuple[Tensor, ...]]:
+    """Mass, stiffness and bending matrices, each for the three directions."""
+    return [tuple(gram(k, degree, d) for k in knots) for d in range(3)]
 
 
-@dataclass(frozen=True, eq=False)
 class BendingOperator:
-    """x -> weight * H x with x^T H x = int |Hessian F|^2 (exact)."""
+    """x -> weight * H x with x^T H x = int |Hessian F|^2 (exact).
 
-    mass: tuple[Tensor, ...]
-    slope: tuple[Tensor, ...]
-    curve: tuple[Tensor, ...]
-    weight: float
+    mass, slope, curve: the matrices of `grams`.
+    """
 
-    def to(self, dtype: torch.dtype) -> BendingOperator:
-        """The same in another precision."""
-        mass, slope, curve = (tuple(m.to(dtype) for m in part) for part in (self.mass, self.slope, self.curve))
-        return BendingOperator(mass, slope, curve, self.weight)
+    def __init__(
+        self, mass: tuple[Tensor, ...], slope: tuple[Tensor, ...], curve: tuple[Tensor, ...], weight: float
+    ) -> None:
+        self._bands = {}
+        for kind in (np.float32, np.float64):
+            weights = (weight, 1.0, 1.0)
+            bands = [
+                _band(*(w * m.numpy().astype(kind) for m in matrices))
+                for w, *matrices in zip(weights, mass, slope, curve, strict=True)
+            ]
+            self._bands[np.dtype(kind)] = tuple(bands)
 
     def __call__(self, x: Tensor) -> Tensor:
-        """(3, n_u, n_v, n_w) -> the same shape."""
-        (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = self.mass, self.slope, self.curve
-        xm, xk, xh = along(m2, x, 3), along(k2, x, 3), along(h2, x, 3)
-        mm = along(m1, xm, 2)
-        first = along(k1, xm, 2) + along(m1, xk, 2)
-        second = along(h1, xm, 2) + along(m1, xh, 2) + 2.0 * along(k1, xk, 2)
-        result = along(self.weight * h0, mm, 1) + along(m0, self.weight * second, 1)
-        return result + along(2.0 * self.weight * k0, first, 1)
+        """(3, n_u, n_v, n_w) -> the same shape, in its precision."""
+        field = np.ascontiguousarray(x.numpy())
+        bands = self._bands[field.dtype]
+        return torch.from_numpy(np.stack(in_parallel(lambda component: _bend(bands, component), list(field))))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _bend(bands: tuple[Band, Band, Band], field: Array) -> Array:
+    """Sum of the six products of three matrices that make up the bending of one component (n_u, n_v, n_w)."""
+    (first_u, mass_u, slope_u, curve_u), (first_v, mass_v, slope_v, curve_v), (first_w, mass_w, slope_w, curve_w) = bands
+    n_u, n_v, n_w = field.shape
+    parts = np.zeros((3, n_u, n_v * n_w), field.dtype)  # what u's mass, slope and curvature apply to
+    for i in range(n_u):
+        by_v = np.zeros((3, n_v, n_w), field.dtype)
+        _apply(first_v, mass_v, field[i], by_v[0])
+        _apply(first_v, slope_v, field[i], by_v[1])
+        _apply(first_v, curve_v, field[i], by_v[2])
+        mass, slope, curve = by_v[0].T.copy(), by_v[1].T.copy(), by_v[2].T.copy()
+        across = np.zeros((3, n_w, n_v), field.dtype)
+        _apply(first_w, slope_w, slope, across[0])
+        across[0] *= 2
+        _apply(first_w, mass_w, curve, across[0])
+        _apply(first_w, curve_w, mass, across[0])
+        _apply(first_w, slope_w, mass, across[1])
+        _apply(first_w, mass_w, slope, across[1])
+        across[1] *= 2
+        _apply(first_w, mass_w, mass, across[2])
+        for kind in range(3):
+            parts[kind, i] = across[kind].T.copy().reshape(n_v * n_w)
+    out = np.zeros((n_u, n_v * n_w), field.dtype)
+    _apply(first_u, mass_u, parts[0], out)
+    _apply(first_u, slope_u, parts[1], out)
+    _apply(first_u, curve_u, parts[2], out)
+    return out.reshape(n_u, n_v, n_w)
 
 
 class FastDiagonalization:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
@@ -86,39 +87,37 @@ def basis_derivatives(knots: Array, degree: int, x: ArrayLike, derivatives: int 
     """
     points = np.atleast_1d(np.asarray(x, dtype=np.float64))
     spans = find_spans(knots, degree, points)
-    lower = _nonzero_by_degree(knots, degree, points, spans)
     values = np.zeros((derivatives + 1, points.size, degree + 1))
-    values[0] = lower[degree]
-    for k in range(1, min(derivatives, degree) + 1):
-        derived = lower[degree - k]
-        for q in range(degree - k + 1, degree + 1):
-            derived = _differentiate(knots, q, spans, derived)
-        values[k] = derived
+    fill_basis(knots, degree, points.ravel(), spans.ravel(), values)
     return spans - degree, values
 
 
-def _nonzero_by_degree(knots: Array, degree: int, x: Array, spans: NDArray[np.int64]) -> list[Array]:
-    """Return the nonzero values of all degrees by Cox and de Boor: entry q has shape (m, q + 1)."""
-    table = [np.ones((x.size, 1))]
-    for q in range(1, degree + 1):
-        values = np.zeros((x.size, q + 1))
-        for r in range(q):
-            right, left = knots[spans + r + 1], knots[spans + r + 1 - q]
-            share = table[q - 1][:, r] / (right - left)
-            values[:, r] += (right - x) * share
-            values[:, r + 1] += (x - left) * share
-        table.append(values)
-    return table
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def fill_basis(knots: Array, degree: int, x: Array, spans: IntArray, out: Array) -> None:
+    """Values and derivatives of the functions that are not zero at points (m,) of these spans: into out (d, m, p + 1).
 
-
-def _differentiate(knots: Array, q: int, spans: NDArray[np.int64], lower: Array) -> Array:
-    """Return derivatives of degree q (m, q + 1) from values or derivatives of degree q - 1 (m, q)."""
-    result = np.zeros((lower.shape[0], q + 1))
-    for r in range(q):
-        slope = q * lower[:, r] / (knots[spans + r + 1] - knots[spans + r + 1 - q])
-        result[:, r] -= slope
-        result[:, r + 1] += slope
-    return result
+    Row q of `table` has the q + 1 values of degree q (Cox-de Boor).
+    """
+    table = np.zeros((degree + 1, degree + 1))
+    for m in range(len(x)):
+        span = spans[m]
+        table[:] = 0.0
+        table[0, 0] = 1.0
+        for q in range(1, degree + 1):
+            for r in range(q):
+                right, left = knots[span + r + 1], knots[span + r + 1 - q]
+                share = table[q - 1, r] / (right - left)
+                table[q, r] += (right - x[m]) * share
+                table[q, r + 1] += (x[m] - left) * share
+        out[0, m] = table[degree]
+        for k in range(1, min(len(out), degree + 1)):
+            derived = out[k, m]
+            derived[:] = table[degree - k]
+            for q in range(degree - k + 1, degree + 1):
+                for r in range(q - 1, -1, -1):
+                    slope = q * derived[r] / (knots[span + r + 1] - knots[span + r + 1 - q])
+                    derived[r + 1] += slope
+                    derived[r] = -slope
 
 
 def collocation(knots: Array, degree: int, x: ArrayLike, derivative: int = 0) -> csr_array:

@@ -1,0 +1,152 @@
+"""Distortion of a spline map, with a penalty on det J at the quadrature points."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..arrays import Array
+from ..config import SplineConfig
+from ..threads import in_parallel
+from .cg import Operator
+from .polar import closest_rotation, cofactor_and_determinant, least_eigenvalue
+from .tensor_product import GaussGrid
+
+_BLOCK = 256  # points at a time: their matrices stay in the cache
+_ENTRY = np.array([[max(a, b) * (max(a, b) + 1) // 2 + min(a, b) for b in range(9)] for a in range(9)])
+
+
+class DistortionEnergy:
+    """int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over the cube with a = |J - R|^2, R the closest rotation.
+
+    a is the ARAP energy of F; the second part keeps its maximum down; the third, like the paper's bijectivity term,
+    holds against folds. Gauss quadrature.
+    """
+
+    def __init__(self, knots: tuple[Array, Array, Array], config: SplineConfig) -> None:
+        self._grid = GaussGrid(knots, (config.degree,) * 3, config.gauss, inner=config.inner_gauss)
+        self._config = config
+        self._limit = config.arap_limit
+
+    def set_limit(self, control: Tensor) -> None:
+        """Put the limit l above which distortion costs more in proportion to 1 + the mean distortion at `control`."""
+
+        def part(planes: slice) -> float:
+            jacobian = self._grid.jacobian(control, planes)
+            return float(self._weights(planes) @ (jacobian - closest_rotation(jacobian)).square().sum(dim=(0, 1)))
+
+        self._limit = self._config.arap_limit * (1.0 + sum(in_parallel(part, self._grid.planes())))
+
+    def energy_and_gradient(self, control: Tensor, penalty: float) -> tuple[float, Tensor, int]:
+        """Energy, gradient (3, n_u, n_v, n_w), and the number of quadrature points with det J <= 0."""
+        config = self._config
+
+        def part(planes: slice) -> tuple[float, int, tuple[int, Array]]:
+            jacobian, weights = self._grid.jacobian(control, planes), self._weights(planes)
+            cofactors, det = cofactor_and_determinant(jacobian)
+            shortfall = weights * (config.min_det - det).clamp_min(0.0)
+            gap = jacobian - closest_rotation(jacobian)
+            density = gap.square().sum(dim=(0, 1))
+            excess = (density - self._limit).clamp_min(0.0)
+            energy = weights @ (density + config.stiffening * excess.square())
+            energy += penalty * (shortfall @ (config.min_det - det))
+            dual = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess) * gap
+            dual -= 2.0 * penalty * shortfall * cofactors
+            return float(energy), int((det <= 0.0).sum()), self._grid.adjoint(dual, planes)
+
+        energies, folded, pulled = zip(*in_parallel(part, self._grid.planes()), strict=True)
+        return sum(energies), self._grid.collect(list(pulled), control), sum(folded)
+
+    def curvature(self, control: Tensor, penalty: float) -> Operator:
+        """A positive semidefinite second derivative at `control`, as an operator in single precision.
+
+        With S = R^T J, R turns by R [omega] when J changes by d, where (tr(S) I - S) omega = -sum_k R_k x d_k over the
+        rows k, so the Hessian of a is 2 (d - R [omega]). It is positive where all sums of two singular values, the
+        eigenvalues of tr(S) I - S, are at least 2; elsewhere these are lifted. The penalty's part is Gauss-Newton.
+        """
+        rough, config = control.float(), self._config
+
+        def matrices(planes: slice) -> tuple[slice, Array]:
+            jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).float()
+            rotation = closest_rotation(jacobian)
+            cofactors, det = cofactor_and_determinant(jacobian)
+            push = (2.0 * penalty * weights * (det < config.min_det)).sqrt() * cofactors
+            gap = jacobian - rotation
+            excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
+            pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
+            scale = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess)
+            parts = rotation, _turning(rotation, jacobian), pull.flatten(0, 1), push.flatten(0, 1), scale
+            return planes, _matrices(*(p.contiguous().numpy() for p in parts))
+
+        pieces = in_parallel(matrices, self._grid.planes())
+
+        def product(x: Tensor) -> Tensor:
+            def part(piece: tuple[slice, Array]) -> tuple[int, Array]:
+                planes, matrix = piece
+                change = self._grid.jacobian(x, planes)
+                dual = _times_matrices(matrix, change.numpy().reshape(9, -1))
+                return self._grid.adjoint(torch.from_numpy(dual.reshape(change.shape)), planes)
+
+            return self._grid.collect(in_parallel(part, pieces), x)
+
+        return product
+
+    def _weights(self, planes: slice) -> Tensor:
+        return torch.from_numpy(self._grid.weights[planes].ravel())
+
+
+def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
+    """(tr(S) I - S)^-1 with S = R^T J, its eigenvalues lifted so that the least is 2: (3, 3, m)."""
+    stretch = torch.stack([rotation[k][:, None] * jacobian[k] for k in range(3)]).sum(0)  # S, symmetric
+    sums = -stretch
+    for i in range(3):
+        sums[i, i] += stretch[0, 0] + stretch[1, 1] + stretch[2, 2]
+    lift = (2.0 - least_eigenvalue(sums)).clamp_min(0.0)
+    for i in range(3):
+        sums[i, i] += lift
+    cofactors, det = cofactor_and_determinant(sums)  # of a symmetric matrix
+    return cofactors / det
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale: Array) -> Array:
+    """The symmetric matrices of the second derivative in the nine entries of J: (45, m), see _ENTRY.
+
+    scale (I - B softness B^T) + pull pull^T + push push^T, where B^T d is the sum of R_k x d_k over the rows k.
+    """
+    m = scale.size
+    turn = np.zeros((9, 3, m), scale.dtype)
+    for k in range(3):
+        for j in range(3):
+            a, b = (j + 1) % 3, (j + 2) % 3
+            turn[3 * k + j, a] = rotation[k, b]
+            turn[3 * k + j, b] = -rotation[k, a]
+    out = np.empty((45, m), scale.dtype)
+    for a in range(9):
+        soft = np.zeros((3, m), scale.dtype)
+        for s in range(3):
+            for t in range(3):
+                soft[s] += softness[s, t] * turn[a, t]
+        for b in range(a + 1):
+            row = out[_ENTRY[a, b]]
+            for i in range(m):
+                turned = soft[0, i] * turn[b, 0, i] + soft[1, i] * turn[b, 1, i] + soft[2, i] * turn[b, 2, i]
+                row[i] = scale[i] * ((a == b) - turned) + pull[a, i] * pull[b, i] + push[a, i] * push[b, i]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _times_matrices(matrices: Array, vectors: Array) -> Array:
+    """Symmetric matrices, entries (45,) above m points, times vectors (9, m)."""
+    out = np.zeros_like(vectors)
+    for begin in range(0, vectors.shape[1], _BLOCK):
+        end = begin + _BLOCK
+        for a in range(9):
+            total = out[a, begin:end]
+            for b in range(9):
+                entries, vector = matrices[_ENTRY[a, b], begin:end], vectors[b, begin:end]
+                for i in range(total.size):
+                    total[i] += entries[i] * vector[i]
+    return out
