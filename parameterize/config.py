@@ -168,9 +168,7 @@ def _stages(steps: tuple[int, int, int, int, int]) -> tuple[StageConfig, ...]:
 
 
 PRESETS = {
-    "fast": Config(
-        "fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((300, 200, 300, 100, 200)), SplineConfig()
-    ),
+    "fast": Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((120, 80, 120, 40, 80)), SplineConfig()),
     "paper": Config(
         "paper",
         NetworkConfig(width=512, modules=6),

@@ -29,7 +29,7 @@ from .cube.flips import flipped, untangle
 from .cube.tutte import Layout, lay_out
 from .history import History
 from .optimization.least_squares import fit_pairs
-from .optimization.newton import Optimized, optimize
+from .optimization.newton import Optimized, one_thread_an_operation, optimize
 from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
 from .progress import ProgressCallback, ignore
@@ -200,7 +200,7 @@ def _attempt(
 ) -> tuple[Optimized, SurfaceFit]:
     """Train, fit and optimise from one start; the control points found and where the surface lies on their boundary."""
     shared: dict[str, Any] = {"history": history, "progress": progress, "checkpoints": checkpoints}
-    with _timed(seconds, "train"):
+    with _timed(seconds, "train"), one_thread_an_operation():
         trainer = Trainer(
             task.vertices,
             task.faces,
@@ -213,7 +213,7 @@ def _attempt(
             **shared,
         )
         network = trainer.run()
-    with _timed(seconds, "fit"):
+    with _timed(seconds, "fit"), one_thread_an_operation():
         fit = _surface_fit(network, trainer.corners, task)
         control = _first_spline(network, fit, task)
     with _timed(seconds, "optimize"):

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-import torch
 
 from parameterize.optimization.least_squares import fit_pairs
 from parameterize.spline.bspline import greville, open_uniform_knots

@@ -44,9 +44,7 @@ def surface_fit():
         vertex_quadrics(vertices, faces, CONFIG.tangential),
         vertex_weights(vertices, faces, len(vertices)),
     )
-    return SurfaceFit(
-        SlidingParameters(KNOTS, 3, 0.5 + project_radially(centred), faces), vertices, quadrics, weights
-    )
+    return SurfaceFit(SlidingParameters(KNOTS, 3, 0.5 + project_radially(centred), faces), vertices, quadrics, weights)
 
 
 def mean_arap(volume, n_gauss=3):

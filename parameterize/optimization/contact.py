@@ -80,8 +80,7 @@ def contact_penalty(knots: tuple[Array, Array, Array], degree: int, control: Ten
     touching = _in_another_sheet(boundary.points + gap * normals, boundary)
     touching, facing = _facing_samples(boundary.points, normals, touching)
     first, second = (
-        SlidingParameters(knots, degree, boundary.parameters[chosen], _NO_TRIANGLES)
-        for chosen in (touching, facing)
+        SlidingParameters(knots, degree, boundary.parameters[chosen], _NO_TRIANGLES) for chosen in (touching, facing)
     )
     return ContactPenalty(
         first.rows,

@@ -29,15 +29,20 @@ _BLOCK = 32  # spans at a time: what they need fits into the cache
 
 @dataclass(frozen=True, eq=False)
 class _Spans:
-    """k spans: their first control points (k, 3), extraction weights (k, 3, p + 1, p + 1), parametric volumes (k,)."""
+    """k spans: their first control points (k, 3) and parametric volumes (k,).
+
+    weights (k, 3, p + 1, p + 1): from control points to Bezier points, a direction; back: their transposes.
+    """
 
     first: IntArray
-    weights: Array
     volumes: Array
+    weights: Array
+    back: Array
 
     def bezier_points(self, control: Tensor) -> Array:
         """Return the Bezier points (k, 3, p + 1, p + 1, p + 1)."""
-        return np.asarray(_bezier_points(np.ascontiguousarray(control.numpy()), self.first, self.weights))
+        points: Array = _bezier_points(np.ascontiguousarray(control.numpy()), self.first, self.weights)
+        return points.reshape(len(points), 3, *self.weights.shape[2:], -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +84,8 @@ class SpanBarrier:
         weights = np.stack([e[1][s] for e, s in zip(self._extractions, self.active.T, strict=True)], axis=1)
         volumes = np.prod([w[s] for w, s in zip(self._widths, self.active.T, strict=True)], axis=0)
         blocks = [slice(start, start + _BLOCK) for start in range(0, len(first), _BLOCK)]
-        self._pieces = [_Spans(first[block], weights[block], volumes[block]) for block in blocks]
+        back = np.ascontiguousarray(np.swapaxes(weights, 2, 3))
+        self._pieces = [_Spans(first[b], volumes[b], weights[b], back[b]) for b in blocks]
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """The penalty at control points (3, n_u, n_v, n_w), and its gradient."""
@@ -87,7 +93,7 @@ class SpanBarrier:
         def part(spans: _Spans) -> tuple[float, Array]:
             found = self._short_rows(control, spans)
             energy = self._share * float(found.shortfall @ found.shortfall)
-            return energy, _combine(found.rows, found.starts, -2.0 * self._share * found.shortfall, spans.weights)
+            return energy, _combine(found.rows, found.starts, -2.0 * self._share * found.shortfall, spans.back)
 
         parts = in_parallel(part, self._pieces)
         return sum(energy for energy, _ in parts), self._collect([pushed for _, pushed in parts], control)
@@ -98,7 +104,7 @@ class SpanBarrier:
 
         def part(piece: _Rows, x: Tensor) -> Array:
             changes = _changes(piece.rows, piece.starts, piece.spans.bezier_points(x))
-            return np.asarray(_combine(piece.rows, piece.starts, 2.0 * self._share * changes, piece.spans.weights))
+            return np.asarray(_combine(piece.rows, piece.starts, 2.0 * self._share * changes, piece.spans.back))
 
         return lambda x: self._collect(in_parallel(lambda piece: part(piece, x), pieces), x)
 
@@ -128,37 +134,38 @@ class SpanBarrier:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _along_axes(field: Array, u: Array, v: Array, w: Array) -> Array:
-    """Apply matrices (n, n) along the three axes of a field (n, n, n): each makes the first axis the last one."""
+def _along_axes(field: Array, u: Array, v: Array, w: Array) -> None:
+    """Apply matrices (n, n) along the axes of a field (n^3,), in place: each makes the first axis the last one."""
     n = len(u)
     for matrix in (u, v, w):
-        flat = field.reshape(n, n * n)
-        applied = np.zeros_like(flat)
+        applied = np.zeros((n, n * n), field.dtype)
         for i in range(n):
             for x in range(n):
                 for r in range(n * n):
-                    applied[i, r] += matrix[i, x] * flat[x, r]
-        field = applied.T.copy().reshape(n, n, n)
-    return field
+                    applied[i, r] += matrix[i, x] * field[x * n * n + r]
+        for r in range(n * n):
+            for i in range(n):
+                field[r * n + i] = applied[i, r]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
-    """Bezier points (k, 3, n, n, n) of spans with their first control points (k, 3) and weights (k, 3, n, n)."""
+    """Bezier points (k, 3, n^3) of spans with their first control points (k, 3) and weights (k, 3, n, n)."""
     spans, n = len(first), weights.shape[2]
-    points = np.empty((spans, 3, n, n, n), control.dtype)
+    points = np.empty((spans, 3, n**3), control.dtype)
     for s in range(spans):
-        i, j, k = first[s]
         for c in range(3):
-            window = control[c, i : i + n, j : j + n, k : k + n].copy()
-            points[s, c] = _along_axes(window, weights[s, 0], weights[s, 1], weights[s, 2])
+            for i in range(n):
+                for j in range(n):
+                    for k in range(n):
+                        point = control[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k]
+                        points[s, c, (i * n + j) * n + k] = point
+            _along_axes(points[s, c], weights[s, 0], weights[s, 1], weights[s, 2])
     return points
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _add_derivatives(
-    place: IntArray, cross: Array, scale: Array, shares: Array, direction: int, rows: Array
-) -> None:
+def _add_derivatives(place: IntArray, cross: Array, scale: Array, shares: Array, direction: int, rows: Array) -> None:
     """Add to rows (r, 3, n, n, n) the derivatives of coefficients (r, 4) in the Bezier points, by one derivative of F.
 
     cross (3, ..., k): the product of the two other derivatives; scale: from differences to that derivative's net.
@@ -193,20 +200,18 @@ def _changes(rows: Array, starts: IntArray, points: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _combine(rows: Array, starts: IntArray, factors: Array, weights: Array) -> Array:
+def _combine(rows: Array, starts: IntArray, factors: Array, back: Array) -> Array:
     """Sum the rows of each span with their factors (r,), as windows of control points: (k, 3, n, n, n)."""
-    spans = len(starts) - 1
-    windows = np.zeros((spans, *rows.shape[1:]), rows.dtype)
+    spans, n = len(starts) - 1, back.shape[2]
+    flat, windows = rows.reshape(len(rows), 3, n**3), np.zeros((spans, 3, n**3), rows.dtype)
     for s in range(spans):
-        total = windows[s].reshape(-1)
         for r in range(starts[s], starts[s + 1]):
-            row, factor = rows[r].reshape(-1), factors[r]
-            for i in range(row.size):
-                total[i] += factor * row[i]
-        u, v, w = weights[s, 0].T.copy(), weights[s, 1].T.copy(), weights[s, 2].T.copy()
+            for c in range(3):
+                for i in range(n**3):
+                    windows[s, c, i] += factors[r] * flat[r, c, i]
         for c in range(3):
-            windows[s, c] = _along_axes(windows[s, c], u, v, w)
-    return windows
+            _along_axes(windows[s, c], back[s, 0], back[s, 1], back[s, 2])
+    return windows.reshape(spans, 3, n, n, n)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -214,8 +219,11 @@ def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
     """Add windows (k, 3, n, n, n) to control points (3, n_u, n_v, n_w), each from its first one on."""
     n = windows.shape[2]
     for s in range(len(first)):
-        i, j, k = first[s]
-        total[:, i : i + n, j : j + n, k : k + n] += windows[s]
+        for c in range(3):
+            for i in range(n):
+                for j in range(n):
+                    for k in range(n):
+                        total[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k] += windows[s, c, i, j, k]
 
 
 def edge_spans(n_spans: tuple[int, int, int]) -> NDArray[np.int64]:

@@ -117,22 +117,22 @@ def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale:
     scale (I - B softness B^T) + pull pull^T + push push^T, where B^T d is the sum of R_k x d_k over the rows k.
     """
     m = scale.size
-    turn = np.zeros((9, 3, m), scale.dtype)
-    for k in range(3):
-        for j in range(3):
-            a, b = (j + 1) % 3, (j + 2) % 3
-            turn[3 * k + j, a] = rotation[k, b]
-            turn[3 * k + j, b] = -rotation[k, a]
+    turn, soft = np.zeros((9, 3, m), scale.dtype), np.zeros((9, 3, m), scale.dtype)
     out = np.empty((45, m), scale.dtype)
     for a in range(9):
-        soft = np.zeros((3, m), scale.dtype)
+        k, j = a // 3, a % 3
+        before, behind = (j + 1) % 3, (j + 2) % 3
+        for i in range(m):
+            turn[a, before, i] = rotation[k, behind, i]
+            turn[a, behind, i] = -rotation[k, before, i]
         for s in range(3):
-            for t in range(3):
-                soft[s] += softness[s, t] * turn[a, t]
+            for i in range(m):
+                soft[a, s, i] = softness[s, before, i] * turn[a, before, i]
+                soft[a, s, i] += softness[s, behind, i] * turn[a, behind, i]
         for b in range(a + 1):
             row = out[_ENTRY[a, b]]
             for i in range(m):
-                turned = soft[0, i] * turn[b, 0, i] + soft[1, i] * turn[b, 1, i] + soft[2, i] * turn[b, 2, i]
+                turned = soft[a, 0, i] * turn[b, 0, i] + soft[a, 1, i] * turn[b, 1, i] + soft[a, 2, i] * turn[b, 2, i]
                 row[i] = scale[i] * ((a == b) - turned) + pull[a, i] * pull[b, i] + push[a, i] * push[b, i]
     return out
 

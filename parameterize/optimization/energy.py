@@ -13,7 +13,7 @@ from torch import Tensor
 
 from ..arrays import Array, IntArray
 from ..config import SplineConfig
-from .cg import Operator, conjugate_gradients
+from .cg import conjugate_gradients
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import SpanBarrier
 from .distortion import DistortionEnergy
@@ -39,6 +39,7 @@ class SplineEnergy:
         self._distortion = DistortionEnergy(knots, config)
         mass, slope, curve = grams(knots, config.degree)
         self._bending = BendingOperator(mass, slope, curve, 2.0 * config.fairness)
+        self._rough_bending = self._bending.to(_ROUGH)
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient)
         ends = torch.zeros_like(mass[0])
         ends[0, 0] = ends[-1, -1] = config.pull * config.vertex / 6.0  # the points spread over six faces
@@ -111,7 +112,7 @@ class SplineEnergy:
         contact = torch.zeros_like if self._contact is None else self._contact.curvature(control, _ROUGH)
 
         def hessian(x: Tensor) -> Tensor:
-            inner = distortion(x) + self._bending(x) + self.penalty * (barrier(x) + facing(x))
+            inner = distortion(x) + self._rough_bending(x) + self.penalty * (barrier(x) + facing(x))
             outer = surface(x) + config.anchors * anchors(x) + config.contact * contact(x)
             return inner + config.vertex * outer
 

@@ -80,7 +80,7 @@ def optimize(
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
-    with _one_thread_an_operation():
+    with one_thread_an_operation():
         energy = SplineEnergy(config, knots, surface)
         energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
         first = Optimized.of(control, knots, config)
@@ -95,7 +95,7 @@ def optimize(
 
 
 @contextmanager
-def _one_thread_an_operation() -> Iterator[None]:
+def one_thread_an_operation() -> Iterator[None]:
     """Most tensors here are small: handing them to a second thread costs more than it saves (up to 4 times)."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)

@@ -79,7 +79,9 @@ def _polar_factors(matrices: Array) -> Array:
         r = out[:, begin : begin + _BLOCK]
         for _ in range(_STEPS):
             for i in range(r.shape[1]):
-                a, b, c, d, e, f, g, h, k = r[0, i], r[1, i], r[2, i], r[3, i], r[4, i], r[5, i], r[6, i], r[7, i], r[8, i]
+                a, b, c = r[0, i], r[1, i], r[2, i]
+                d, e, f = r[3, i], r[4, i], r[5, i]
+                g, h, k = r[6, i], r[7, i], r[8, i]
                 ca, cb, cc = e * k - f * h, f * g - d * k, d * h - e * g
                 cd, ce, cf = c * h - b * k, a * k - c * g, b * g - a * h
                 cg, ch, ck = b * f - c * e, c * d - a * f, a * e - b * d

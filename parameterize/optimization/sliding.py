@@ -154,25 +154,31 @@ def _face_windows(
 ) -> tuple[IntArray, Array, Array]:
     """What a FaceWindow holds, for points (N, 3) on cube faces (N,)."""
     count, width = len(parameters), degree + 1
-    sizes = np.array([len(k) - degree - 1 for k in knots])
-    stride = np.array([sizes[1] * sizes[2], sizes[2], 1])
+    sizes, stride = np.empty(3, np.int64), np.ones(3, np.int64)
+    for d in range(3):
+        sizes[d] = len(knots[d]) - degree - 1
+    stride[1], stride[0] = sizes[2], sizes[1] * sizes[2]
     indices = np.empty((count, width * width), np.int64)
-    tables = np.zeros((2, 2, count, width))
-    first, span = np.empty(2, np.int64), np.empty(1, np.int64)
+    in_a, in_b = np.empty((count, 2, width)), np.empty((count, 2, width))
+    table, first, span = np.empty((2, 1, width)), np.empty(2, np.int64), np.empty(1, np.int64)
     for n in range(count):
         axis, side = cube_faces[n] // 2, cube_faces[n] % 2
         for d in range(2):
             along = (axis + 1 + d) % 3
             row, x = knots[along], parameters[n, along : along + 1]
             span[0] = min(max(np.searchsorted(row, x[0], side="right") - 1, degree), len(row) - degree - 2)
-            fill_basis(row, degree, x, span, tables[d, :, n : n + 1])
+            fill_basis(row, degree, x, span, table)
             first[d] = span[0] - degree
+            basis = in_b if d else in_a
+            for k in range(2):
+                for i in range(width):
+                    basis[n, k, i] = table[k, 0, i]
         base = side * (sizes[axis] - 1) * stride[axis]
         step_a, step_b = stride[(axis + 1) % 3], stride[(axis + 2) % 3]
         for i in range(width):
             for j in range(width):
                 indices[n, i * width + j] = base + (first[0] + i) * step_a + (first[1] + j) * step_b
-    return indices, tables[0].transpose(1, 0, 2).copy(), tables[1].transpose(1, 0, 2).copy()
+    return indices, in_a, in_b
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

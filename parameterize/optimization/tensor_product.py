@@ -108,20 +108,19 @@ def _squared(piece: tuple[int, IntArray], columns: IntArray, values: Array, metr
     begin, starts = piece
     out, at = np.zeros_like(field), np.empty(3, field.dtype)
     for row in range(len(starts) - 1):
-        at[:] = 0.0
-        for entry in range(starts[row], starts[row + 1]):
-            for c in range(3):
+        for c in range(3):
+            at[c] = 0.0
+            for entry in range(starts[row], starts[row + 1]):
                 at[c] += values[entry] * field[c, columns[entry]]
-        pulled = (
-            metric[begin + row, :, 0] * at[0] + metric[begin + row, :, 1] * at[1] + metric[begin + row, :, 2] * at[2]
-        )
-        for entry in range(starts[row], starts[row + 1]):
-            for c in range(3):
-                out[c, columns[entry]] += values[entry] * pulled[c]
+        for c in range(3):
+            m = metric[begin + row, c]
+            pulled = m[0] * at[0] + m[1] * at[1] + m[2] * at[2]
+            for entry in range(starts[row], starts[row + 1]):
+                out[c, columns[entry]] += values[entry] * pulled
     return out
 
 
-Band = tuple[Any, ...]  # see _band
+Band = tuple[IntArray, Array, Array]  # of two matrices: first columns (m,), entries from there on (m, k) each
 
 
 class GaussGrid:
@@ -143,13 +142,14 @@ class GaussGrid:
         )
         self.weights = u[:, None] * (w[:, None] * v).ravel()
         tables = [
-            [collocation(k, p, x, d).toarray() for d in range(2)]
+            [np.asarray(collocation(k, p, x, d).toarray()) for d in range(2)]
             for k, p, x in zip(knots, degrees, points, strict=True)
         ]
         self._bands: dict[Any, tuple[tuple[Band, ...], tuple[Band, ...]]] = {}
         for dtype in (np.float32, np.float64):
-            forward = tuple(_band(*(m.astype(dtype) for m in pair)) for pair in tables)
-            self._bands[np.dtype(dtype)] = forward, tuple(_band(*(m.T.astype(dtype) for m in pair)) for pair in tables)
+            pairs: list[list[Array]] = [[m.astype(dtype) for m in pair] for pair in tables]
+            bands = [(_band(values, slopes), _band(values.T, slopes.T)) for values, slopes in pairs]
+            self._bands[np.dtype(dtype)] = tuple(f for f, _ in bands), tuple(t for _, t in bands)
 
     def planes(self) -> list[slice]:
         """Return the planes of each piece of work."""
@@ -178,14 +178,14 @@ class GaussGrid:
         return total
 
 
-def _band(*matrices: Array) -> Any:
-    """Store matrices (m, n) with few entries a row: the first columns (m,), the entries from there on (m, k) each."""
-    used = np.any([matrix != 0.0 for matrix in matrices], axis=0)
+def _band(values: Array, slopes: Array) -> Band:
+    """Store two matrices (m, n) with few entries a row from the first of these on."""
+    used = (values != 0.0) | (slopes != 0.0)
     low, high = used.argmax(axis=1), used.shape[1] - used[:, ::-1].argmax(axis=1)
     width = int((high - low).max())
     first = np.minimum(low, used.shape[1] - width)
     columns = first[:, None] + np.arange(width)
-    return first, *(np.take_along_axis(matrix, columns, axis=1) for matrix in matrices)
+    return first, np.take_along_axis(values, columns, axis=1), np.take_along_axis(slopes, columns, axis=1)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -196,6 +196,15 @@ def _apply(first: IntArray, entries: Array, field: Array, out: Array) -> None:
             entry, row = entries[m, k], first[m] + k
             for i in range(out.shape[1]):
                 out[m, i] += entry * field[row, i]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _transposed(field: Array) -> Array:
+    out = np.empty((field.shape[1], field.shape[0]), field.dtype)
+    for i in range(field.shape[0]):
+        for j in range(field.shape[1]):
+            out[j, i] = field[i, j]
+    return out
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -218,7 +227,7 @@ def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
             _apply(first_v, values_v, flat, part[2])
             for direction in range(3):
                 entries = slopes_w if direction == 2 else values_w
-                _apply(first_w, entries, part[direction].T.copy(), out[c, direction, m])
+                _apply(first_w, entries, _transposed(part[direction]), out[c, direction, m])
     return out.reshape(3, 3, planes * m_w * m_v)
 
 
@@ -227,7 +236,7 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
     """The transpose; the bands of v and w are transposed already. All layers (3, layers, n_v, n_w)."""
     (first_u, values_u, slopes_u), (first_v, values_v, slopes_v), (first_w, values_w, slopes_w) = bands
     planes, n_v, n_w, width = len(first_u), len(first_v), len(first_w), values_u.shape[1]
-    m_w = max(first_w) + values_w.shape[1]
+    m_w = first_w[-1] + values_w.shape[1]
     m_v = dual.shape[2] // (planes * m_w)
     field = dual.reshape(3, 3, planes, m_w, m_v)
     out = np.zeros((3, first_u[-1] + width, n_v, n_w), dual.dtype)
@@ -238,11 +247,13 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
                 entries = slopes_w if direction == 2 else values_w
                 _apply(first_w, entries, field[c, direction, m], part[direction])
             plain, steep = np.zeros((n_v, n_w), dual.dtype), np.zeros((n_v, n_w), dual.dtype)
-            _apply(first_v, values_v, part[0].T.copy(), steep)
-            _apply(first_v, slopes_v, part[1].T.copy(), plain)
-            _apply(first_v, values_v, part[2].T.copy(), plain)
+            _apply(first_v, values_v, _transposed(part[0]), steep)
+            _apply(first_v, slopes_v, _transposed(part[1]), plain)
+            _apply(first_v, values_v, _transposed(part[2]), plain)
             for k in range(width):
-                out[c, first_u[m] + k] += values_u[m, k] * plain + slopes_u[m, k] * steep
+                for i in range(n_v):
+                    for j in range(n_w):
+                        out[c, first_u[m] + k, i, j] += values_u[m, k] * plain[i, j] + slopes_u[m, k] * steep[i, j]
     return out
 
 
@@ -270,59 +281,33 @@ def grams(knots: tuple[Array, ...], degree: int) -> list[tuple[Tensor, ...]]:
     return [tuple(gram(k, degree, d) for k in knots) for d in range(3)]
 
 
+@dataclass(frozen=True, eq=False)
 class BendingOperator:
-    """x -> weight * H x with x^T H x = int |Hessian F|^2 (exact).
+    """x -> weight * H x with x^T H x = int |Hessian F|^2 (exact)."""
 
-    mass, slope, curve: the matrices of `grams`.
-    """
+    mass: tuple[Tensor, ...]
+    slope: tuple[Tensor, ...]
+    curve: tuple[Tensor, ...]
+    weight: float
 
-    def __init__(
-        self, mass: tuple[Tensor, ...], slope: tuple[Tensor, ...], curve: tuple[Tensor, ...], weight: float
-    ) -> None:
-        self._bands = {}
-        for kind in (np.float32, np.float64):
-            weights = (weight, 1.0, 1.0)
-            bands = [
-                _band(*(w * m.numpy().astype(kind) for m in matrices))
-                for w, *matrices in zip(weights, mass, slope, curve, strict=True)
-            ]
-            self._bands[np.dtype(kind)] = tuple(bands)
+    def to(self, dtype: torch.dtype) -> BendingOperator:
+        """The same in another precision."""
+        mass, slope, curve = (tuple(m.to(dtype) for m in part) for part in (self.mass, self.slope, self.curve))
+        return BendingOperator(mass, slope, curve, self.weight)
 
     def __call__(self, x: Tensor) -> Tensor:
-        """(3, n_u, n_v, n_w) -> the same shape, in its precision."""
-        field = np.ascontiguousarray(x.numpy())
-        bands = self._bands[field.dtype]
-        return torch.from_numpy(np.stack(in_parallel(lambda component: _bend(bands, component), list(field))))
+        """(3, n_u, n_v, n_w) -> the same shape."""
+        return torch.cat(in_parallel(self._bend, torch.split(x, 1)))
 
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _bend(bands: tuple[Band, Band, Band], field: Array) -> Array:
-    """Sum of the six products of three matrices that make up the bending of one component (n_u, n_v, n_w)."""
-    (first_u, mass_u, slope_u, curve_u), (first_v, mass_v, slope_v, curve_v), (first_w, mass_w, slope_w, curve_w) = bands
-    n_u, n_v, n_w = field.shape
-    parts = np.zeros((3, n_u, n_v * n_w), field.dtype)  # what u's mass, slope and curvature apply to
-    for i in range(n_u):
-        by_v = np.zeros((3, n_v, n_w), field.dtype)
-        _apply(first_v, mass_v, field[i], by_v[0])
-        _apply(first_v, slope_v, field[i], by_v[1])
-        _apply(first_v, curve_v, field[i], by_v[2])
-        mass, slope, curve = by_v[0].T.copy(), by_v[1].T.copy(), by_v[2].T.copy()
-        across = np.zeros((3, n_w, n_v), field.dtype)
-        _apply(first_w, slope_w, slope, across[0])
-        across[0] *= 2
-        _apply(first_w, mass_w, curve, across[0])
-        _apply(first_w, curve_w, mass, across[0])
-        _apply(first_w, slope_w, mass, across[1])
-        _apply(first_w, mass_w, slope, across[1])
-        across[1] *= 2
-        _apply(first_w, mass_w, mass, across[2])
-        for kind in range(3):
-            parts[kind, i] = across[kind].T.copy().reshape(n_v * n_w)
-    out = np.zeros((n_u, n_v * n_w), field.dtype)
-    _apply(first_u, mass_u, parts[0], out)
-    _apply(first_u, slope_u, parts[1], out)
-    _apply(first_u, curve_u, parts[2], out)
-    return out.reshape(n_u, n_v, n_w)
+    def _bend(self, x: Tensor) -> Tensor:
+        """The same for one component (1, n_u, n_v, n_w)."""
+        (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = self.mass, self.slope, self.curve
+        xm, xk, xh = along(m2, x, 3), along(k2, x, 3), along(h2, x, 3)
+        mm = along(m1, xm, 2)
+        first = along(k1, xm, 2) + along(m1, xk, 2)
+        second = along(h1, xm, 2) + along(m1, xh, 2) + 2.0 * along(k1, xk, 2)
+        result = along(self.weight * h0, mm, 1) + along(m0, self.weight * second, 1)
+        return result + along(2.0 * self.weight * k0, first, 1)
 
 
 class FastDiagonalization:
@@ -351,6 +336,10 @@ class FastDiagonalization:
 
     def __call__(self, residual: Tensor) -> Tensor:
         """(3, n_u, n_v, n_w) -> the same shape."""
+        return torch.cat(in_parallel(self._solve, torch.split(residual, 1)))
+
+    def _solve(self, residual: Tensor) -> Tensor:
+        """The same for one component (1, n_u, n_v, n_w)."""
         for axis, vectors in enumerate(self._vectors, start=1):
             residual = along(vectors.T, residual, axis)
         residual = residual * self._inverse

@@ -101,23 +101,23 @@ def fill_basis(knots: Array, degree: int, x: Array, spans: IntArray, out: Array)
     table = np.zeros((degree + 1, degree + 1))
     for m in range(len(x)):
         span = spans[m]
-        table[:] = 0.0
         table[0, 0] = 1.0
         for q in range(1, degree + 1):
+            table[q, 0] = 0.0
             for r in range(q):
                 right, left = knots[span + r + 1], knots[span + r + 1 - q]
                 share = table[q - 1, r] / (right - left)
                 table[q, r] += (right - x[m]) * share
-                table[q, r + 1] += (x[m] - left) * share
-        out[0, m] = table[degree]
-        for k in range(1, min(len(out), degree + 1)):
-            derived = out[k, m]
-            derived[:] = table[degree - k]
+                table[q, r + 1] = (x[m] - left) * share
+        for k in range(min(len(out), degree + 1)):
+            for r in range(degree - k + 1):
+                out[k, m, r] = table[degree - k, r]
             for q in range(degree - k + 1, degree + 1):
+                out[k, m, q] = 0.0
                 for r in range(q - 1, -1, -1):
-                    slope = q * derived[r] / (knots[span + r + 1] - knots[span + r + 1 - q])
-                    derived[r + 1] += slope
-                    derived[r] = -slope
+                    slope = q * out[k, m, r] / (knots[span + r + 1] - knots[span + r + 1 - q])
+                    out[k, m, r + 1] += slope
+                    out[k, m, r] = -slope
 
 
 def collocation(knots: Array, degree: int, x: ArrayLike, derivative: int = 0) -> csr_array:

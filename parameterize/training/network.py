@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from ..config import NetworkConfig
+from ..threads import in_parallel
+
+_PIECE = 1024  # points that a thread takes at a time
 
 
 class ResidualModule(nn.Module):
@@ -59,3 +63,33 @@ class InverseMap(nn.Module):
         hidden = torch.relu(self.first(self.encode(x)))
         shift: Tensor = self.last(self.residual(hidden))
         return (x - 0.5) @ self.affine.T + 0.5 + shift
+
+
+def map_in_pieces(network: nn.Module, points: Tensor) -> Tensor:
+    """Return network(points), (m, 3) -> (m, 3), with its gradient, on all threads; the bits do not depend on them."""
+    mapped: Tensor = _InPieces.apply(network, points, *network.parameters())  # type: ignore[no-untyped-call]
+    return mapped
+
+
+class _InPieces(torch.autograd.Function):
+    """The network on pieces of the points, forward and back; the pieces' gradients are added in their order."""
+
+    @staticmethod
+    def forward(ctx: Any, network: nn.Module, points: Tensor, *parameters: Tensor) -> Tensor:
+        """Map the points and keep what the way back needs."""
+        size = _PIECE if points.device.type == "cpu" else len(points)
+
+        def part(piece: Tensor) -> Tensor:
+            with torch.enable_grad():
+                mapped: Tensor = network(piece)
+            return mapped
+
+        ctx.pieces, ctx.parameters = in_parallel(part, torch.split(points, size)), parameters
+        return torch.cat([piece.detach() for piece in ctx.pieces])
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> Any:
+        """Return the gradients in the parameters."""
+        pairs = list(zip(ctx.pieces, torch.split(gradient, [len(piece) for piece in ctx.pieces]), strict=True))
+        parts = in_parallel(lambda pair: torch.autograd.grad(pair[0], ctx.parameters, pair[1]), pairs)
+        return None, None, *(sum(of_one[1:], start=of_one[0]) for of_one in zip(*parts, strict=True))

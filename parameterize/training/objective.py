@@ -11,7 +11,7 @@ from ..config import StageConfig, TrainConfig
 from ..cube.cube import CORNERS
 from ..optimization.polar import determinant
 from . import losses
-from .network import InverseMap
+from .network import InverseMap, map_in_pieces
 from .samples import Stencils, TriangleSampler, gather
 from .target_shapes import nearest, nearest_on_cube_face
 
@@ -58,7 +58,8 @@ class Objective:
         held = [] if boundary.corners is None else [boundary.corners]
         held += [] if boundary.paths is None else [boundary.paths.vertices]
         points = [self.stencils.shifted(generator), *(boundary.vertices[index] for index in (used, *held))]
-        nodes, surface, *held = self.network(torch.cat(points)).split([len(p) for p in points])
+        mapped = map_in_pieces(self.network, torch.cat(points))
+        nodes, surface, *held = torch.split(mapped, [len(p) for p in points])
         terms, folded = self._interior_terms(gather(nodes, self.stencils.index))
         terms |= self._surface_terms(stage, boundary, gather(surface, place), picks)
         terms |= self._held_terms(boundary, held)
