@@ -80,7 +80,8 @@ def parameterize(
 ) -> Parameterization:
     """Map the unit cube onto the solid inside a closed surface (paper, section 4.3).
 
-    config: options, `preset("fast")` by default. device: "auto", "cpu" or "cuda"; dtype: of the network.
+    config: options, `preset("fast")` by default. device: where the network trains, "auto", "cpu" or "cuda"; dtype: of
+    the network. The number of threads (OMP_NUM_THREADS, or all cores) does not change the result on a CPU.
     corners: (8, 3) points in the surface's units or 8 vertex numbers, in the order (0,0,0), (0,0,1), (0,1,0), ...
     checkpoint_dir: where checkpoints go; with `resume` the run goes on from the last one.
 

@@ -114,6 +114,23 @@ def test_newton_direction_leads_down():
     assert energy.volume_part(moved)[0] + energy.surface_part(moved)[0] < 0.5 * (value + outer)
 
 
+def test_the_number_of_threads_changes_no_bit(monkeypatch):
+    control, found = wavy_control(0.1, seed=3), []
+    monkeypatch.delenv("NUMBA_NUM_THREADS", raising=False)
+    for threads in ("1", "3"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        energy = SplineEnergy(CONFIG, KNOTS, surface_fit())
+        energy.barrier.activate(np.indices((4, 4, 4)).reshape(3, -1).T)  # two pieces of work
+        energy.slide(control)
+        value, gradient, _ = energy.volume_part(control)
+        outer, pulled = energy.surface_part(control)
+        direction = energy.newton_direction(control, -(gradient + pulled))
+        found.append((value, outer, gradient, pulled, direction, torch.as_tensor(energy.surface.places.parameters)))
+    (value, outer, *tensors), (again, outer_again, *others) = found
+    assert value == again and outer == outer_again
+    assert all(torch.equal(a, b) for a, b in zip(tensors, others, strict=True))
+
+
 def optimise_from(control, config=CONFIG, **options):
     history = History()
     return optimize(control, KNOTS, surface_fit(), config, history=history, **options), history.arrays()

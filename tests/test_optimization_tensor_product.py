@@ -3,11 +3,10 @@ import pytest
 import torch
 from scipy.sparse import csr_array
 
-from parameterize.optimization.cg import conjugate_gradients
+from parameterize.optimization.cg import FastDiagonalization, conjugate_gradients
 from parameterize.optimization.tensor_product import (
     BendingOperator,
     ControlRows,
-    FastDiagonalization,
     GaussGrid,
     along,
     gram,

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from parameterize.config import NetworkConfig
-from parameterize.training.network import InverseMap, ResidualModule
+from parameterize.training.network import InverseMap, ResidualModule, map_in_pieces
 
 SMALL = NetworkConfig(width=16, modules=2, frequencies=3)
 
@@ -65,3 +65,24 @@ def test_first_weights_are_drawn_from_the_generator():
     torch.manual_seed(6)
     network = InverseMap(SMALL, torch.Generator().manual_seed(5))
     assert torch.equal(network.first.weight, expected.weight) and torch.equal(network.first.bias, expected.bias)
+
+
+def test_pieces_give_the_networks_map_and_gradient_with_the_same_bits_for_any_number_of_threads(monkeypatch):
+    network = InverseMap(SMALL).double()
+    torch.nn.init.normal_(network.last.weight, generator=torch.Generator().manual_seed(0))
+    points = torch.rand(2500, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+
+    def found(mapping):
+        network.zero_grad()
+        mapped = mapping(points)
+        mapped.square().sum().backward()
+        return [mapped.detach(), *(parameter.grad for parameter in network.parameters())]
+
+    expected = found(network)
+    monkeypatch.delenv("NUMBA_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    one = found(lambda x: map_in_pieces(network, x))
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    three = found(lambda x: map_in_pieces(network, x))
+    assert all(torch.allclose(a, b, rtol=1e-10) for a, b in zip(expected, one, strict=True))
+    assert all(torch.equal(a, b) for a, b in zip(one, three, strict=True))

@@ -13,14 +13,14 @@ from torch import Tensor
 
 from ..arrays import Array, IntArray
 from ..config import SplineConfig
-from .cg import conjugate_gradients
+from .cg import FastDiagonalization, conjugate_gradients
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import SpanBarrier
 from .distortion import DistortionEnergy
 from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
 from .surface_distance import SurfaceFit
-from .tensor_product import BendingOperator, FastDiagonalization, grams
+from .tensor_product import BendingOperator, grams
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
 Knots = tuple[Array, Array, Array]

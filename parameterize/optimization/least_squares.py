@@ -9,8 +9,8 @@ from torch import Tensor
 
 from ..arrays import Array
 from ..spline.bspline import basis_derivatives, sparse_rows, window_numbers
-from .cg import conjugate_gradients
-from .tensor_product import BendingOperator, ControlRows, FastDiagonalization, grams
+from .cg import FastDiagonalization, conjugate_gradients
+from .tensor_product import BendingOperator, ControlRows, grams
 
 
 def fit_pairs(
