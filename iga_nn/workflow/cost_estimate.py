@@ -1,7 +1,7 @@
 """Estimates the time and the memory of a run before it starts, from counts and the time of two small pieces of work.
 
-The pieces are a pass (the network forward and backward on 1000 points) and a product with the second derivative of the
-spline's distortion. How many of them a run takes is known from profiles of the models conch, bird and bunny.
+The pieces, run on all threads, are a pass (the network forward and backward on 1000 points) and a product with the second
+derivative of the spline's distortion. How many of them a run takes is known from runs of the models conch, duck and bird.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ UNKNOWN = 2.4e-3  # for each unknown of the problem solved
 REST = 1000.0  # libraries loaded, figures drawn
 
 # Products
-NEWTON_STEP, CERTIFICATE, FIT = 65.0, 270.0, 700.0
-EASY, HARD = (6, 14), (10, 18)  # rounds, and Newton steps a round
+NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
+EASY, HARD = (7, 14), (10, 18)  # rounds, and Newton steps a round
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
