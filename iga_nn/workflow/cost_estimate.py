@@ -1,7 +1,7 @@
 """Estimates the time and the memory of a run before it starts, from counts and the time of two small pieces of work.
 
 The pieces, run on all threads, are a pass (the network forward and backward on 1000 points) and a product with the
-second derivative of the spline's distortion. How many of them a run takes is known from the models conch, duck and bird.
+second derivative of the spline's distortion. How many of them a run takes is known from conch, duck and bird.
 """
 
 from __future__ import annotations
