@@ -195,13 +195,20 @@ def test_data_whose_squares_overflow_are_refused(problem):
         solve_problem(benchmark_volume(3), problem)
 
 
+def test_numbers_are_formulas_of_constants():
+    numbers = Poisson(source=1, kappa=2.0, reaction=-0.5 + 1.0, boundary=0, robin={"u0": (3.0, 1)})
+    words = Poisson(source="1", kappa="2", reaction="0.5", boundary="0", robin={"u0": ("3", "1")})
+    found = [solve_problem(benchmark_volume(3), problem).coefficients for problem in (numbers, words)]
+    assert np.array_equal(*found)
+
+
 def test_problems_without_a_source_are_refused_with_the_remedy():
     with pytest.raises(ValueError, match='source="0"'):
         Poisson(boundary="x")
     with pytest.raises(ValueError, match="source"):
         Poisson(exact=lambda x, y, z: x)
-    with pytest.raises(ValueError, match="source must be a formula"):
-        Poisson(source=1.0)
+    with pytest.raises(ValueError, match="source must be a number, a formula"):
+        Poisson(source=object())
     with pytest.raises(ExpressionError, match="boundary: expression, column 1"):
         Poisson(source="0", boundary="q")
 

@@ -21,7 +21,7 @@ LARGEST = 1e100  # of data: their squares, summed over all points, must not over
 WORDS = {2: "two", 3: "three"}
 USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
-Scalar = str | SplineField | Callable[..., ArrayLike]
+Scalar = str | float | SplineField | Callable[..., ArrayLike]
 Data = Scalar | Sequence[Scalar]  # a sequence has one entry a component
 Entry = Expression | SplineField | Callable[[Array], ArrayLike]
 
@@ -97,14 +97,15 @@ def _evaluate(entry: Entry, x: Array) -> ArrayLike:
 
 
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:
-    """Translate what a user gives for c components.
+    """Translate what a user gives for c components; a number is the formula of that constant.
 
     of_coordinates: functions take three arrays x, y, z instead of one array (3, ...).
     Raises ExpressionError for a formula that is refused, ValueError for what is no datum; both name it.
     """
     is_vector = isinstance(data, Sequence) and not isinstance(data, str)
-    entries: list[Any] = list(data) if is_vector else [data]  # type: ignore[arg-type]
-    if len(entries) != components and (is_vector or isinstance(data, str)):
+    given: list[Any] = list(data) if is_vector else [data]  # type: ignore[arg-type]
+    entries = [repr(float(entry)) if isinstance(entry, int | float) else entry for entry in given]
+    if len(entries) != components and (is_vector or isinstance(entries[0], str)):
         count = WORDS.get(components, str(components))
         raise ValueError(f"{name} must have {count} entries, one a component, got {data!r}")
     for entry in entries:
@@ -112,7 +113,7 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
         if isinstance(entry, SplineField) and entry.coefficients.shape[3:] != wanted:
             raise ValueError(f"{name}: the field must have {components if wanted else 1} component(s) here")
         if not isinstance(entry, str) and not callable(entry):
-            raise ValueError(f"{name} must be a formula such as '1', a function of x or a field, got {entry!r}")
+            raise ValueError(f"{name} must be a number, a formula, a function of x or a field, got {entry!r}")
     try:
         parsed = [Expression(entry) if isinstance(entry, str) else entry for entry in entries]
     except ExpressionError as error:
