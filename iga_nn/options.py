@@ -95,6 +95,8 @@ class PoissonOptions:
             solution.
         refine: levels to solve on; level n halves every knot span of the map n times.
         degree: degree of the trial space; that of the map by default.
+        quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
+            points a span; "gauss", degree points a span.
     """
 
     exact: str | None = None
@@ -106,6 +108,7 @@ class PoissonOptions:
     robin: tuple[str, ...] = ()
     refine: tuple[int, ...] = (0, 1)
     degree: int | None = None
+    quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
 
     section: ClassVar[str] = "poisson"
     components: ClassVar[int] = 1  # of the solution
@@ -150,6 +153,8 @@ class ElasticityOptions:
         poisson_ratio: Poisson's ratio nu.
         refine: levels to solve on; level n halves every knot span of the map n times.
         degree: degree of the trial space; that of the map by default.
+        quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
+            points a span; "gauss", degree points a span.
     """
 
     exact: str | None = None
@@ -160,6 +165,7 @@ class ElasticityOptions:
     poisson_ratio: float = 0.3
     refine: tuple[int, ...] = (0, 1)
     degree: int | None = None
+    quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
 
     section: ClassVar[str] = "elasticity"
     components: ClassVar[int] = 3

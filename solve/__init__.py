@@ -17,10 +17,13 @@ span halved `refine` times, or of another `degree`; F itself stays as it is. Wit
 
     int grad v . kappa grad u dx = int (grad v)^T G (grad u) d(u, v, w),    G = det J  J^-1 kappa J^-T,
 
-gradients by the parameters on the right. p Gauss points a span and direction integrate it (one more where functions are
-only continuous). The matrix A is not assembled. Of a scalar symmetric law six numbers of G a point are kept, and sum
-factorization applies it; any other law is called on planes of points, between sum factorizations. Given values of u are
-interpolated at the cube's corners, and projected in L2 on its edges, then on its faces.
+gradients by the parameters on the right. Integrals are taken by Gauss rules of spline spaces S^d_(p-2), of degree d and
+one derivative less smooth than the trial functions: (d - p + 2) / 2 points a span and direction. d is 2 p - 1 where G
+varies little from span to span, as on smooth maps (p = 2: Gauss points on every span instead); else 2 p, from p = 4 on
+2 p + 1. Directions in which functions are only continuous have p + 1 Gauss points a span. The matrix A is not
+assembled. Of a scalar symmetric law six numbers of G a point are kept, and sum factorization applies it; any other law
+is called on planes of points, between sum factorizations. Given values of u are interpolated at the cube's corners, and
+projected in L2 on its edges, then on its faces.
 
 Preconditioner (`linear`; Sangalli, Tani, SIAM J. Sci. Comput. 38, 2016). Each component has its own, from the flux of
 unit gradients. G is replaced by its diagonal, and that by products of functions of one parameter, fitted in the sense

@@ -14,7 +14,7 @@ from .balance import balanced
 from .discretization.assembly import assemble
 from .discretization.operator import prepare
 from .discretization.planes import map_planes
-from .discretization.quadrature import gauss_rule
+from .discretization.quadrature import gauss_rule, operator_rule
 from .discretization.space import trial_space
 from .failure import check_unknowns
 from .forms.elasticity import Elasticity
@@ -22,7 +22,7 @@ from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .options import SolverOptions
 from .solution import Solution
-from .system import MassForm, System, assemble_data, build, check_device
+from .system import MassForm, System, assemble_data, build, check_device, problem_rule
 from .threads import checked_threads
 
 log = logging.getLogger(__name__)
@@ -35,12 +35,15 @@ def solve_problem(
     refine: int = 0,
     degree: int | None = None,
     threads: int | None = None,
+    quadrature: str = "spline",
     **how: Any,
 ) -> Solution:
     """Solve a problem on a volume.
 
     refine: how often every span of the map's knots is halved for the trial space; degree: default the map's own.
     threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
+    quadrature: of the operator: "spline", Gauss rules of the spline space, as many points as the map and the law need;
+        "gauss", `degree` Gauss points a span; "gauss+1", one more. Errors have degree + 2 points a span in any case.
     how: the fields of `SolverOptions`: tolerance, max_iterations, certified, device, start, estimate, strict.
 
     Raises ValueError for arguments out of range and for Neumann data that do not balance the source, ExpressionError
@@ -49,7 +52,8 @@ def solve_problem(
     options = SolverOptions(**how)
     _check_types(volume, problem)
     check_device(options.device, problem)
-    return discretize(volume, problem, refine=refine, degree=degree, threads=threads).solve(**how)
+    system = discretize(volume, problem, refine=refine, degree=degree, threads=threads, quadrature=quadrature)
+    return system.solve(**how)
 
 
 def discretize(
@@ -59,14 +63,16 @@ def discretize(
     refine: int = 0,
     degree: int | None = None,
     threads: int | None = None,
+    quadrature: str = "spline",
 ) -> System:
     """Return the linear system of a problem, for loops of one's own; arguments and errors as in `solve_problem`."""
     _check_types(volume, problem)
     count, placed, space = checked_threads(threads), problem.on(volume), trial_space(volume, refine, degree)
     check_unknowns(space, placed.dirichlet)
     _warm_up(placed.form.components == 1 and placed.form.symmetric)
-    prepare(space, placed.form.has_reaction)
-    return build(volume, placed, space, count)
+    rule = problem_rule(volume, placed, space, quadrature)
+    prepare(space, rule, placed.form.has_reaction)
+    return build(volume, placed, space, rule, count)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem) -> None:
@@ -98,9 +104,10 @@ def _warm_up(is_scalar: bool) -> None:
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
     space = trial_space(cube, 1)
+    rule = operator_rule(space)
     if is_scalar:
         for kappa in ("1", ["1", "0", "0", "1", "0", "1"]):
-            build(cube, Poisson(exact="x*x", kappa=kappa), space).solve()
+            build(cube, Poisson(exact="x*x", kappa=kappa), space, rule).solve()
     else:
-        build(cube, Elasticity(exact=("x*x", "y", "z")), space).solve()
+        build(cube, Elasticity(exact=("x*x", "y", "z")), space, rule).solve()
         assemble(cube, space, MassForm(), is_scalar=False).operator.apply(np.zeros((1, *space.shape)))

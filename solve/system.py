@@ -22,7 +22,8 @@ from .discretization.form_operator import FormOperator
 from .discretization.natural import FaceMass, face_rule
 from .discretization.norms import error_norms
 from .discretization.operator import Operator, free_window
-from .discretization.quadrature import GaussRule, gauss_rule
+from .discretization.quadrature import GaussRule, operator_rule
+from .discretization.roughness import rough_directions
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .estimate import error_estimate
 from .failure import announce, solve_notices
@@ -101,7 +102,7 @@ class System:
 
     @cached_property
     def mass(self) -> LinearOperator:
-        """The mass matrix, the integrals of u . v, by the rule of A."""
+        """The mass matrix, the integrals of u . v."""
         window = self.assembled.operator.window
         single = assemble(self.volume, self.space, MassForm(), window=window, threads=self.threads).operator
         return self._linear(lambda free: np.stack([single.apply_free(component) for component in free]))
@@ -225,9 +226,20 @@ class System:
         return iterate(self.multiply, self.right, self.precondition, *limits, guess)
 
 
-def build(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, threads: int = 1) -> System:
+def problem_rule(
+    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, quadrature: str = "spline"
+) -> GaussRule:
+    """Return the rule of a problem's operator, once its law is checked; quadrature as in `operator_rule`."""
+    if isinstance(problem, Problem):
+        check_law(problem.form, _samples(volume))
+    return operator_rule(space, quadrature, rough_directions(volume, space, problem.form.tensor))
+
+
+def build(
+    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, rule: GaussRule, threads: int = 1
+) -> System:
     """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space."""
-    start, rule = time.process_time(), gauss_rule(space)
+    start = time.process_time()
     with one_blas_thread():
         assembled, faces, known = assemble_data(volume, problem, space, rule, threads)
         operator = assembled.operator
@@ -236,7 +248,7 @@ def build(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpac
             term.add_diagonal(extra)
         blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
         robin = {name: term.mean for name, term in faces.items()}
-        inverses = tuple(fast_diagonalization(block, rule, robin, extra) for block in blocks)
+        inverses = tuple(fast_diagonalization(block, robin, extra) for block in blocks)
         if isinstance(operator, FormOperator) and inverses[0].singular:
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "

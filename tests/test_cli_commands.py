@@ -133,7 +133,25 @@ def test_solve_poisson_on_a_saved_volume(in_folder, capsys):
 @pytest.mark.pictures
 def test_source_without_exact_reports_estimates(in_folder, capsys):
     benchmark_volume(4).save("map.npz")
-    assert main(["solve", "poisson", "map.npz", "--source", "1", "--boundary", "0", "--refine", "0", "--quiet"]) == 0
+    assert (
+        main(
+            [
+                "solve",
+                "poisson",
+                "map.npz",
+                "--source",
+                "1",
+                "--boundary",
+                "0",
+                "--refine",
+                "0",
+                "--quiet",
+                "--quadrature",
+                "gauss",
+            ]
+        )
+        == 0
+    )
     section = json.loads(Path("map/report.json").read_text())["poisson"]
     assert "exact" not in section and "l2" not in section["levels"][0]
     assert 0.0 < section["levels"][0]["error_estimate_relative"] < 0.1
@@ -252,6 +270,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--exact", "x^2"], "x**2"),
         (["run", "poisson", "cube", "--exact", "2x"], "2*x"),
         (["run", "poisson", "cube", "--degree", "0"], "degree"),
+        (["run", "poisson", "cube", "--quadrature", "simpson"], "quadrature"),
         (["run", "poisson", "cube", "--preset", "slow"], "preset"),
         (["run", "poisson", "cube", "--seed", "-1"], "seed"),
         (["run", "poisson", "cube", "--control-points", "3"], "control points"),

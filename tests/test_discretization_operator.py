@@ -5,7 +5,7 @@ from volumes import scalar_system
 from parameterize.spline.bspline import collocation
 from parameterize.spline.volume import BSplineVolume
 from solve.discretization.operator import free_window
-from solve.discretization.quadrature import gauss_rule
+from solve.discretization.quadrature import gauss_rule, operator_rule
 from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
 
@@ -44,7 +44,7 @@ def case(request):
     stretched = smooth.control_points * [1.0, 2.0, 0.5] + 0.02 * rng.standard_normal(smooth.control_points.shape)
     volume = BSplineVolume.uniform(stretched[:, : own + 1], own) if own == 3 else BSplineVolume.uniform(stretched, own)
     space = trial_space(volume, degree=degree)
-    rule = gauss_rule(space)
+    rule = operator_rule(space)
 
     def source(x, y, z):
         return x * y + np.sin(z)
@@ -100,10 +100,10 @@ def test_folded_points_are_counted_and_a_flat_map_is_refused():
     smooth = benchmark_volume(4)
     mirrored = BSplineVolume(smooth.degrees, smooth.knots, smooth.control_points * [1.0, 1.0, -1.0])
     system = scalar_system(mirrored)
-    assert system.folded == system.points == 12**3
+    assert system.folded == system.points == np.prod(system.operator.rule.shape)
     assert scalar_system(smooth).folded == 0
     flat = BSplineVolume(smooth.degrees, smooth.knots, 0.0 * smooth.control_points)
-    with pytest.raises(ValueError, match=r"det J is zero at the parameters \(0\.028"):
+    with pytest.raises(ValueError, match=r"det J is zero at the parameters \(0\.0\d"):
         scalar_system(flat)
 
 
@@ -133,7 +133,7 @@ def test_coefficients_equal_the_assembled_matrix(kappa, degree):
         return 3.0 + x - y
 
     operator = scalar_system(volume, space, kappa=kappa, reaction=reaction).operator
-    matrix, _ = assemble_dense(volume, space, gauss_rule(space), lambda x, y, z: x, dense_kappa, lambda p: reaction(*p))
+    matrix, _ = assemble_dense(volume, space, operator.rule, lambda x, y, z: x, dense_kappa, lambda p: reaction(*p))
     x = np.random.default_rng(1).standard_normal(space.shape)
     expected = (matrix @ x.ravel()).reshape(x.shape)
     assert np.allclose(operator.apply(x), expected, atol=1e-12 * np.abs(expected).max())

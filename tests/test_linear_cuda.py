@@ -7,7 +7,6 @@ from volumes import scalar_system  # noqa: E402
 
 from parameterize.spline.volume import FACE_NAMES  # noqa: E402
 from solve import Poisson, benchmark_volume, solve_problem  # noqa: E402
-from solve.discretization.quadrature import gauss_rule  # noqa: E402
 from solve.discretization.space import trial_space  # noqa: E402
 from solve.linear.cg import conjugate_gradients  # noqa: E402
 from solve.linear.cuda import DeviceOperator, device_preconditioner, solve_on_device  # noqa: E402
@@ -20,7 +19,7 @@ def build(degree, dirichlet=FACE_NAMES, reaction=None):
     volume = benchmark_volume(4, degree)
     space = trial_space(volume, refine=1)
     operator = scalar_system(volume, space, reaction=reaction, dirichlet=dirichlet).operator
-    return operator, fast_diagonalization(operator, gauss_rule(space))
+    return operator, fast_diagonalization(operator)
 
 
 def close(tensor, array):

@@ -242,3 +242,20 @@ def test_the_solution_is_the_same_for_any_number_of_threads():
     assert one.report.l2 == three.report.l2
     with pytest.raises(ValueError, match="threads must be at least 1"):
         solve_problem(volume, problem, threads=0)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4])
+@pytest.mark.parametrize("wave", [1.0, 5.0], ids=["smooth", "wavy"])
+def test_the_default_quadrature_keeps_the_error_of_one_gauss_point_more_than_the_degree(degree, wave):
+    problem = Poisson(exact="exp(x+z)*sin(y)", kappa=f"exp(sin({wave}*x)*y)", reaction="1+x", neumann={"u0": None})
+    volume = benchmark_volume(12, degree)
+    reference, default = (
+        solve_problem(volume, problem, tolerance=1e-12, quadrature=rule).report for rule in ("gauss+1", "spline")
+    )
+    assert default.l2 == pytest.approx(reference.l2, rel=5e-3)
+    assert default.h1_seminorm == pytest.approx(reference.h1_seminorm, rel=5e-3)
+
+
+def test_a_quadrature_that_is_unknown_is_refused():
+    with pytest.raises(ValueError, match="quadrature must be one of spline, gauss"):
+        solve_problem(benchmark_volume(2), Poisson(), quadrature="newton")

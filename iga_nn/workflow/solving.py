@@ -58,7 +58,13 @@ def _solutions(
     for level in sorted(set(options.refine)):
         with input_errors():
             solution = solve_problem(
-                volume, equation, refine=level, degree=options.degree, certified=verdict_of(state), **solver
+                volume,
+                equation,
+                refine=level,
+                degree=options.degree,
+                quadrature=options.quadrature,
+                certified=verdict_of(state),
+                **solver,
             )
         log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
         solution.save(state.folder / "solution.npz")

@@ -17,7 +17,7 @@ from . import kernels
 from .form_operator import FormOperator
 from .operator import Operator, Window, free_window, to_blocks
 from .planes import count_folded, map_planes
-from .quadrature import GaussRule, gauss_rule
+from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace
 
 Source = Callable[[Array], Array]
@@ -55,7 +55,7 @@ def assemble(
     Where the map is folded, |det J| takes the place of det J. The geometry is the volume's own, evaluated exactly
     whatever the trial space. Raises ValueError where det J is zero at a point, naming it.
     """
-    rule, window = rule or gauss_rule(space), window or free_window(space)
+    rule, window = rule or operator_rule(space), window or free_window(space)
     operator: Operator | FormOperator
     if is_scalar:
         operator = Operator.empty(space, rule, form.has_reaction, window, threads)
@@ -80,7 +80,8 @@ def assemble(
             if source is None:
                 continue
             for density, total in zip(source(x), load, strict=True):
-                kernels.integrate_plane(density * np.abs(measure), v.first, v.values[0], w.first, w.values[0], plane)
+                field = (density * np.abs(measure))[None, :, None]
+                kernels.integrate_plane(field, 0, v.first, v.values[0], w.first, w.values[0], plane)
                 total[u.first[q] : u.first[q] + u.values.shape[2]] += np.multiply.outer(u.values[0, q], plane)
 
     for pieces in colours(u.first, space.degrees[0]):

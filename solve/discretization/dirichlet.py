@@ -14,11 +14,12 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
-from parameterize.spline.bspline import apply_along, collocation, gauss_points
+from parameterize.spline.bspline import apply_along, collocation
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import Points
 from .space import TrialSpace
+from .spline_quadrature import spline_rule
 
 FREE = None
 Entity = tuple[int | None, ...]  # per direction: the side 0 or 1, or FREE
@@ -45,7 +46,7 @@ def boundary_coefficients(
 
 
 class _Direction(NamedTuple):
-    """Gauss points (q,) of one direction, its functions there, and those that vanish at both ends.
+    """Points (q,) of one direction, its functions there, and those that vanish at both ends.
 
     basis: (q, n). inner: (q, n - 2), weights included. mass: the Cholesky factor of the inner functions' mass matrix.
     """
@@ -57,7 +58,7 @@ class _Direction(NamedTuple):
 
     @classmethod
     def of(cls, knots: Array, degree: int) -> _Direction:
-        points, weights = (part.ravel() for part in gauss_points(knots, degree + 2))
+        points, weights = spline_rule(knots, degree, 2 * degree)
         basis = collocation(knots, degree, points)
         inside = basis[:, 1:-1].toarray()
         inner = weights[:, None] * inside

@@ -13,7 +13,7 @@ from parameterize.arrays import Array, IntArray
 
 from ..compiled import compiled
 
-LANES = 32  # points of direction v in a block of factors
+LANES = 24  # points of direction v in a block of factors
 
 
 @compiled
@@ -70,18 +70,24 @@ def evaluate_plane(
 
 
 @compiled
-def integrate_plane(field: Array, first_v: IntArray, v: Array, first_w: IntArray, w: Array, out: Array) -> None:
-    """Integrate field (q_w, q_v), weights included, against products of functions: out (n_v, n_w).
+def integrate_plane(
+    fields: Array, index: int, first_v: IntArray, v: Array, first_w: IntArray, w: Array, out: Array
+) -> None:
+    """Integrate a field of a plane, weights included, against products of functions: out (n_v, n_w).
 
+    fields: (v blocks, q_w, fields, points of v in a block); the field with number `index` is integrated.
     v: (q_v, degree_v + 1) and w: (q_w, degree_w + 1) hold the functions' values.
     """
     n_v, n_w = out.shape
-    lines = np.zeros((n_w, v.shape[0]))
-    for q in range(w.shape[0]):
-        for k in range(w.shape[1]):
-            line, row, value = lines[first_w[q] + k], field[q], w[q, k]
-            for m in range(line.size):
-                line[m] += value * row[m]
+    blocks, width = fields.shape[0], fields.shape[3]
+    lines = np.zeros((n_w, blocks * width))
+    for block in range(blocks):
+        for q in range(w.shape[0]):
+            row = fields[block, q, index]
+            for k in range(w.shape[1]):
+                line, value = lines[first_w[q] + k, block * width : (block + 1) * width], w[q, k]
+                for m in range(width):
+                    line[m] += value * row[m]
     out[:] = 0.0
     for q in range(v.shape[0]):
         for j in range(v.shape[1]):

@@ -18,7 +18,7 @@ from parameterize.spline.volume import FACE_NAMES
 from ..forms.data import check_faces
 from ..threads import colours, in_parallel
 from . import kernels, product
-from .quadrature import GaussRule, SpanTable, Table, gauss_rule, span_tables
+from .quadrature import GaussRule, GroupTable, Table
 from .space import TrialSpace
 
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six factors
@@ -40,13 +40,14 @@ def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> W
 class Operator:
     """Symmetric positive semidefinite matrix of the form, never assembled.
 
-    tables: the trial basis at the quadrature points. window: the free coefficients. threads: of a product.
+    tables: the trial basis at the points of the rule. window: the free coefficients. threads: of a product.
     factors: (q_u, v blocks, q_w, 6 or 7, LANES), the six of G and c w det J where there is a reaction; weights
     included, points of v in blocks, the last one filled up with zeros.
     Coefficients are (n_u, n_v, n_w), or with a leading axis of one.
     """
 
     space: TrialSpace
+    rule: GaussRule
     tables: tuple[Table, Table, Table]
     factors: Array
     window: Window
@@ -59,11 +60,12 @@ class Operator:
         """Return an operator whose factors are still to be written."""
         blocks, terms = -(-rule.shape[1] // kernels.LANES), 6 + has_reaction
         factors = np.empty((rule.shape[0], blocks, rule.shape[2], terms, kernels.LANES))
-        return cls(space, rule.tabulate(space.degrees, space.knots), factors, window, threads)
+        return cls(space, rule, rule.tabulate(space.degrees, space.knots), factors, window, threads)
 
     @cached_property
-    def _spans(self) -> tuple[SpanTable, SpanTable, SpanTable]:
-        return span_tables(self.space, self.tables)
+    def _groups(self) -> tuple[GroupTable, GroupTable]:
+        """Of directions v and w."""
+        return self.tables[1].grouped(), self.tables[2].grouped()
 
     @cached_property
     def _pieces(self) -> tuple[list[IntArray], list[IntArray]]:
@@ -93,10 +95,9 @@ class Operator:
     def multiply_planes(self, points: IntArray, packed: Array, total: Array) -> None:
         """Add the part of some points of u to a packed total."""
         q_u, v_blocks, q_w, terms, lanes = self.factors.shape
-        _, v, w = self._spans
-        factors = self.factors.reshape(q_u, v_blocks, len(w.first), q_w // len(w.first) * terms * lanes)
-        n_w = self.space.shape[2]
-        product.multiply_planes(packed, points, self.tables[0], v, w, factors, (0,) * terms, n_w, total)
+        factors = self.factors.reshape(q_u, v_blocks, q_w * terms * lanes)
+        tables = (self.tables[0], *self._groups)
+        product.multiply_planes(packed, points, *tables, factors, (0,) * terms, self.space.shape[2], total)
 
     def diagonal(self) -> Array:
         """Return the diagonal of the matrix, shape `space.shape`: squared basis functions in place of the basis."""
@@ -113,8 +114,7 @@ class Operator:
                 window = slice(u.first[q], u.first[q] + u.values.shape[2])
                 for index, pair in enumerate(pairs):
                     in_u, in_v, in_w = (products[a][pair.count(a)] for a in range(3))
-                    field = from_blocks(self.factors[q, :, :, index], len(v.first))
-                    kernels.integrate_plane(field, v.first, in_v, w.first, in_w, plane)
+                    kernels.integrate_plane(self.factors[q], index, v.first, in_v, w.first, in_w, plane)
                     twice = 2.0 if len(set(pair)) == 2 else 1.0
                     result[window] += twice * np.multiply.outer(in_u[q], plane)
 
@@ -129,15 +129,15 @@ class Operator:
         return float(sum(plane[:, :, 6].sum() for plane in self.factors))
 
 
-def prepare(space: TrialSpace, reaction: bool = False) -> None:
-    """Compile the product for a space's degrees, or load it from the cache, so that no timing contains it."""
+def prepare(space: TrialSpace, rule: GaussRule, reaction: bool = False) -> None:
+    """Compile the product for a space's degrees and a rule, or load it from the cache: no timing contains it."""
     # A large block freed teaches glibc (mallopt(3), M_MMAP_THRESHOLD) to keep freed memory. Else every temporary of a
     # plane goes back to the system and is faulted in again: formulas take five times as long.
     np.empty(2**21)
-    tables = gauss_rule(space).tabulate(space.degrees, space.knots)
-    factors = np.zeros((0, 0, len(tables[2].first), 6 + reaction, kernels.LANES))
+    tables = rule.tabulate(space.degrees, space.knots)
+    factors = np.zeros((0, 0, 0, 6 + reaction, kernels.LANES))
     packed = np.zeros((1, 1, 1, product.ROWS))
-    Operator(space, tables, factors, free_window(space)).multiply_planes(np.arange(0), packed, packed)
+    Operator(space, rule, tables, factors, free_window(space)).multiply_planes(np.arange(0), packed, packed)
 
 
 def to_blocks(plane: Array) -> Array:
@@ -146,9 +146,3 @@ def to_blocks(plane: Array) -> Array:
     padded = np.zeros((q_w, -(-q_v // kernels.LANES) * kernels.LANES))
     padded[:, :q_v] = plane
     return padded.reshape(q_w, -1, kernels.LANES).transpose(1, 0, 2)
-
-
-def from_blocks(blocks: Array, q_v: int) -> Array:
-    """The plane (q_w, q_v) that `to_blocks` has cut, in memory of its own."""
-    plane = blocks.transpose(1, 0, 2).reshape(blocks.shape[1], -1)
-    return np.ascontiguousarray(plane[:, :q_v])

@@ -2,16 +2,16 @@
 
 Points of direction v are cut into blocks of LANES, coefficients of direction w into blocks of ROWS: the innermost
 loops have a fixed length and fixed strides, which is what the compiler needs to use vector instructions. Loops over
-the Gauss points and the functions of a span run over the tuples `points` and `functions` of a `quadrature.SpanTable`,
-and those over the factors over a tuple `terms`: the compiler knows their lengths, and every degree gets machine code of
-its own.
+the points and the functions of a group run over the tuples `points` and `functions` of a `quadrature.GroupTable`, and
+those over the factors over a tuple `terms`: the compiler knows their lengths, and every degree gets machine code of its
+own. Where a group holds fewer points its table is zero: what then stands in the workspace does not matter.
 
     coefficients    (n_u, n_v, n_w) packed as (n_u, w blocks, n_v, ROWS)
     planes          (2, w blocks, n_v, ROWS): value and u derivative at one point of u
     lines           (v blocks, n_w, 3, LANES): value, u and v derivative (B B, B' B, B B') at points of u and v
-    factors         (q_u, v blocks, spans of w, Gauss points x 6 or 7 x LANES): uu, uv, uw, vv, vw, ww, mass
+    factors         (q_u, v blocks, q_w x 6 or 7 x LANES): uu, uv, uw, vv, vw, ww, mass
     u               Table: functions and their first number, point by point
-    v, w            SpanTable of a direction; `values` of one span is a table (Gauss points, 2, degree + 1)
+    v, w            GroupTable of a direction; `values` of one group is a table (points, 2, degree + 1)
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from parameterize.arrays import Array, IntArray
 
 from ..compiled import compiled
 from .kernels import LANES
-from .quadrature import SpanTable, Table
+from .quadrature import GroupTable, Table
 
 ROWS = 16
 Sizes = tuple[int, ...]  # only its length counts
@@ -55,8 +55,8 @@ def multiply_planes(
     packed: Array,
     points: IntArray,
     u: Table,
-    v: SpanTable,
-    w: SpanTable,
+    v: GroupTable,
+    w: GroupTable,
     factors: Array,
     terms: Sizes,
     n_w: int,
@@ -71,7 +71,8 @@ def multiply_planes(
     planes = np.empty((2, w_blocks * n_v * ROWS))
     lines = np.zeros((factors.shape[1], n_w, 3 * LANES))
     sums = np.empty(lines.shape)
-    rows = np.empty(len(v.points) * 3 * ROWS)
+    rows = np.zeros(len(v.points) * 3 * ROWS)
+    near = np.zeros(len(w.points) * len(terms) * LANES)
     fluxes = np.empty(len(w.points) * 4 * LANES)
     for point in points:
         first, values, slopes = u.first[point], u.values[0, point], u.values[1, point]
@@ -81,7 +82,8 @@ def multiply_planes(
         _contract_v(planes, w_blocks, v, rows, lines)
         sums[:] = 0.0
         for block in range(lines.shape[0]):
-            _multiply_w(lines[block].reshape(-1), factors[point, block], w, terms, fluxes, sums[block].reshape(-1))
+            here = factors[point, block]
+            _multiply_w(lines[block].reshape(-1), here, w, terms, near, fluxes, sums[block].reshape(-1))
         planes[:] = 0.0
         _spread_v(sums, w_blocks, v, rows, planes)
         for i in range(values.size):
@@ -104,17 +106,17 @@ def _spread_u(planes: Array, value: float, slope: float, target: Array) -> None:
 
 
 @compiled
-def _contract_v(planes: Array, w_blocks: int, v: SpanTable, rows: Array, lines: Array) -> None:
+def _contract_v(planes: Array, w_blocks: int, v: GroupTable, rows: Array, lines: Array) -> None:
     counts, order = v.points, v.functions
     n_w, size = lines.shape[1], planes.shape[1] // w_blocks
     for block in range(w_blocks):
         plane, plane_u = planes[0, block * size : (block + 1) * size], planes[1, block * size : (block + 1) * size]
         width = min(ROWS, n_w - block * ROWS)
-        for span in range(v.first.size):
-            window = slice(v.first[span] * ROWS, (v.first[span] + len(order)) * ROWS)
-            _contract_span(plane[window], plane_u[window], v.values[span].reshape(-1), counts, order, rows)
-            for q in range(len(counts)):
-                point = span * len(counts) + q
+        for group in range(v.first.size):
+            window = slice(v.first[group] * ROWS, (v.first[group] + len(order)) * ROWS)
+            _contract_group(plane[window], plane_u[window], v.values[group].reshape(-1), counts, order, rows)
+            for q in range(v.length[group]):
+                point = v.start[group] + q
                 target = lines[point // LANES, block * ROWS : block * ROWS + width]
                 lane = point % LANES
                 for k in range(width):
@@ -124,8 +126,8 @@ def _contract_v(planes: Array, w_blocks: int, v: SpanTable, rows: Array, lines: 
 
 
 @compiled
-def _contract_span(plane: Array, plane_u: Array, table: Array, counts: Sizes, order: Sizes, rows: Array) -> None:
-    """At the Gauss points of one span of v: rows (Gauss points, 3, ROWS) from planes (degree + 1, ROWS)."""
+def _contract_group(plane: Array, plane_u: Array, table: Array, counts: Sizes, order: Sizes, rows: Array) -> None:
+    """At a group of points of v: rows (points, 3, ROWS) from planes (degree + 1, ROWS)."""
     size = len(order)
     for m in range(ROWS):
         for q in range(len(counts)):
@@ -141,28 +143,28 @@ def _contract_span(plane: Array, plane_u: Array, table: Array, counts: Sizes, or
 
 
 @compiled
-def _spread_v(sums: Array, w_blocks: int, v: SpanTable, rows: Array, planes: Array) -> None:
+def _spread_v(sums: Array, w_blocks: int, v: GroupTable, rows: Array, planes: Array) -> None:
     counts, order = v.points, v.functions
     n_w, size = sums.shape[1], planes.shape[1] // w_blocks
     for block in range(w_blocks):
         plane, plane_u = planes[0, block * size : (block + 1) * size], planes[1, block * size : (block + 1) * size]
         width = min(ROWS, n_w - block * ROWS)
-        for span in range(v.first.size):
-            for q in range(len(counts)):
-                point = span * len(counts) + q
+        for group in range(v.first.size):
+            for q in range(v.length[group]):
+                point = v.start[group] + q
                 source = sums[point // LANES, block * ROWS : block * ROWS + width]
                 lane = point % LANES
                 for k in range(width):
                     rows[3 * q * ROWS + k] = source[k, lane]
                     rows[(3 * q + 1) * ROWS + k] = source[k, LANES + lane]
                     rows[(3 * q + 2) * ROWS + k] = source[k, 2 * LANES + lane]
-            window = slice(v.first[span] * ROWS, (v.first[span] + len(order)) * ROWS)
-            _spread_span(rows, v.values[span].reshape(-1), counts, order, plane[window], plane_u[window])
+            window = slice(v.first[group] * ROWS, (v.first[group] + len(order)) * ROWS)
+            _spread_group(rows, v.values[group].reshape(-1), counts, order, plane[window], plane_u[window])
 
 
 @compiled
-def _spread_span(rows: Array, table: Array, counts: Sizes, order: Sizes, plane: Array, plane_u: Array) -> None:
-    """Transpose of `_contract_span`: adds to the planes."""
+def _spread_group(rows: Array, table: Array, counts: Sizes, order: Sizes, plane: Array, plane_u: Array) -> None:
+    """Transpose of `_contract_group`: adds to the planes."""
     size = len(order)
     for m in range(ROWS):
         for j in range(size):
@@ -176,24 +178,26 @@ def _spread_span(rows: Array, table: Array, counts: Sizes, order: Sizes, plane: 
 
 
 @compiled
-def _multiply_w(lines: Array, factors: Array, w: SpanTable, terms: Sizes, fluxes: Array, sums: Array) -> None:
-    """Contract w, multiply with the factors, spread back: for one block of points of v, all spans of w."""
+def _multiply_w(
+    lines: Array, factors: Array, w: GroupTable, terms: Sizes, near: Array, fluxes: Array, sums: Array
+) -> None:
+    """Contract w, multiply with the factors, spread back: for one block of points of v, all groups of points of w."""
     counts, order = w.points, w.functions
-    near = np.empty(len(counts) * len(terms) * LANES)
-    for span in range(w.first.size):
-        window = slice(w.first[span] * 3 * LANES, (w.first[span] + len(order)) * 3 * LANES)
-        table, source = w.values[span].reshape(-1), factors[span]
-        for m in range(source.size):  # in the order of memory, which the loop after next is not: a third faster
+    step = len(terms) * LANES
+    for group in range(w.first.size):
+        window = slice(w.first[group] * 3 * LANES, (w.first[group] + len(order)) * 3 * LANES)
+        table, source = w.values[group].reshape(-1), factors[w.start[group] * step :]
+        for m in range(w.length[group] * step):  # in the order of memory, which the next loop is not: a third faster
             near[m] = source[m]
-        _flux_span(lines[window], near, table, counts, order, terms, fluxes)
+        _flux_group(lines[window], near, table, counts, order, terms, fluxes)
         _spread_flux(fluxes, table, counts, order, terms, sums[window])
 
 
 @compiled
-def _flux_span(
+def _flux_group(
     lines: Array, factors: Array, table: Array, counts: Sizes, order: Sizes, terms: Sizes, fluxes: Array
 ) -> None:
-    """Fluxes (Gauss points, 4, LANES) of one span of w: mass term, along u, v, w."""
+    """Fluxes (points, 4, LANES) of a group of points of w: mass term, along u, v, w."""
     size = len(order)
     for m in range(LANES):
         for q in range(len(counts)):

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from parameterize.arrays import Array
-from parameterize.spline.bspline import basis_derivatives, breakpoints, gauss_points
+from parameterize.arrays import Array, IntArray
+from parameterize.spline.bspline import basis_derivatives
 
 from .space import TrialSpace
+from .spline_quadrature import gauss_on_spans, spline_rule
+
+QUADRATURES = ("spline", "gauss", "gauss+1")
 
 
 class Table(NamedTuple):
@@ -21,27 +24,37 @@ class Table(NamedTuple):
     values: (2, q, degree + 1) values and first derivatives of the nonzero ones.
     """
 
-    first: NDArray[np.int64]
+    first: IntArray
     values: Array
 
-    def by_spans(self, spans: int) -> SpanTable:
-        """The same span by span, for a rule with as many points in each of its `spans` spans."""
-        values = self.values.reshape(2, spans, -1, self.values.shape[2])
-        first = self.first.reshape(spans, -1)[:, 0]
-        sizes = (0,) * values.shape[2], (0,) * values.shape[3]
-        return SpanTable(np.ascontiguousarray(first), np.ascontiguousarray(values.transpose(1, 2, 0, 3)), *sizes)
+    def grouped(self) -> GroupTable:
+        """The same for groups of points, as many in each as there are between two breakpoints on average."""
+        firsts, begins, counts = np.unique(self.first, return_index=True, return_counts=True)
+        size = int(counts.mean() + 0.5)
+        pieces = [
+            (start, min(size, begin + count - start))
+            for begin, count in zip(begins, counts, strict=True)
+            for start in range(begin, begin + count, size)
+        ]
+        start, length = np.array(pieces).T
+        values = np.zeros((len(pieces), size, *self.values.shape[::2]))
+        for group, (at, held) in enumerate(pieces):
+            values[group, :held] = self.values[:, at : at + held].transpose(1, 0, 2)
+        return GroupTable(self.first[start], start, length, values, (0,) * size, (0,) * values.shape[3])
 
 
-class SpanTable(NamedTuple):
-    """The basis functions of one direction, span by span.
+class GroupTable(NamedTuple):
+    """The basis functions of one direction at groups of neighbouring points where the same functions are nonzero.
 
-    first: (spans,) index of the first function that is nonzero there.
-    values: (spans, points per span, 2, degree + 1) values and first derivatives of the nonzero ones.
-    points, functions: zeros, one for each Gauss point of a span and one for each function that is nonzero there.
-        The kernels are compiled for the lengths of these tuples.
+    first: (groups,) index of the first function that is nonzero there.
+    start, length: (groups,) index of a group's first point, and how many points it holds.
+    values: (groups, size, 2, degree + 1) values and first derivatives of the nonzero ones; zero beyond `length`.
+    points, functions: zeros, `size` and `degree` + 1 of them. The kernels are compiled for the lengths of these tuples.
     """
 
-    first: NDArray[np.int64]
+    first: IntArray
+    start: IntArray
+    length: IntArray
     values: Array
     points: tuple[int, ...]
     functions: tuple[int, ...]
@@ -80,14 +93,44 @@ class GaussRule:
         return u, v, w
 
 
-def span_tables(space: TrialSpace, tables: tuple[Table, Table, Table]) -> tuple[SpanTable, SpanTable, SpanTable]:
-    """Tables at a Gauss rule on the spans of `space`, span by span."""
-    u, v, w = (table.by_spans(len(breakpoints(k)) - 1) for table, k in zip(tables, space.knots, strict=True))
-    return u, v, w
-
-
 def gauss_rule(space: TrialSpace, counts: tuple[int, int, int] | None = None) -> GaussRule:
     """Gauss rule on the spans of `space` with `counts` points per span (default: those the operator needs)."""
-    rows = [gauss_points(k, n) for k, n in zip(space.knots, counts or space.gauss_points, strict=True)]
-    points, weights = ([r.ravel() for r in part] for part in zip(*rows, strict=True))
-    return GaussRule((points[0], points[1], points[2]), (weights[0], weights[1], weights[2]))
+    each = zip(space.knots, counts or space.gauss_points, strict=True)
+    return _tensor_rule([gauss_on_spans(knots, count) for knots, count in each])
+
+
+def operator_rule(
+    space: TrialSpace, quadrature: str = "spline", rough: tuple[bool, bool, bool] = (True, True, True)
+) -> GaussRule:
+    """Return the rule of the operator.
+
+    quadrature: "spline", Gauss rules of the spline space itself; "gauss", `degree` Gauss points a span; "gauss+1", one
+    more. rough: per direction, whether the factors vary much from span to span (`roughness`): "spline" takes more
+    points there.
+    Raises ValueError for any other quadrature.
+    """
+    if quadrature not in QUADRATURES:
+        raise ValueError(f"quadrature must be one of {', '.join(QUADRATURES)}, got {quadrature!r}")
+    if quadrature == "gauss":
+        return gauss_rule(space)
+    if quadrature == "gauss+1":
+        p_u, p_v, p_w = space.degrees
+        return gauss_rule(space, (p_u + 1, p_v + 1, p_w + 1))
+    each = zip(space.knots, space.degrees, space.gauss_points, rough, strict=True)
+    return _tensor_rule([_fewest_points(*direction) for direction in each])
+
+
+def _fewest_points(knots: Array, degree: int, gauss: int, is_rough: bool) -> tuple[Array, Array]:
+    """Return points and weights of a direction: L2 errors stay within 0.5 % of those of degree + 1 Gauss points a span.
+
+    Measured on the twisted cube and, rough, on trained maps: degrees 4 and 5 would lose 1 to 3 % there with 2 p, and
+    degree 2 on smooth ones as much with 2 p - 1, but nothing with as many Gauss points on every span (`gauss`).
+    """
+    if is_rough:
+        return spline_rule(knots, degree, 2 * degree + int(degree > 3))
+    return gauss_on_spans(knots, gauss) if degree == 2 else spline_rule(knots, degree, 2 * degree - 1)
+
+
+def _tensor_rule(rows: Sequence[tuple[Array, Array]]) -> GaussRule:
+    (u, v, w), (weights_u, weights_v, weights_w) = zip(*rows, strict=True)
+    return GaussRule((u, v, w), (weights_u, weights_v, weights_w))

@@ -18,8 +18,8 @@ from scipy.linalg import eigh
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES
 
-from ..discretization.operator import Operator, from_blocks
-from ..discretization.quadrature import GaussRule, Table
+from ..discretization.operator import Operator
+from ..discretization.quadrature import Table
 from ..threads import in_parallel
 
 DIAGONAL = (0, 3, 5)  # the places of uu, vv, ww among the six factors
@@ -76,7 +76,7 @@ def _pieces(length: int, size: int) -> list[slice]:
 
 
 def fast_diagonalization(
-    operator: Operator, rule: GaussRule, robin: Mapping[str, float] | None = None, extra_diagonal: Array | None = None
+    operator: Operator, robin: Mapping[str, float] | None = None, extra_diagonal: Array | None = None
 ) -> FastDiagonalization:
     """Build the preconditioner of an operator restricted to its free coefficients.
 
@@ -84,7 +84,7 @@ def fast_diagonalization(
     element. extra_diagonal: (n_u, n_v, n_w), the diagonal of what is added to the operator elsewhere (Robin's terms).
     """
     robin = robin or {}
-    slopes, masses, averages = _directional_matrices(operator, rule, robin)
+    slopes, masses, averages = _directional_matrices(operator, robin)
     reaction = operator.mean_mass() / float(np.prod(averages))
     values, vectors = zip(*(eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
     spectrum = _sum_outer(values) + reaction
@@ -98,18 +98,18 @@ def fast_diagonalization(
 
 
 def _directional_matrices(
-    operator: Operator, rule: GaussRule, robin: Mapping[str, float]
+    operator: Operator, robin: Mapping[str, float]
 ) -> tuple[list[Array], list[Array], list[float]]:
     """Return per direction the stiffness matrix K_d and the mass matrix M_d on the free coefficients, and M_d's mean.
 
     The mean is that of the weight b_d over the direction's parameter.
     """
-    along, across = _separable_coefficients(operator, rule)
-    averages = [float(w @ b) for w, b in zip(rule.weights, across, strict=True)]
+    along, across = _separable_coefficients(operator)
+    averages = [float(w @ b) for w, b in zip(operator.rule.weights, across, strict=True)]
     slopes, masses = [], []
     for axis, (table, n, free) in enumerate(zip(operator.tables, operator.space.shape, operator.window, strict=True)):
-        mass = _gram(table, rule.weights[axis] * across[axis], n, 0)
-        slope = _gram(table, rule.weights[axis] * along[axis], n, 1)
+        mass = _gram(table, operator.rule.weights[axis] * across[axis], n, 0)
+        slope = _gram(table, operator.rule.weights[axis] * along[axis], n, 1)
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
             # one function only is nonzero at the end, with value 1
             slope[end, end] += robin.get(name, 0.0) * averages[axis] / float(np.prod(averages))
@@ -132,7 +132,7 @@ def _scaling(
     return scaling
 
 
-def _separable_coefficients(operator: Operator, rule: GaussRule) -> tuple[list[Array], list[Array]]:
+def _separable_coefficients(operator: Operator) -> tuple[list[Array], list[Array]]:
     """Return the weights a_d and b_d at the Gauss points of each direction: two lists of (q_d,).
 
     G_dd is close to a_d of its own parameter times b_e and b_f of the two others, in the sense of least squares of
@@ -140,15 +140,16 @@ def _separable_coefficients(operator: Operator, rule: GaussRule) -> tuple[list[A
     middle one, stands for the span.
     """
     starts = [np.unique(table.first, return_index=True)[1] for table in operator.tables]  # of the spans
-    counts = [np.diff(s, append=q) for s, q in zip(starts, rule.shape, strict=True)]  # points per span
-    lengths = [np.add.reduceat(w, s) for w, s in zip(rule.weights, starts, strict=True)]
+    counts = [np.diff(s, append=q) for s, q in zip(starts, operator.rule.shape, strict=True)]  # points per span
+    lengths = [np.add.reduceat(w, s) for w, s in zip(operator.rule.weights, starts, strict=True)]
     u, v, w = (s + c // 2 for s, c in zip(starts, counts, strict=True))  # the middle points
     means = [[np.zeros(len(s)) for s in starts] for _ in range(3)]  # means[d][axis]: of log G_dd over the other axes
+    block, lane = np.divmod(v, operator.factors.shape[4])
     for span, q in enumerate(u):
-        weights = rule.plane_weights(int(q))[np.ix_(w, v)]
+        weights = operator.rule.plane_weights(int(q))[np.ix_(w, v)]
+        factors = operator.factors[q][block, w[:, None], :, lane]  # (spans of w, spans of v, 6 or 7)
         for mean, index in zip(means, DIAGONAL, strict=True):
-            plane = from_blocks(operator.factors[q][:, w, index], rule.shape[1])[:, v]
-            logarithm = np.log(np.maximum(np.abs(plane / weights), 1e-300))  # (spans of w, spans of v)
+            logarithm = np.log(np.maximum(np.abs(factors[:, :, index] / weights), 1e-300))
             mean[0][span] = lengths[2] @ logarithm @ lengths[1]
             mean[1] += lengths[0][span] * (lengths[2] @ logarithm)
             mean[2] += lengths[0][span] * (logarithm @ lengths[1])
