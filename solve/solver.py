@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import logging
+import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -70,9 +72,12 @@ def discretize(
     count, placed, space = checked_threads(threads), problem.on(volume), trial_space(volume, refine, degree)
     check_unknowns(space, placed.dirichlet)
     _warm_up(placed.form.components == 1 and placed.form.symmetric)
+    start = time.process_time()
     rule = problem_rule(volume, placed, space, quadrature)
+    chosen = time.process_time() - start
     prepare(space, rule, placed.form.has_reaction)
-    return build(volume, placed, space, rule, count)
+    system = build(volume, placed, space, rule, count)
+    return replace(system, setup=system.setup + chosen)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem) -> None:

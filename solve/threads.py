@@ -13,6 +13,7 @@ from parameterize.threads import default_threads, in_parallel
 
 __all__ = ["checked_threads", "colours", "default_threads", "in_parallel", "one_blas_thread"]
 
+SHARES = 4  # of the pieces of one colour a thread: some wait less where others take longer
 LAYERS = 4  # of elements in a piece of work, where the degree allows so few
 
 
@@ -23,16 +24,21 @@ def checked_threads(threads: int | None) -> int:
     return threads or default_threads()
 
 
-def colours(first: IntArray, degree: int) -> tuple[list[IntArray], list[IntArray]]:
-    """Consecutive points in pieces, every other piece in the first list, the rest in the second.
+def colours(first: IntArray, degree: int, threads: int) -> tuple[list[IntArray], list[IntArray]]:
+    """Return consecutive points in pieces, every other piece in the first list, the rest in the second.
 
     first: (q,) number of the first function that is not zero at each point. A piece covers at least as many layers of
     elements as the degree, so that no two of one list share a basis function: they may add to the same array at the
-    same time, and each sum has one order.
+    same time, and each sum has one order. Pieces of one list are joined to some shares a thread, to one for a single.
     """
     layers = np.unique(first, return_inverse=True)[1]
     pieces = np.split(np.arange(len(first)), np.flatnonzero(np.diff(layers // max(degree, LAYERS))) + 1)
-    return pieces[0::2], pieces[1::2]
+    return _joined(pieces[0::2], threads), _joined(pieces[1::2], threads)
+
+
+def _joined(pieces: list[IntArray], threads: int) -> list[IntArray]:
+    shares = min(len(pieces), SHARES * threads if threads > 1 else 1)
+    return [np.concatenate(pieces[i::shares]) for i in range(shares)]
 
 
 @functools.cache

@@ -84,7 +84,7 @@ def assemble(
                 kernels.integrate_plane(field, 0, v.first, v.values[0], w.first, w.values[0], plane)
                 total[u.first[q] : u.first[q] + u.values.shape[2]] += np.multiply.outer(u.values[0, q], plane)
 
-    for pieces in colours(u.first, space.degrees[0]):
+    for pieces in colours(u.first, space.degrees[0], threads):
         in_parallel(fill, pieces, threads)
     return Assembled(operator, load, sum(folded), int(np.prod(rule.shape)))
 

@@ -64,7 +64,7 @@ class FormOperator:
 
     @cached_property
     def _pieces(self) -> tuple[list[IntArray], list[IntArray]]:
-        return colours(self.tables[0].first, self.space.degrees[0])
+        return colours(self.tables[0].first, self.space.degrees[0], self.threads)
 
     def _laws(self, points: IntArray) -> Iterator[tuple[int, Array, Fused]]:
         """Yield q, R and what turns values and gradients by the parameters into reactions and fluxes, in place."""

@@ -89,11 +89,14 @@ def integrate_plane(
                 for m in range(width):
                     line[m] += value * row[m]
     out[:] = 0.0
+    row = np.empty(n_w)
     for q in range(v.shape[0]):
+        for k in range(n_w):
+            row[k] = lines[k, q]
         for j in range(v.shape[1]):
             target, value = out[first_v[q] + j], v[q, j]
             for k in range(n_w):
-                target[k] += value * lines[k, q]
+                target[k] += value * row[k]
 
 
 @compiled

@@ -69,7 +69,7 @@ class Operator:
 
     @cached_property
     def _pieces(self) -> tuple[list[IntArray], list[IntArray]]:
-        return colours(self.tables[0].first, self.space.degrees[0])
+        return colours(self.tables[0].first, self.space.degrees[0], self.threads)
 
     def apply(self, coefficients: Array) -> Array:
         """Return the product with coefficients of shape `space.shape`, those that are not free included."""

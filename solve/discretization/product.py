@@ -80,8 +80,8 @@ def multiply_planes(
         for i in range(values.size):
             _contract_u(packed[first + i].reshape(-1), values[i], slopes[i], planes)
         _contract_v(planes, w_blocks, v, rows, lines)
-        sums[:] = 0.0
         for block in range(lines.shape[0]):
+            sums[block] = 0.0
             here = factors[point, block]
             _multiply_w(lines[block].reshape(-1), here, w, terms, near, fluxes, sums[block].reshape(-1))
         planes[:] = 0.0
