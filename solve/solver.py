@@ -16,7 +16,7 @@ from .balance import balanced
 from .discretization.assembly import assemble
 from .discretization.operator import prepare
 from .discretization.planes import map_planes
-from .discretization.quadrature import gauss_rule, operator_rule
+from .discretization.quadrature import gauss_rule
 from .discretization.space import trial_space
 from .failure import check_unknowns
 from .forms.elasticity import Elasticity
@@ -76,7 +76,7 @@ def discretize(
     rule = problem_rule(volume, placed, space, quadrature)
     chosen = time.process_time() - start
     prepare(space, rule, placed.form.has_reaction)
-    system = build(volume, placed, space, rule, count)
+    system = build(volume, placed, space, count, rule)
     return replace(system, setup=system.setup + chosen)
 
 
@@ -109,10 +109,9 @@ def _warm_up(is_scalar: bool) -> None:
     corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
     cube = BSplineVolume.uniform(corners, degree=1)
     space = trial_space(cube, 1)
-    rule = operator_rule(space)
     if is_scalar:
         for kappa in ("1", ["1", "0", "0", "1", "0", "1"]):
-            build(cube, Poisson(exact="x*x", kappa=kappa), space, rule).solve()
+            build(cube, Poisson(exact="x*x", kappa=kappa), space).solve()
     else:
-        build(cube, Elasticity(exact=("x*x", "y", "z")), space, rule).solve()
+        build(cube, Elasticity(exact=("x*x", "y", "z")), space).solve()
         assemble(cube, space, MassForm(), is_scalar=False).operator.apply(np.zeros((1, *space.shape)))

@@ -236,9 +236,17 @@ def problem_rule(
 
 
 def build(
-    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, rule: GaussRule, threads: int = 1
+    volume: BSplineVolume,
+    problem: BoundaryValueProblem,
+    space: TrialSpace,
+    threads: int = 1,
+    rule: GaussRule | None = None,
 ) -> System:
-    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space."""
+    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
+
+    rule: of the operator; default: that of a rough map.
+    """
+    rule = rule or operator_rule(space)
     start = time.process_time()
     with one_blas_thread():
         assembled, faces, known = assemble_data(volume, problem, space, rule, threads)
