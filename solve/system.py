@@ -23,7 +23,7 @@ from .discretization.natural import FaceMass, face_rule
 from .discretization.norms import error_norms
 from .discretization.operator import Operator, free_window
 from .discretization.quadrature import GaussRule, operator_rule
-from .discretization.roughness import rough_directions
+from .discretization.roughness import is_rough
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .estimate import error_estimate
 from .failure import announce, solve_notices
@@ -232,7 +232,7 @@ def problem_rule(
     """Return the rule of a problem's operator, once its law is checked; quadrature as in `operator_rule`."""
     if isinstance(problem, Problem):
         check_law(problem.form, _samples(volume))
-    return operator_rule(space, quadrature, rough_directions(volume, space, problem.form.tensor))
+    return operator_rule(space, quadrature, is_rough(volume, space, problem.form.tensor))
 
 
 def build(

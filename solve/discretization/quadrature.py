@@ -99,14 +99,11 @@ def gauss_rule(space: TrialSpace, counts: tuple[int, int, int] | None = None) ->
     return _tensor_rule([gauss_on_spans(knots, count) for knots, count in each])
 
 
-def operator_rule(
-    space: TrialSpace, quadrature: str = "spline", rough: tuple[bool, bool, bool] = (True, True, True)
-) -> GaussRule:
+def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = True) -> GaussRule:
     """Return the rule of the operator.
 
     quadrature: "spline", Gauss rules of the spline space itself; "gauss", `degree` Gauss points a span; "gauss+1", one
-    more. rough: per direction, whether the factors vary much from span to span (`roughness`): "spline" takes more
-    points there.
+    more. rough: whether the factors vary much from span to span (`roughness.is_rough`), which takes more points.
     Raises ValueError for any other quadrature.
     """
     if quadrature not in QUADRATURES:
@@ -116,17 +113,17 @@ def operator_rule(
     if quadrature == "gauss+1":
         p_u, p_v, p_w = space.degrees
         return gauss_rule(space, (p_u + 1, p_v + 1, p_w + 1))
-    each = zip(space.knots, space.degrees, space.gauss_points, rough, strict=True)
-    return _tensor_rule([_fewest_points(*direction) for direction in each])
+    each = zip(space.knots, space.degrees, space.gauss_points, strict=True)
+    return _tensor_rule([_fewest_points(*direction, rough) for direction in each])
 
 
-def _fewest_points(knots: Array, degree: int, gauss: int, is_rough: bool) -> tuple[Array, Array]:
+def _fewest_points(knots: Array, degree: int, gauss: int, rough: bool) -> tuple[Array, Array]:
     """Return points and weights of a direction: L2 errors stay within 0.5 % of those of degree + 1 Gauss points a span.
 
     Measured on the twisted cube and, rough, on trained maps: degrees 4 and 5 would lose 1 to 3 % there with 2 p, and
     degree 2 on smooth ones as much with 2 p - 1, but nothing with as many Gauss points on every span (`gauss`).
     """
-    if is_rough:
+    if rough:
         return spline_rule(knots, degree, 2 * degree + int(degree > 3))
     return gauss_on_spans(knots, gauss) if degree == 2 else spline_rule(knots, degree, 2 * degree - 1)
 

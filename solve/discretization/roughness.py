@@ -22,19 +22,18 @@ LIMIT = 0.03  # trained maps reach 0.06 and more after two refinements, the twis
 Tensor = Callable[[Points], Array | None]
 
 
-def rough_directions(volume: BSplineVolume, space: TrialSpace, tensor: Tensor) -> tuple[bool, bool, bool]:
-    """Return for each direction whether G = det J J^-1 kappa J^-T varies much from span to span of a trial space.
+def is_rough(volume: BSplineVolume, space: TrialSpace, tensor: Tensor) -> bool:
+    """Return whether G = det J J^-1 kappa J^-T varies much from span to span of a trial space.
 
     Measured are second differences of G between the middles of three neighbouring spans, relative to G, at SAMPLES^3
-    places: a direction is rough where their root mean square exceeds LIMIT, or where it has fewer than three spans.
+    places. G is rough where their root mean square exceeds LIMIT in a direction, and on fewer than three spans.
     tensor: takes points (3, ...) and returns kappa, a scalar (...) or six entries (6, ...), or None for the identity.
     """
     u, v, w = (_stencils(knots) for knots in space.knots)
     rule = GaussRule((u, v, w), (np.ones_like(u), np.ones_like(v), np.ones_like(w)))
     with np.errstate(all="ignore"):  # of a map without an inverse the assembly speaks
         factors = np.stack([_factors(fields, tensor(x)) for _, fields, x in map_planes(volume, rule)])
-        rough_u, rough_w, rough_v = (not _bend(factors, axis) <= LIMIT for axis in range(3))  # (q_u, q_w, q_v, 3, 3)
-    return rough_u, rough_v, rough_w
+        return not all(_bend(factors, axis) <= LIMIT for axis in range(3))
 
 
 def _stencils(knots: Array) -> Array:
