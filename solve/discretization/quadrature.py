@@ -1,4 +1,4 @@
-"""Tensor-product Gauss rules on the spans of a trial space, and basis functions tabulated at their points."""
+"""Tensor-product Gauss rules, on spans or of the spline space, and basis functions tabulated at their points."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class GroupTable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GaussRule:
-    """Tensor-product Gauss-Legendre rule: `points[a]` and `weights[a]`, each (q_a,), in the parametric directions."""
+    """Tensor-product rule: `points[a]` and `weights[a]`, each (q_a,), in the parametric directions."""
 
     points: tuple[Array, Array, Array]
     weights: tuple[Array, Array, Array]
@@ -94,7 +94,7 @@ class GaussRule:
 
 
 def gauss_rule(space: TrialSpace, counts: tuple[int, int, int] | None = None) -> GaussRule:
-    """Gauss rule on the spans of `space` with `counts` points per span (default: those the operator needs)."""
+    """Gauss rule on the spans of `space` with `counts` points per span (default: `space.gauss_points`)."""
     each = zip(space.knots, counts or space.gauss_points, strict=True)
     return _tensor_rule([gauss_on_spans(knots, count) for knots, count in each])
 

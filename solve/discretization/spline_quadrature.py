@@ -15,7 +15,7 @@ from scipy.sparse import csr_array, hstack
 from scipy.sparse.linalg import splu
 
 from parameterize.arrays import Array
-from parameterize.spline.bspline import collocation, gauss_points, greville
+from parameterize.spline.bspline import basis_derivatives, gauss_points, greville, sparse_rows
 
 TOLERANCE = 1e-14  # of an integral, the interval's length being 1
 MAX_STEPS = 60  # of Newton's method: uniform knots take 6 to 10, irregular ones up to 25
@@ -76,7 +76,9 @@ def _newton(knots: Array, degree: int, spare: int) -> tuple[Array, Array] | None
     points, weights = _first_guess(knots, degree, integrals, spare)
     length = knots[-1] - knots[0]
     for _ in range(MAX_STEPS):
-        values, slopes = (csr_array(collocation(knots, degree, points, order).T) for order in (0, 1))
+        first, basis = basis_derivatives(knots, degree, points, derivatives=1)
+        columns = first[:, None] + np.arange(degree + 1)
+        values, slopes = (csr_array(sparse_rows(table, columns, len(integrals)).T) for table in basis)
         missing = integrals - values @ weights
         if np.abs(missing).max() <= TOLERANCE * length:
             return points, weights
@@ -84,7 +86,7 @@ def _newton(knots: Array, degree: int, spare: int) -> tuple[Array, Array] | None
         room = np.minimum(gaps[:-1], gaps[1:])
         jacobian = csr_array(hstack([values * weights, slopes * (weights * room)]))  # unknowns are relative changes
         try:
-            step = jacobian.T @ splu((jacobian @ jacobian.T).tocsc()).solve(missing)
+            step = jacobian.T @ splu((jacobian @ jacobian.T).tocsc(), permc_spec="NATURAL").solve(missing)
         except RuntimeError:  # a singular matrix
             break
         step *= min(1.0, LARGEST_STEP / np.abs(step).max())
