@@ -201,7 +201,10 @@ class StudyOptions:
     degree: tuple[int, ...] = ()
     refine: tuple[str, ...] = ("0..2",)
 
-    def problem(self) -> Poisson:
+    command: ClassVar[str] = "study"
+    components: ClassVar[int] = 1
+
+    def problem(self) -> Poisson | Elasticity:
         """Return the problem of these options. Raises InputError."""
         return PoissonOptions(exact=self.exact).problem()
 
@@ -213,6 +216,32 @@ class StudyOptions:
         for degree in self.degree or (None,):
             check_space(levels, degree)
         return sorted(levels)
+
+
+@dataclass(frozen=True)
+class ElasticityStudyOptions(StudyOptions):
+    """An exact displacement of an elastic body, and the trial spaces it is approximated in.
+
+    Attributes:
+        exact: the displacement, a vector: three formulas in x, y, z or X, Y, Z (scaled to volume 1 about the middle),
+            separated by semicolons, in quotes: "x*y;0;sin(z)".
+        traction: faces with the traction of that displacement; the others carry the displacement itself.
+        young: Young's modulus E.
+        poisson_ratio: Poisson's ratio nu.
+    """
+
+    traction: tuple[str, ...] = ()
+    young: float = 1.0
+    poisson_ratio: float = 0.3
+
+    command: ClassVar[str] = "study elasticity"
+    components: ClassVar[int] = 3
+
+    def problem(self) -> Elasticity:
+        """Return the problem of these options. Raises InputError."""
+        return ElasticityOptions(
+            exact=self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio
+        ).problem()
 
 
 ProblemOptions = PoissonOptions | ElasticityOptions

@@ -201,6 +201,30 @@ def test_elasticity_under_a_body_force(in_folder):
     assert "--body-force" in Path("map/report.html").read_text()
 
 
+def test_run_elasticity_and_the_faces_by_name(formula_training, in_folder, capsys):
+    formula_training()
+    body = ["--body-force", "0;0;-1", "--traction", "u1=0;0;0", "v0=0;0;0", "--refine", "0"]
+    assert main(["run", "elasticity", "cube", "--out", "out", *body, "--quiet"]) == 0
+    report = json.loads(Path("out/report.json").read_text())
+    with np.load("out/solution.npz") as data:
+        assert data["coefficients"].shape[3] == 3
+        assert report["elasticity"]["levels"][0]["dofs"] == data["coefficients"].size
+    assert Path("out/named_faces.png").exists() or "named_faces.png" in report["not_drawn"]
+    assert main(["run", "elasticity", "cube", "--out", "other", "--exact", "x;y;log(0-9-x)", "--quiet"]) == 2
+    assert "not finite" in capsys.readouterr().err
+
+
+def test_study_of_elasticity_shows_its_rates(in_folder, capsys):
+    benchmark_volume(2).save("map.npz")
+    body = ["--exact", "x*y;sin(z);x", "--traction", "u1", "--young", "200", "--poisson-ratio", "0.25"]
+    assert main(["study", "elasticity", "map.npz", *body, "--refine", "0..2", "--quiet"]) == 0
+    study = json.loads(Path("map-study/report.json").read_text())["study"]
+    assert study["exact"] == "x*y;sin(z);x" and study["levels"][-1]["dofs"] == 3 * 11**3
+    assert study["levels"][-1]["rate_l2"] > 3.5
+    assert main(["study", "elasticity", "map.npz", "--out", "none"]) == 2
+    assert "exact" in capsys.readouterr().err
+
+
 def test_study_writes_table_csv_and_plot(in_folder, capsys):
     benchmark_volume(2).save("map.npz")
     assert main(["study", "map.npz", "--degree", "3", "2", "--refine", "0..2"]) == 0

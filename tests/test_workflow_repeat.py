@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from iga_nn.cli.commands import app
-from iga_nn.options import ElasticityOptions, MapOptions, PoissonOptions, StudyOptions
+from iga_nn.options import ElasticityOptions, ElasticityStudyOptions, MapOptions, PoissonOptions, StudyOptions
 from iga_nn.workflow.repeat import command_line
 
 
@@ -25,6 +25,8 @@ def options_of(line: str) -> tuple[object, ...]:
         ("solve poisson", (PoissonOptions(exact="-x*y", neumann=("u1=-y", "w0"), robin=("v0=1+x*x:2",)),)),
         ("solve poisson", (PoissonOptions(source="1", boundary="0", kappa="2,0,0,1,0,1", refine=(1, 2), degree=4),)),
         ("solve elasticity", (ElasticityOptions(body_force="0;0;-1", traction=("u1=1;0;0",), young=2.5),)),
+        ("run elasticity", (MapOptions(seed=3), ElasticityOptions(exact="x;y;z", traction=("u1",)))),
+        ("study elasticity", (ElasticityStudyOptions(exact="x;y;z", traction=("u1", "v0"), degree=(2,), young=2.5),)),
         ("study", (StudyOptions(degree=(2, 3), refine=("0..3",)),)),
     ],
 )

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from ..errors import InputError, expected_errors, input_errors, one_line
-from ..options import ElasticityOptions, MapOptions, PoissonOptions, StudyOptions
+from ..options import ElasticityOptions, ElasticityStudyOptions, MapOptions, PoissonOptions, StudyOptions
 from ..version import __version__
 from .exit_codes import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
 
@@ -36,8 +36,11 @@ app = App(
 )
 run_app = App(name="run", help="Parameterize a surface and solve a problem on its volume.")
 solve_app = App(name="solve", help="Solve a problem on a volume.")
-app.command(run_app)
-app.command(solve_app)
+study_app = App(
+    name="study", help="Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the rates."
+)
+for group in (run_app, solve_app, study_app):
+    app.command(group)
 
 
 Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
@@ -77,9 +80,10 @@ Mapping = Annotated[MapOptions, Parameter(name="*")]
 Equation = Annotated[PoissonOptions, Parameter(name="*")]
 Body = Annotated[ElasticityOptions, Parameter(name="*")]
 Study = Annotated[StudyOptions, Parameter(name="*")]
+BodyStudy = Annotated[ElasticityStudyOptions, Parameter(name="*")]
 
 OUTPUT, MAPPING, STUDY = OutputOptions(), MapOptions(), StudyOptions()
-POISSON, BODY = PoissonOptions(), ElasticityOptions()
+POISSON, BODY, BODY_STUDY = PoissonOptions(), ElasticityOptions(), ElasticityStudyOptions()
 
 
 @run_app.command(name="poisson")
@@ -91,6 +95,19 @@ def run_poisson(
 
     with _progress(output) as progress:
         outcome = pipeline.run("poisson", mesh, mapping=mapping, poisson=poisson, progress=progress, **output.folder)
+    return _finish(outcome, output)
+
+
+@run_app.command(name="elasticity")
+def run_elasticity(mesh: Mesh, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING, body: Body = BODY) -> int:
+    """Parameterize a surface, certify the spline and solve linear elasticity on it.
+
+    named_faces.png shows which face of the volume is u0, u1, v0, v1, w0, w1; --corners decides it beforehand.
+    """
+    from ..workflow import pipeline
+
+    with _progress(output) as progress:
+        outcome = pipeline.run("elasticity", mesh, mapping=mapping, elasticity=body, progress=progress, **output.folder)
     return _finish(outcome, output)
 
 
@@ -137,12 +154,23 @@ def solve_elasticity(volume: Volume, /, *, output: Output = OUTPUT, body: Body =
     return _finish(outcome, output)
 
 
-@app.command(name="study")
+@study_app.default
 def study_volume(volume: Volume, /, *, output: Output = OUTPUT, study: Study = STUDY) -> int:
     """Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors and their rates.
 
     Results go to STEM-study in the current folder, unless --out names another.
     """
+    return _study(volume, output, study)
+
+
+@study_app.command(name="elasticity")
+def study_elasticity(volume: Volume, /, *, output: Output = OUTPUT, study: BodyStudy = BODY_STUDY) -> int:
+    """Do the same for linear elasticity with a given displacement."""
+    return _study(volume, output, study)
+
+
+def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
+    """Make a convergence study, print its table and return the exit code."""
     from ..workflow import pipeline
     from . import answer
 

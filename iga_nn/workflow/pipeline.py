@@ -17,7 +17,8 @@ from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
-from ..options import MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
+from ..options import ElasticityOptions, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
+from ..report import document as reports
 from ..report import html, tables
 from .output_folder import Outcome, RunFolder, open_folder
 from .repeat import command_line, gives_the_same
@@ -33,12 +34,13 @@ log = logging.getLogger(__name__)
 
 
 def run(
-    problem: Literal["poisson"],
+    problem: Literal["poisson", "elasticity"],
     mesh: str | Path,
     out: str | Path | None = None,
     *,
     mapping: MapOptions | None = None,
     poisson: PoissonOptions | None = None,
+    elasticity: ElasticityOptions | None = None,
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
@@ -50,21 +52,23 @@ def run(
     Raises MeshError for a surface that is not accepted, solve.ExpressionError for a formula, InputError for other
     options and for an output folder that holds a result (unless `force`) or cannot be written.
     """
-    if problem != "poisson":
-        raise InputError(f"problem {problem!r}: only 'poisson' can be solved")
-    mapping, poisson = mapping or MapOptions(), poisson or PoissonOptions()
-    equation, spline = poisson.problem(), mapping.config().spline
+    known = {"poisson": poisson or PoissonOptions(), "elasticity": elasticity or ElasticityOptions()}
+    if problem not in known:
+        raise InputError(f"problem {problem!r}: 'poisson' and 'elasticity' can be solved")
+    mapping, options = mapping or MapOptions(), known[problem]
+    equation, spline = options.problem(), mapping.config().spline
     blank = BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree)
-    unknowns = check_size(blank, max(poisson.refine), poisson.degree)
-    command = command_line("run poisson", mesh, mapping, poisson, out=out)
+    unknowns = check_size(blank, max(options.refine), options.degree, options.components)
+    command = command_line(f"run {problem}", mesh, mapping, options, out=out)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
-            if "poisson" not in state.finished.report:
+            if problem not in state.finished.report:
                 path = state.folder / "volume.npz"
-                raise InputError(f"{state.folder}: holds a finished volume; `iga-nn solve poisson {path}` solves on it")
+                hint = f"`iga-nn solve {problem} {path}` solves on it"
+                raise InputError(f"{state.folder}: holds a finished volume; {hint}")
             return _finished_by(command, state.finished)
         volume = map_surface(state, mesh, mapping, progress, command, equation, unknowns).volume
-        solution = solve_levels(state, volume, equation, poisson)
+        solution = solve_levels(state, volume, equation, options)
         return _finish(state, volume, solution, equation)
 
 
@@ -116,8 +120,6 @@ def solve_to(
             state, path, loaded, command_line(f"solve {options.section}", path, options, **elsewhere, out=out)
         )
         solution = solve_levels(state, loaded, equation, options, **elsewhere)
-        if len(equation.dirichlet) < 6:  # the user names faces: show which is which
-            state.draw("solution", named_volume=loaded)
         return _finish(state, loaded, solution, equation)
 
 
@@ -140,12 +142,12 @@ def study_to(
     loaded = load_volume(path)
     degrees = sorted(options.degree) or [max(loaded.degrees)]
     for degree in degrees:
-        check_size(loaded, levels[-1], degree)
+        check_size(loaded, levels[-1], degree, options.components)
     with input_errors():
         check_problem(loaded, equation)
     with open_folder(path, out or f"{path.name.split('.')[0]}-study", force, vector=vector) as state:
         state.begin("study")
-        write_certificate(state, path, loaded, command_line("study", path, options, out=out))
+        write_certificate(state, path, loaded, command_line(options.command, path, options, out=out))
         study: dict[int, list[ConvergenceRow]] = {}
         with reported(state, loaded), state.timed("solve"), input_errors():
             for degree in degrees:
@@ -153,7 +155,8 @@ def study_to(
                 log.info("degree %d: solved", degree)
         save_text(state.folder / "study.csv", tables.as_csv(study))
         notices = notices_of(row.report for row in chain(*study.values()))
-        state.write(study=described(equation, loaded) | {"levels": tables.rows_of(study), "notices": notices})
+        known = described(equation, loaded) | ({"exact": options.exact} if options.exact else {})
+        state.write(study=known | {"levels": tables.rows_of(study), "notices": notices})
         state.draw("study", study=study)
         return _finish(state, loaded), tables.as_table(study)
 
@@ -163,7 +166,7 @@ def _finished_by(command: str, finished: Outcome) -> Outcome:
     folder, made_by = finished.folder, finished.report.get("command", "")
     if not gives_the_same(made_by, command):
         raise InputError(f"{folder}: holds the result of `{made_by}`; --force replaces it, --out names another folder")
-    wanted = ["volume.npz"] + ["solution.npz"] * ("poisson" in finished.report)
+    wanted = ["volume.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
     if gone := [name for name in wanted if not (folder / name).is_file()]:
         raise InputError(f"{folder}: {gone[0]} is gone from this finished result; --force makes it anew")
     log.info("%s: finished already", folder)

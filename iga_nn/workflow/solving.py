@@ -46,6 +46,8 @@ def solve_levels(
         }
     )
     _draw_errors(state, volume, solutions, equation)
+    if len(equation.dirichlet) < 6:  # the user names faces: show which is which
+        state.draw("solution", named_volume=volume)
     return solutions[-1]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.files import save_arrays
+from parameterize.spline.volume import FACE_NAMES
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from parameterize.progress import ProgressCallback
     from parameterize.run import Parameterization
     from parameterize.surface.surface import Surface
-    from solve import Poisson
+    from solve import Elasticity, Poisson
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +52,7 @@ def map_surface(
     options: MapOptions,
     progress: ProgressCallback | None,
     command: str,
-    equation: Poisson | None = None,
+    equation: Poisson | Elasticity | None = None,
     unknowns: int = 0,
 ) -> Parameterization:
     """Parameterize a surface, write everything that is known of the map into the folder, and return it.
@@ -67,7 +68,7 @@ def map_surface(
 
 
 def _prepare(
-    state: RunFolder, mesh: str | Path, options: MapOptions, equation: Poisson | None, unknowns: int
+    state: RunFolder, mesh: str | Path, options: MapOptions, equation: Poisson | Elasticity | None, unknowns: int
 ) -> _Given:
     """Read the surface and the corners, check the problem's data on it, and announce what the run will take.
 
@@ -104,7 +105,7 @@ def _frame(surface: Surface) -> UnitFrame:
     return UnitFrame((x, y, z), 1.0 / surface.scale)
 
 
-def _check_data(equation: Poisson, surface: Surface) -> None:
+def _check_data(equation: Poisson | Elasticity, surface: Surface) -> None:
     """Check the problem's data on the surface: no points inside are known yet. Raises ExpressionError."""
     from parameterize.surface.geometry import vertex_normals
     from solve.meaning import empty_formulas
@@ -118,10 +119,10 @@ def _check_data(equation: Poisson, surface: Surface) -> None:
     for _, notice in empty_formulas(equation, points):
         log.warning("%s", notice)
     normals = vertex_normals(surface.vertices, surface.faces)
-    for face in equation.neumann:
-        _check_somewhere(partial(equation.flux_at, face), surface.vertices, normals)
-    for face in equation.robin:
-        _check_somewhere(partial(equation.robin_at, face), surface.vertices, normals)
+    for face in FACE_NAMES:
+        if face not in equation.dirichlet:
+            evaluate_at = equation.flux_at if face in equation.natural else equation.robin_at
+            _check_somewhere(partial(evaluate_at, face), surface.vertices, normals)
 
 
 def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:
