@@ -17,6 +17,7 @@ import iga_nn
 
 HERE = Path(__file__).resolve().parent
 WIDTH, COLORS = 640, 224  # of a picture kept
+EQUATIONS = ("own_law", "heat", "vibration", "thermal_stress", "convection_diffusion", "nonlinear_conductivity")
 SHORT = {"steps_factor": 0.06, "control_points": 12}
 
 
@@ -25,6 +26,7 @@ def runs(full: bool) -> dict[str, Callable[[], Path]]:
     sys.path.insert(0, str(HERE))
     mapping = iga_nn.MapOptions() if full else iga_nn.MapOptions(**SHORT)
     module = importlib.import_module
+    equations = {name: lambda name=name: module(name).main() for name in EQUATIONS}
     return {
         "first_run": lambda: module("first_run").main(config=mapping.config()),
         "own_mesh": lambda: module("own_mesh").main(mapping=mapping),
@@ -36,6 +38,7 @@ def runs(full: bool) -> dict[str, Callable[[], Path]]:
         "export_files": lambda: module("export_files").main(),
         "elasticity": lambda: module("elasticity").main(),
         "batch": lambda: module("batch").main(mapping=mapping),
+        **equations,
     }
 
 

@@ -15,6 +15,7 @@ from small_run import shortened
 import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.options import read_corners
+from solve.study import benchmark_volume
 
 
 @pytest.fixture
@@ -87,6 +88,60 @@ def test_elasticity_near_beam_theory(tmp_path, capsys):
     assert shown(load("elasticity").main(out=tmp_path))
     found, known = (float(part.split()[-1]) for part in capsys.readouterr().out.split("sinks by ")[1].split(", beam"))
     assert found == pytest.approx(known, rel=0.02)
+
+
+def numbers(text, pattern):
+    return [float(found) for found in re.findall(pattern, text)]
+
+
+def test_own_law_has_the_rates_of_its_degree_on_any_volume(tmp_path, capsys):
+    benchmark_volume(2).save(tmp_path / "volume.npz")
+    assert shown(load("own_law").main(tmp_path / "volume.npz", tmp_path))
+    out = capsys.readouterr().out
+    assert numbers(out, r"L2 rate ([\d.]+)")[-1] == pytest.approx(4.0, abs=0.3)
+    assert numbers(out, r"H1 rate ([\d.]+)")[-1] == pytest.approx(3.0, abs=0.3)
+
+
+def test_heat_is_of_second_order_in_time(tmp_path, capsys):
+    assert shown(load("heat").main(out=tmp_path))
+    out = capsys.readouterr().out
+    assert numbers(out, r"order ([\d.]+)")[-1] == pytest.approx(2.0, abs=0.05)
+    assert numbers(out, r"error (\S+)")[-1] < 2e-5
+
+
+def test_vibration_near_beam_theory(tmp_path, capsys):
+    assert shown(load("vibration").main(out=tmp_path))
+    out = capsys.readouterr().out
+    frequencies = numbers(out, r"frequency (\S+)")
+    assert len(frequencies) == 4 and max(numbers(out, r"residual (\S+)")) < 1e-5
+    assert frequencies[:2] == pytest.approx(2 * numbers(out, r"theory (\S+)"), rel=0.01)  # both ways to bend
+
+
+def test_thermal_stress_near_free_expansion(tmp_path, capsys):
+    assert shown(load("thermal_stress").main(out=tmp_path))
+    out = capsys.readouterr().out
+    assert numbers(out, r"T = ([\d.]+)") == pytest.approx([4.0])  # heat of 1/2 along a length of 8
+    assert numbers(out, r"moved by (\S+),") == pytest.approx(numbers(out, r"expansion (\S+)"), rel=0.01)
+
+
+def test_convection_diffusion_has_the_rates_of_its_degree(tmp_path, capsys):
+    assert shown(load("convection_diffusion").main(out=tmp_path))
+    out = capsys.readouterr().out
+    assert numbers(out, r"L2 rate ([\d.]+)")[-1] == pytest.approx(4.0, abs=0.3)
+    assert max(numbers(out, r"(\d+) iterations of GMRES")) < 30
+
+
+def test_nonlinear_conductivity_is_kirchhoffs(tmp_path, capsys):
+    assert shown(load("nonlinear_conductivity").main(out=tmp_path))
+    out = capsys.readouterr().out
+    changes = numbers(out, r"changes by (\S+)")
+    assert len(changes) < 30 and changes[-1] < 1e-8
+    assert numbers(out, r"- w\|: (\S+) of")[0] < 5e-3
+
+
+@pytest.mark.parametrize("name", [*load("gallery").EQUATIONS, "common"])
+def test_scripts_on_equations_are_short(name):
+    assert len((EXAMPLES / f"{name}.py").read_text(encoding="utf-8").splitlines()) <= 60
 
 
 def test_batch_goes_on_after_a_refused_file(formula_map, in_folder, tmp_path, capsys):

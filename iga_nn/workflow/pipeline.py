@@ -52,7 +52,8 @@ def run(
     Raises MeshError for a surface that is not accepted, solve.ExpressionError for a formula, InputError for other
     options and for an output folder that holds a result (unless `force`) or cannot be written.
     """
-    known = {"poisson": poisson or PoissonOptions(), "elasticity": elasticity or ElasticityOptions()}
+    known: dict[str, ProblemOptions] = {"poisson": poisson or PoissonOptions()}
+    known["elasticity"] = elasticity or ElasticityOptions()
     if problem not in known:
         raise InputError(f"problem {problem!r}: 'poisson' and 'elasticity' can be solved")
     mapping, options = mapping or MapOptions(), known[problem]
