@@ -107,7 +107,7 @@ def one_thread_an_operation() -> Iterator[None]:
 
 @dataclass
 class _Rounds:
-    """Where the optimisation stands between two rounds; number and polished count those done."""
+    """Where the optimisation stands between two rounds; number, parting and polished count those done."""
 
     energy: SplineEnergy
     knots: Knots

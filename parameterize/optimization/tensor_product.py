@@ -1,6 +1,7 @@
-"""Tensor-product splines as torch contractions: Jacobians on a grid, 1-D matrices, Kronecker operators.
+"""Tensor-product splines: sparse rows, Jacobians on a grid by banded matrices, 1-D matrices, the bending operator.
 
-Control points are held as (3, n_u, n_v, n_w), component first, so that every contraction is one large matrix product.
+Control points are held as (3, n_u, n_v, n_w), component first. Pieces of work run on all threads; their results are
+added in their order, so that the number of threads changes no bit.
 """
 
 from __future__ import annotations
