@@ -1,4 +1,4 @@
-"""From a closed surface mesh to a solved PDE on a certified trivariate B-spline.
+"""Takes a closed surface mesh to a solved PDE on a certified trivariate B-spline.
 
 The docstrings of these packages explain the method with formulas: `parameterize` the map and its certificate, `solve`
 the discretisation and its preconditioner, `iga_nn.io.formats` the files.

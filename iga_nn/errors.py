@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 class InputError(ValueError):
-    """An option, an input file or the output folder is at fault; the message is one line with the remedy."""
+    """Say that an option, an input file or the output folder is at fault, in one line with the remedy."""
 
 
 @contextmanager

@@ -21,25 +21,20 @@ TIMEOUT = 60.0  # seconds
 
 @dataclass(frozen=True)
 class Model:
-    """A published model. path: of its file in the public repository; the boundary of tetrahedra is taken."""
+    """Hold a published model. path: of its file in the public repository; the boundary of tetrahedra is taken."""
 
     path: str
     sha256: str
 
     @property
     def url(self) -> str:
-        """Address of the raw file."""
+        """Return the address of the raw file."""
         return f"{RAW}/{self.path}"
 
 
-def _published() -> dict[str, Model]:
-    """Return the models of models.txt by name."""
-    lines = (files(__package__) / "models.txt").read_text(encoding="utf-8").splitlines()
-    models = [Model(*line.split()) for line in lines if not line.startswith("#")]
-    return {Path(model.path).stem: model for model in models}
-
-
-MODELS = _published()
+_ROWS = (files(__package__) / "models.txt").read_text(encoding="utf-8").splitlines()
+_PUBLISHED = [Model(*row.split()) for row in _ROWS if not row.startswith("#")]
+MODELS = {Path(model.path).stem: model for model in _PUBLISHED}
 
 
 def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FACES, decimate: bool = False) -> Surface:

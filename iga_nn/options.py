@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 from .errors import InputError, input_errors
 
@@ -15,8 +16,11 @@ if TYPE_CHECKING:
 
     from parameterize.config import Config
     from parameterize.spline.volume import BSplineVolume
-    from solve import Elasticity, Poisson
+    from solve import Elasticity, Poisson, Problem
     from solve.forms.frame import UnitFrame
+
+Equation: TypeAlias = "Poisson | Elasticity | Problem"
+Formula = str  # one that starts with a minus is written --option=-x
 
 MAX_CONTROL_POINTS = 100  # per direction
 MAX_STEPS_FACTOR = 100.0
@@ -28,9 +32,28 @@ _LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
 _LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 
 
+@dataclass(frozen=True, kw_only=True)
+class SurfaceOptions:
+    """Say which surface is taken from a file.
+
+    Attributes:
+        component: number of the connected component to take, counted from 0.
+        max_faces: refuse surfaces with more faces.
+        decimate: reduce surfaces with more faces to max_faces instead; a notice says how far they moved.
+    """
+
+    component: int | None = None
+    max_faces: int = 500_000
+    decimate: bool = False
+
+    def reading(self) -> dict[str, Any]:
+        """Return the keywords of `models.resolve`."""
+        return {field.name: getattr(self, field.name) for field in fields(SurfaceOptions)}
+
+
 @dataclass(frozen=True)
-class MapOptions:
-    """How a surface becomes a volume.
+class MapOptions(SurfaceOptions):
+    """Say how a surface becomes a volume.
 
     Attributes:
         preset: "fast", made for two CPU cores, or "paper", the paper's own settings.
@@ -41,9 +64,6 @@ class MapOptions:
             cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
         resume: continue from the checkpoint in the output folder.
-        component: number of the connected component to take, counted from 0.
-        max_faces: refuse surfaces with more faces.
-        decimate: reduce surfaces with more faces to max_faces instead; a notice says how far they moved.
         steps_factor: multiply the steps of every stage by this factor; a small one gives a quick look.
     """
 
@@ -53,9 +73,6 @@ class MapOptions:
     control_points: int = 30
     corners: Path | None = None
     resume: bool = False
-    component: int | None = None
-    max_faces: int = 500_000
-    decimate: bool = False
     steps_factor: float = 1.0
 
     def config(self) -> Config:
@@ -76,8 +93,39 @@ class MapOptions:
 
 
 @dataclass(frozen=True)
-class PoissonOptions:
-    """-div(kappa grad u) + c u = f on the volume, data on its six faces, and the meshes it is solved on.
+class ProblemOptions(ABC):
+    """Hold what every PDE of the command line is told: its exact solution, the meshes it is solved on, and how.
+
+    A new PDE is a subclass with options of its own, entered in PROBLEMS.
+
+    Attributes:
+        refine: levels to solve on; level n halves every knot span of the map n times.
+        degree: degree of the trial space; that of the map by default.
+        quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
+            points a span; "gauss", degree points a span.
+    """
+
+    exact: Formula | None = None
+    _: KW_ONLY
+    refine: tuple[int, ...] = (0, 1)
+    degree: int | None = None
+    quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
+
+    section: ClassVar[str]  # its name on the command line and in report.json
+    title: ClassVar[str]
+
+    @abstractmethod
+    def problem(self) -> Equation:
+        """Return the problem of these options. Raises InputError."""
+
+    def solver(self) -> dict[str, Any]:
+        """Return the keywords of `solve.solve_problem` that are the same on every level."""
+        return {"degree": self.degree, "quadrature": self.quadrature}
+
+
+@dataclass(frozen=True)
+class PoissonOptions(ProblemOptions):
+    """State -div(kappa grad u) + c u = f on the volume, with data on its six faces, and the meshes it is solved on.
 
     A formula may use x, y, z, in the input's units, and X, Y, Z, the same scaled to volume 1 about the middle of the
     volume's bounding box: X = (x - c) / V^(1/3). A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and
@@ -93,25 +141,17 @@ class PoissonOptions:
         neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for that of the exact solution.
         robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
             solution.
-        refine: levels to solve on; level n halves every knot span of the map n times.
-        degree: degree of the trial space; that of the map by default.
-        quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
-            points a span; "gauss", degree points a span.
     """
 
-    exact: str | None = None
-    source: str | None = None
-    boundary: str | None = None
-    kappa: str | None = None
-    reaction: str | None = None
+    source: Formula | None = None
+    boundary: Formula | None = None
+    kappa: Formula | None = None
+    reaction: Formula | None = None
     neumann: tuple[str, ...] = ()
     robin: tuple[str, ...] = ()
-    refine: tuple[int, ...] = (0, 1)
-    degree: int | None = None
-    quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
 
     section: ClassVar[str] = "poisson"
-    components: ClassVar[int] = 1  # of the solution
+    title: ClassVar[str] = "Poisson's equation"
 
     def problem(self) -> Poisson:
         """Return the problem of these options. Raises InputError."""
@@ -129,7 +169,7 @@ class PoissonOptions:
                 exact=self.exact,
                 source=self.source,
                 boundary=self.boundary,
-                kappa=self.kappa.split(",") if self.kappa else None,
+                kappa=None if self.kappa is None else self.kappa.split(","),
                 reaction=self.reaction,
                 neumann=_faces("neumann", self.neumann),
                 robin=robin,
@@ -137,8 +177,8 @@ class PoissonOptions:
 
 
 @dataclass(frozen=True)
-class ElasticityOptions:
-    """Linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
+class ElasticityOptions(ProblemOptions):
+    """State linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
 
     A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
     or X, Y, Z (scaled to volume 1 about the middle), separated by semicolons, in quotes: "x*y;0;sin(z)".
@@ -151,24 +191,16 @@ class ElasticityOptions:
         traction: faces where a traction is given, each as "FACE=VECTOR", or FACE for that of the exact solution.
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
-        refine: levels to solve on; level n halves every knot span of the map n times.
-        degree: degree of the trial space; that of the map by default.
-        quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
-            points a span; "gauss", degree points a span.
     """
 
-    exact: str | None = None
-    body_force: str | None = None
-    displacement: str | None = None
+    body_force: Formula | None = None
+    displacement: Formula | None = None
     traction: tuple[str, ...] = ()
     young: float = 1.0
     poisson_ratio: float = 0.3
-    refine: tuple[int, ...] = (0, 1)
-    degree: int | None = None
-    quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
 
     section: ClassVar[str] = "elasticity"
-    components: ClassVar[int] = 3
+    title: ClassVar[str] = "linear elasticity"
 
     def problem(self) -> Elasticity:
         """Return the problem of these options. Raises InputError."""
@@ -186,9 +218,12 @@ class ElasticityOptions:
             )
 
 
+PROBLEMS: dict[str, type[ProblemOptions]] = {kind.section: kind for kind in (PoissonOptions, ElasticityOptions)}
+
+
 @dataclass(frozen=True)
 class StudyOptions:
-    """An exact solution of Poisson's problem, and the trial spaces it is approximated in.
+    """Give an exact solution of Poisson's problem, and the trial spaces it is approximated in.
 
     Attributes:
         exact: the solution, a formula in x, y, z or X, Y, Z (scaled to volume 1 about the middle); exp(X+Z)*sin(Y) by
@@ -197,14 +232,13 @@ class StudyOptions:
         refine: levels to solve on, 0 1 2 or 0..2; level n halves every knot span of the map n times.
     """
 
-    exact: str | None = None
+    exact: Formula | None = None
     degree: tuple[int, ...] = ()
     refine: tuple[str, ...] = ("0..2",)
 
     command: ClassVar[str] = "study"
-    components: ClassVar[int] = 1
 
-    def problem(self) -> Poisson | Elasticity:
+    def problem(self) -> Equation:
         """Return the problem of these options. Raises InputError."""
         return PoissonOptions(exact=self.exact).problem()
 
@@ -220,7 +254,7 @@ class StudyOptions:
 
 @dataclass(frozen=True)
 class ElasticityStudyOptions(StudyOptions):
-    """An exact displacement of an elastic body, and the trial spaces it is approximated in.
+    """Give an exact displacement of an elastic body, and the trial spaces it is approximated in.
 
     Attributes:
         exact: the displacement, a vector: three formulas in x, y, z or X, Y, Z (scaled to volume 1 about the middle),
@@ -235,16 +269,11 @@ class ElasticityStudyOptions(StudyOptions):
     poisson_ratio: float = 0.3
 
     command: ClassVar[str] = "study elasticity"
-    components: ClassVar[int] = 3
 
-    def problem(self) -> Elasticity:
+    def problem(self) -> Equation:
         """Return the problem of these options. Raises InputError."""
-        return ElasticityOptions(
-            exact=self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio
-        ).problem()
-
-
-ProblemOptions = PoissonOptions | ElasticityOptions
+        own = ElasticityOptions(self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio)
+        return own.problem()
 
 
 def check_space(refine: Sequence[int], degree: int | None) -> None:

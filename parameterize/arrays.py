@@ -1,6 +1,4 @@
-"""The two kinds of arrays that most functions take and return, and how a point is written."""
-
-from __future__ import annotations
+"""The kinds of arrays that most functions take and return, and how a point is written."""
 
 from collections.abc import Iterable
 
@@ -9,6 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 def in_brackets(point: Iterable[float]) -> str:

@@ -3,8 +3,6 @@
 A checksum over both is kept with them: what is damaged is refused, not computed with.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping
@@ -42,10 +40,16 @@ class Checkpoints:
             for path in [path for name in NAMES for path in folder.glob(f"{name}*.safetensors")]:
                 path.unlink()
 
-    def of_start(self, start: int) -> Checkpoints:
+    def of_start(self, start: int) -> "Checkpoints":
         """Return the checkpoints of another start of the run, in files of their own; the first start is number 0."""
         other = copy(self)
         other._suffix = f"-{start}" if start else ""
+        return other
+
+    def of_try(self, number: int) -> "Checkpoints":
+        """Return the checkpoints of another try of the spline stage, in files of their own; the first is number 0."""
+        other = copy(self)
+        other._suffix += f"-try{number}" if number else ""
         return other
 
     def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:

@@ -83,19 +83,25 @@ class SplineConfig:
     near_share: float = 0.99  # the anchors act from the first round on if at least this share of them is near
     given_corner: float = 0.5  # share of `anchors` that holds a corner given by the user, in all directions
     tangential: float = 2e-4  # share of `vertex` for the distance within the tangent plane
+    sharp: tuple[float, ...] = (0.0, 30.0)  # degrees, one a try of the first start: lower edges count as smooth
     min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
     min_facing: float = 0.1  # likewise (t_a x t_b) . n of the boundary's tangents and the mesh's normals
     facing_margin: float = 3.0  # times `min_facing`: points below may fall under it in the next step and are watched
     gap: float = 1e-3  # sheets of a boundary that meets itself are pushed so far apart
     contact: float = 10.0  # share of `vertex` for the squared depth by which they miss that
+    contact_way: float = 0.0625  # factor of the surface's weights there, each round
     penalties: tuple[float, ...] = (20.0, 100.0, 500.0, 2500.0)  # one a round, then the last one again
     rounds: int = 16  # at most
-    polish: int = 3  # of them, after the map is certified for the first time
+    polish: int = 6  # of them, after the map is certified for the first time, at most
     parting: int = 6  # before these, while the boundary of a certified map meets itself, at most
-    patient_rounds: int = 2  # after these the anchors let go, and the surface gives way at unproved spans
+    patient_rounds: int = 2  # after these the anchors let go, and the penalty grows at unproved spans
+    span_growth: float = 5.0  # factor of the penalty's weight there, each round
+    span_most: float = 125.0  # of these factors together
+    firm_rounds: int = 4  # after these the surface gives way at unproved spans
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most
+    usual_steps: tuple[int, ...] = (40, 30, 15, 10, 10, 10)  # of the rounds of most runs: tells the time left
     least_steps: int = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
     slides: int = 2  # of the boundary parameters after each step
     relaxations: int = 1  # sweeps over the triangles that these flipped
@@ -103,6 +109,8 @@ class SplineConfig:
     last_sweeps: int = 600  # over the triangles that the last slides flipped, at most
     first_gain: float = 4e-3  # the first round ends once a step lowers the energy by less than this share of it
     gain: float = 5e-4  # likewise the later ones
+    damping: float = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
+    damping_growth: float = 3.0  # factor after each further one, and divisor after a full step
     tolerance: float = 0.1  # of the inner solves, relative
     iterations: int = 20  # of an inner solve, at most
     pull: float = 3e-4  # share of `vertex` in the preconditioner: more would hold back what slides along the surface
@@ -118,6 +126,8 @@ class LayoutConfig:
     orders: int = 24  # in which the paths are traced, at most
     sweeps: int = 600  # of relaxation, at most
     patience: int = 60  # sweeps after which one more ring of neighbours may move
+    pushes: int = 100  # sweeps that push the corners of flipped triangles alone, at most
+    unflipped: float = 1e-2  # share of the median triangle that one so pushed takes
     held_rounds: int = 20  # in which points are held so that no further triangle flips, at most
     same: float = 1e-7  # share: final cuts this close to a vertex take the vertex
     nudge: float = 1e-4  # by which vertices move where a mesh edge runs through a corner of the cube
@@ -140,6 +150,7 @@ class Config:
     train: TrainConfig
     stages: tuple[StageConfig, ...]
     spline: SplineConfig
+    layout: LayoutConfig = LAYOUT
     starts: int = 2  # a map that is not certified is tried anew with the cube turned, so many times in all
 
     def scaled(self, factor: float) -> Config:

@@ -1,7 +1,5 @@
 """Array files: atomic writing and guarded reading of .npz, without pickles."""
 
-from __future__ import annotations
-
 import math
 import os
 import zipfile

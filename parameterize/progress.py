@@ -1,9 +1,12 @@
-"""Progress: what a long run reports to its caller after each step."""
+"""What a long run reports: Progress to its caller after each step, History of all steps, as history.npz holds them."""
 
-from __future__ import annotations
-
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Array
 
@@ -30,3 +33,23 @@ ProgressCallback = Callable[[Progress], None]
 
 def ignore(_: Progress) -> None:
     """Do nothing: the callback of a silent run."""
+
+
+@dataclass
+class History:
+    """Loss, folded samples and unweighted terms of every step, over all stages."""
+
+    rows: list[tuple[str, int, float, int, dict[str, float]]] = field(default_factory=list)
+
+    def add(self, stage: str, step: int, loss: float, folded: int, terms: dict[str, float]) -> None:
+        """Append a row."""
+        self.rows.append((stage, step, loss, folded, terms))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return columns of equal length, with NaN where a term is not used."""
+        columns = {
+            name: np.array([row[k] for row in self.rows]) for k, name in enumerate(("stage", "step", "loss", "folded"))
+        }
+        for name in sorted({name for row in self.rows for name in row[4]}):
+            columns[name] = np.array([row[4].get(name, math.nan) for row in self.rows])
+        return columns

@@ -1,7 +1,5 @@
 """parameterize: a closed surface to a trivariate B-spline volume, certified where that succeeds."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import operator
@@ -21,18 +19,16 @@ from .certificate.boundary import check_boundary
 from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
-from .cube.boundary_map import BoundaryMap
-from .cube.correspondence import boundary_map
+from .cube.boundary_map import BoundaryMap, boundary_map
 from .cube.cutting import subdivide_long_edges
 from .cube.edge_paths import PathError, choose_corners
 from .cube.flips import flipped, untangle
 from .cube.tutte import Layout, lay_out
-from .history import History
 from .optimization.least_squares import fit_pairs
 from .optimization.newton import Optimized, one_thread_an_operation, optimize
 from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
-from .progress import ProgressCallback, ignore
+from .progress import History, ProgressCallback, ignore
 from .quality.quality import QualityReport, measure
 from .spline.bspline import open_uniform_knots
 from .spline.volume import BSplineVolume
@@ -93,31 +89,27 @@ def parameterize(
     place = choose_device(device)
     given = None if corners is None else corner_vertices(surface, corners)
     identity = {
-        "surface": _digest(surface),
+        "surface": hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest(),
         "config": asdict(config),
         "seed": seed,
         "device": place.type,
         "dtype": str(dtype),
         "corners": None if given is None else given.tolist(),
     }
-    checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), _plain(identity), resume=resume)
-    history, seconds = History(), dict[str, float]()
+    checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     spline = config.spline
     knots = (open_uniform_knots(spline.control_points, spline.degree),) * 3
     longest = 1.0 / (spline.control_points - spline.degree)  # a span's length: no triangle larger than that
     vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
-    task = _Task(vertices, len(surface.vertices), faces, config, knots, seed, place, dtype, given)
-
-    def attempt(start: int) -> tuple[Optimized, SurfaceFit]:
-        return _attempt(task, start, seconds, history, progress or ignore, checkpoints.of_start(start))
-
-    found, fit = attempt(0)
+    own, history, seconds = len(surface.vertices), History(), dict[str, float]()
+    report: dict[str, Any] = {"history": history, "progress": progress or ignore}
+    task = _Task(vertices, own, faces, config, knots, seed, place, dtype, given, seconds, report)
+    found, fit = _attempt(task, 0, checkpoints)
     for start in range(1, config.starts if given is None else 1):
         if not any(found.faults):
             break
-        reason = "the boundary meets itself" if found.meets_itself else "not certified"
-        _log.warning("%s; trying again with the cube rotated", reason)
-        other = attempt(start)
+        _log.warning("%s; trying again with the cube rotated", _fault(found))
+        other = _attempt(task, start, checkpoints.of_start(start))
         if other[0].faults < found.faults:
             found, fit = other
     with _timed(seconds, "optimize"):
@@ -139,13 +131,8 @@ def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config
     return config or preset("fast"), operator.index(seed)
 
 
-def _digest(surface: Surface) -> str:
-    """SHA-256 of the triangles that are taken: one file may hold several bodies."""
-    return hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest()
-
-
 def choose_device(name: str) -> torch.device:
-    """The torch device for "auto", "cpu" or "cuda". Raises ValueError where it is not there."""
+    """Return the torch device for "auto", "cpu" or "cuda". Raises ValueError where it is not there."""
     if name not in ("auto", "cpu", "cuda"):
         raise ValueError(f"device {name!r}: choose auto, cpu or cuda")
     available = torch.cuda.is_available()
@@ -155,7 +142,7 @@ def choose_device(name: str) -> torch.device:
 
 
 def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
-    """Vertex numbers (8,) for given corners: 8 vertex numbers, or (8, 3) points that take their nearest vertices.
+    """Return the vertices (8,) of given corners: 8 vertex numbers, or (8, 3) points that take their nearest ones.
 
     Raises ValueError unless these are eight different vertices.
     """
@@ -189,19 +176,17 @@ class _Task:
     device: torch.device
     dtype: torch.dtype
     given_corners: IntArray | None
+    seconds: dict[str, float]  # which grow as the run goes on
+    report: dict[str, Any]  # history and progress, as Trainer and optimize take them
 
 
-def _attempt(
-    task: _Task,
-    start: int,
-    seconds: dict[str, float],
-    history: History,
-    progress: ProgressCallback,
-    checkpoints: Checkpoints,
-) -> tuple[Optimized, SurfaceFit]:
-    """Train, fit and optimise from one start; the control points found and where the surface lies on their boundary."""
-    shared: dict[str, Any] = {"history": history, "progress": progress, "checkpoints": checkpoints}
-    with _timed(seconds, "train"), one_thread_an_operation():
+def _attempt(task: _Task, start: int, checkpoints: Checkpoints) -> tuple[Optimized, SurfaceFit]:
+    """Train, fit and optimise from one start; return what was found and where the surface lies on its boundary.
+
+    Where the first start is not certified, or meets itself, its control points are optimised once more with boundary
+    data that hold along the normal alone where the mesh is smooth: F slides freely, which helps some shapes.
+    """
+    with _timed(task.seconds, "train"), one_thread_an_operation():
         trainer = Trainer(
             task.vertices,
             task.faces,
@@ -211,47 +196,61 @@ def _attempt(
             device=task.device,
             dtype=task.dtype,
             given_corners=task.given_corners,
-            **shared,
+            checkpoints=checkpoints,
+            **task.report,
         )
         network = trainer.run()
-    with _timed(seconds, "fit"), one_thread_an_operation():
-        fit = _surface_fit(network, trainer.corners, task)
-        control = _first_spline(network, fit, task)
-    with _timed(seconds, "optimize"):
-        return optimize(control, task.knots, fit, task.config.spline, **shared), fit
+    tries: list[tuple[Optimized, SurfaceFit]] = []
+    for number, sharp in enumerate(task.config.spline.sharp if start == 0 else task.config.spline.sharp[:1]):
+        if tries:
+            _log.warning("%s; trying again with the boundary free to slide", _fault(tries[0][0]))
+        with _timed(task.seconds, "fit"), one_thread_an_operation():
+            fit = _surface_fit(network, trainer.corners, task, sharp)
+            control = _first_spline(network, fit, task)
+        with _timed(task.seconds, "optimize"):
+            kept, spline = checkpoints.of_try(number), task.config.spline
+            tries.append((optimize(control, task.knots, fit, spline, checkpoints=kept, **task.report), fit))
+        if not any(tries[-1][0].faults):
+            break
+    return min(tries, key=lambda found: found[0].faults)
 
 
-def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task) -> SurfaceFit:
-    """Where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
+def _fault(found: Optimized) -> str:
+    return "the boundary meets itself" if found.meets_itself else "not certified"
+
+
+def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task, sharp: float) -> SurfaceFit:
+    """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
     spline = task.config.spline
     mapped = map_points(network, task.vertices, task.device, task.dtype)
     layout = _layout(mapped, corners, task)
     return SurfaceFit(
-        SlidingParameters(task.knots, spline.degree, layout.places, layout.faces),
+        SlidingParameters(task.knots, spline.degree, layout.places, layout.faces, task.config.layout),
         layout.vertices,
-        vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
+        vertex_quadrics(layout.vertices, layout.faces, spline.tangential, sharp),
         vertex_weights(layout.vertices, layout.faces, task.own),
         given_corners=None if task.given_corners is None else task.vertices[task.given_corners],
     )
 
 
 def _layout(mapped: Array, corners: IntArray | None, task: _Task) -> Layout:
-    """Nearest points on the cube, untangled; where that leaves flipped triangles, patches between traced edges.
+    """Return nearest points on the cube, untangled; where that leaves flips, patches between traced edges.
 
     The first stays closer to the network's map, the second always succeeds where the edges can be traced.
     """
     nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
-    untangled = untangle(nearest, task.faces)
+    untangled = untangle(nearest, task.faces, task.config.layout)
     if flipped(untangled, task.faces).mean() > task.config.spline.few_flips:
         try:
-            return lay_out(mapped, task.vertices, task.faces, choose_corners(mapped) if corners is None else corners)
+            chosen = choose_corners(mapped) if corners is None else corners
+            return lay_out(mapped, task.vertices, task.faces, chosen, task.config.layout)
         except PathError as error:
             _log.warning("the first layout has flipped triangles: %s", error)
     return Layout(task.vertices, task.faces, untangled)
 
 
 def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Tensor:
-    """Least squares on interior pairs (G(x), x) and the boundary's (section 4.3.2, step 2)."""
+    """Fit by least squares to interior pairs (G(x), x) and the boundary's (section 4.3.2, step 2)."""
     spline, vertices = task.config.spline, fit.points
     inside = interior_points(task.vertices, task.faces, spline.fit_cell)
     mapped = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
@@ -274,18 +273,19 @@ def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Te
 def _in_users_units(
     found: Optimized, surface: Surface, task: _Task, fit: SurfaceFit
 ) -> tuple[BSplineVolume, BoundaryMap]:
-    """The volume and its boundary map; the parameters are first brought close to this volume's closest points."""
+    """Return the volume and its boundary map; parameters are first brought close to this volume's closest points."""
     spline, places = task.config.spline, fit.places
     longest = 0.5 / spline.control_points
     for _ in range(spline.last_slides):
         places.slide(found.control, fit.points, longest)
-    places.relax(spline.last_sweeps)
+    places.unflip()
+    places.relax(spline.last_sweeps)  # where flips are left
     for _ in range(spline.last_slides):
         places.slide(found.control, fit.points, longest, keep_layout=True)
     points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
     volume = BSplineVolume((spline.degree,) * 3, task.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
-    return volume, boundary_map(volume, own, places.triangles, places.parameters)
+    return volume, boundary_map(volume, own, places.triangles, places.parameters, task.config.layout)
 
 
 @contextmanager
@@ -293,10 +293,3 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
     start = time.perf_counter()
     yield
     seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
-
-
-def _plain(value: Any) -> Any:
-    """Tuples as lists, as JSON gives them back."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value

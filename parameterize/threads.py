@@ -1,7 +1,5 @@
 """Pieces of work shared out among threads; what comes out does not depend on their number."""
 
-from __future__ import annotations
-
 import functools
 import os
 from collections.abc import Callable, Sequence
@@ -13,7 +11,7 @@ Result = TypeVar("Result")
 
 
 def default_threads() -> int:
-    """NUMBA_NUM_THREADS or OMP_NUM_THREADS where set, else the cores this process may use."""
+    """Return NUMBA_NUM_THREADS or OMP_NUM_THREADS where set, else the cores this process may use."""
     for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS"):
         text = os.environ.get(name, "")
         if text.isdigit() and int(text) > 0:
@@ -31,5 +29,5 @@ def in_parallel(task: Callable[[Piece], Result], pieces: Sequence[Piece], thread
 
 @functools.cache
 def _pool(threads: int, _process: int) -> ThreadPoolExecutor:
-    """The threads of this process: a copy that fork makes of it has none of them."""
+    """Return the threads of this process: a copy that fork makes of it has none of them."""
     return ThreadPoolExecutor(threads)

@@ -1,7 +1,5 @@
 """SplineField: a function of the parameters, as solution.npz holds it; and points that know their parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
-from parameterize.spline.volume import checked_knots, load_spline, save_spline
+from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
 
 class Points(np.ndarray[Any, Any]):
@@ -32,19 +30,25 @@ class Points(np.ndarray[Any, Any]):
         points.rows, points.order = rows, order
         return points
 
+    @classmethod
+    def on(cls, volume: BSplineVolume, u: Array, v: Array, w: Array) -> Self:
+        """Return the points (3, len(u), len(v), len(w)) of a volume on a tensor grid of parameters."""
+        return cls.of(np.moveaxis(volume.grid(u, v, w), -1, 0), (u, v, w))
+
 
 @dataclass(frozen=True, eq=False)
 class SplineField:
     """A function of the parameters.
 
     degrees: one per direction. knots: three open knot vectors on [0, 1]. coefficients: (m_u, m_v, m_w), with c
-    components (m_u, m_v, m_w, c).
+    components (m_u, m_v, m_w, c). geometry: the volume on which it was found, None for a function of any.
     Raises ValueError where the parts do not fit together.
     """
 
     degrees: tuple[int, int, int]
     knots: tuple[Array, Array, Array]
     coefficients: Array
+    geometry: BSplineVolume | None = None
 
     def __post_init__(self) -> None:
         shape = np.shape(self.coefficients)
@@ -68,19 +72,24 @@ class SplineField:
         if not isinstance(x, Points) or x.rows is None:
             raise ValueError("a field has values at the points x that the solver hands out, whole and unchanged")
         values = np.moveaxis(self.grid(*x.rows), -1, 0) if self.coefficients.ndim == 4 else self.grid(*x.rows)[None]
-        order = (
-            *x.order,
-            *(axis for axis in range(3) if axis not in x.order),
-        )  # directions of one parameter at the end
-        values = values.transpose(0, *(1 + axis for axis in order)).reshape(-1, *x.shape[1:])
+        single = [axis for axis in range(3) if axis not in x.order]  # directions of one parameter
+        values = values.transpose(0, *(1 + axis for axis in (*x.order, *single))).reshape(-1, *x.shape[1:])
         return values if self.coefficients.ndim == 4 else values[0]
+
+    def fits(self, volume: BSplineVolume) -> bool:
+        """Return whether the field may be data on a volume: found on it, or on none that is known."""
+        own = self.geometry
+        if own is None or own is volume:
+            return True
+        parts = zip((*own.knots, own.control_points), (*volume.knots, volume.control_points), strict=True)
+        return own.degrees == volume.degrees and all(np.array_equal(*pair) for pair in parts)
 
     def save(self, path: str | Path) -> None:
         """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients); atomic."""
         save_spline(path, self.degrees, self.knots, coefficients=self.coefficients)
 
     @staticmethod
-    def load(path: str | Path) -> SplineField:
+    def load(path: str | Path) -> "SplineField":
         """Read solution.npz: the field alone, without map and report.
 
         Raises FileNotFoundError, or ValueError naming what is wrong with the file.

@@ -1,15 +1,38 @@
-"""SolverOptions: how a linear system is solved."""
-
-from __future__ import annotations
+"""What a solve may be told: how the trial space is made, and how the linear system is solved."""
 
 from dataclasses import dataclass
+
+from parameterize.threads import default_threads
 
 from .field import SplineField
 
 
 @dataclass(frozen=True, kw_only=True)
+class SpaceOptions:
+    """Hold what `discretize` is told; its fields are its keywords.
+
+    refine: how often every span of the map's knots is halved for the trial space; degree: default the map's own.
+    threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
+    quadrature: of the operator: "spline", Gauss rules of the spline space, as many points as the map and the law need;
+        "gauss", `degree` Gauss points a span; "gauss+1", one more. Errors have degree + 2 points a span in any case.
+
+    Raises ValueError for fewer threads than one.
+    """
+
+    refine: int = 0
+    degree: int | None = None
+    threads: int | None = None
+    quadrature: str = "spline"
+
+    def __post_init__(self) -> None:
+        if self.threads is not None and self.threads < 1:
+            default = default_threads()
+            raise ValueError(f"threads must be at least 1, got {self.threads}; leave it out for {default}")
+
+
+@dataclass(frozen=True, kw_only=True)
 class SolverOptions:
-    """Hold what `solve_problem` and `System.solve` are told; its fields are their keywords.
+    """Hold what `System.solve` is told; its fields are its keywords.
 
     tolerance: of |r| / |b| for the linear solver.
     certified: the verdict of the map's certificate, if known; anything but "certified" is logged and noted.

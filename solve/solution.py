@@ -1,13 +1,73 @@
-"""Solution: the spline that a solve returns, with its map and report."""
+"""Solution: the spline that a solve returns, and SolveReport: its numbers."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from parameterize.spline.volume import BSplineVolume
 
+from .discretization.errors import Errors
 from .field import SplineField
-from .report import SolveReport
+
+NORMS = {  # name in report.json -> name as shown
+    "l2_relative": "relative L2",
+    "l2": "L2",
+    "h1_relative": "relative H1",
+    "h1_seminorm": "H1",
+    "error_estimate_relative": "estimated relative L2",
+    "error_estimate": "estimated L2",
+}
+
+
+def _known(part: str, norm: str) -> property:
+    """Return a property: a norm of a report's errors or estimate, None where it is unknown."""
+    return property(lambda report: getattr(getattr(report, part), norm, None))
+
+
+@dataclass(frozen=True)
+class SolveReport:
+    """One entry of `poisson.levels` in report.json.
+
+    elements, dofs: totals; the unknowns fixed by boundary data count as dofs.
+    h: longest straight edge of a mapped element, in the volume's units.
+    errors: the norms, None without an exact solution. estimate: of the L2 error, from the residual, where there is no
+        exact solution, or on request. The names of NORMS are properties, None where they are unknown.
+    residual: |r| / |b| at the end; residuals: the same before the first and after every iteration.
+    seconds: process CPU seconds of setup, solve and errors.
+    notices: what the reader of these numbers must know, one line each.
+    meaningful: False where a formula does not vary on the domain, or the mesh does not resolve the exact solution.
+    """
+
+    elements: int
+    dofs: int
+    h: float
+    iterations: int
+    converged: bool
+    residual: float
+    seconds: dict[str, float]
+    errors: Errors | None = None
+    estimate: Errors | None = None
+    notices: tuple[str, ...] = ()
+    meaningful: bool = True
+    residuals: tuple[float, ...] = field(default=(), repr=False)
+
+    l2 = _known("errors", "l2")
+    l2_relative = _known("errors", "l2_relative")
+    h1_relative = _known("errors", "h1_relative")
+    h1_seminorm = _known("errors", "h1_seminorm")
+    error_estimate = _known("estimate", "l2")
+    error_estimate_relative = _known("estimate", "l2_relative")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry as report.json holds it; errors that are not known are absent."""
+        names = ("elements", "dofs", "h", *NORMS, "iterations", "converged", "residual", "meaningful", "seconds")
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
+
+    def __str__(self) -> str:
+        parts = [f"{self.elements} elements", f"{self.dofs} dofs", f"h {self.h:.4g}"]
+        found = {shown: getattr(self, norm) for norm, shown in NORMS.items()}
+        parts += [f"{shown} {value:.4e}" for shown, value in found.items() if value is not None]
+        state = "" if self.converged else f", NOT CONVERGED (residual {self.residual:.1e})"
+        return "\n".join([", ".join([*parts, f"{self.iterations} iterations{state}"]), *self.notices])
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,9 +75,9 @@ class Solution(SplineField):
     """The discrete solution: a spline of the parameters, the map it lives on, and the report."""
 
     geometry: BSplineVolume
-    report: SolveReport
+    report: SolveReport = field(kw_only=True)
 
     @property
     def field(self) -> SplineField:
-        """The spline alone: a datum for another problem on the same volume."""
-        return SplineField(self.degrees, self.knots, self.coefficients)
+        """The spline without the report: a datum for another problem on the same volume."""
+        return SplineField(self.degrees, self.knots, self.coefficients, self.geometry)

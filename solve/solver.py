@@ -1,83 +1,59 @@
 """One entrance for all problems: check, discretize, solve."""
 
-from __future__ import annotations
-
 import functools
 import logging
-import time
-from dataclasses import replace
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
+from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
+from parameterize.threads import default_threads
 
-from .balance import balanced
-from .discretization.assembly import assemble
-from .discretization.operator import prepare
+from .discretization.operator import free_window
 from .discretization.planes import map_planes
 from .discretization.quadrature import gauss_rule
 from .discretization.space import trial_space
-from .failure import check_unknowns
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
-from .options import SolverOptions
+from .options import SolverOptions, SpaceOptions
 from .solution import Solution
-from .system import MassForm, System, assemble_data, build, check_device, problem_rule
-from .threads import checked_threads
+from .system import System, assemble_data, balanced, build, check_device
 
 log = logging.getLogger(__name__)
 
 
-def solve_problem(
-    volume: BSplineVolume,
-    problem: Poisson | Elasticity | Problem,
-    *,
-    refine: int = 0,
-    degree: int | None = None,
-    threads: int | None = None,
-    quadrature: str = "spline",
-    **how: Any,
-) -> Solution:
+def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution:
     """Solve a problem on a volume.
 
-    refine: how often every span of the map's knots is halved for the trial space; degree: default the map's own.
-    threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
-    quadrature: of the operator: "spline", Gauss rules of the spline space, as many points as the map and the law need;
-        "gauss", `degree` Gauss points a span; "gauss+1", one more. Errors have degree + 2 points a span in any case.
-    how: the fields of `SolverOptions`: tolerance, max_iterations, certified, device, start, estimate, strict.
+    how: the fields of `SpaceOptions`, refine, degree, threads and quadrature; and those of `SolverOptions`, tolerance,
+    max_iterations, certified, device, start, estimate and strict.
 
     Raises ValueError for arguments out of range and for Neumann data that do not balance the source, ExpressionError
     where the data are not finite or have the wrong sign, TypeError for what is no problem or no volume.
     """
-    options = SolverOptions(**how)
+    of_space = {field.name for field in fields(SpaceOptions)} & how.keys()
+    of_solver = {name: value for name, value in how.items() if name not in of_space}
+    options = SolverOptions(**of_solver)
     _check_types(volume, problem)
     check_device(options.device, problem)
-    system = discretize(volume, problem, refine=refine, degree=degree, threads=threads, quadrature=quadrature)
-    return system.solve(**how)
+    return discretize(volume, problem, **{name: how[name] for name in of_space}).solve(**of_solver)
 
 
-def discretize(
-    volume: BSplineVolume,
-    problem: Poisson | Elasticity | Problem,
-    *,
-    refine: int = 0,
-    degree: int | None = None,
-    threads: int | None = None,
-    quadrature: str = "spline",
-) -> System:
-    """Return the linear system of a problem, for loops of one's own; arguments and errors as in `solve_problem`."""
+def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> System:
+    """Return the linear system of a problem, for loops of one's own. how: the fields of `SpaceOptions`.
+
+    Raises what `solve_problem` does.
+    """
+    options = SpaceOptions(**how)
     _check_types(volume, problem)
-    count, placed, space = checked_threads(threads), problem.on(volume), trial_space(volume, refine, degree)
-    check_unknowns(space, placed.dirichlet)
-    _warm_up(placed.form.components == 1 and placed.form.symmetric)
-    start = time.process_time()
-    rule = problem_rule(volume, placed, space, quadrature)
-    chosen = time.process_time() - start
-    prepare(space, rule, placed.form.has_reaction)
-    system = build(volume, placed, space, count, rule)
-    return replace(system, setup=system.setup + chosen)
+    placed, space = problem.on(volume), trial_space(volume, options.refine, options.degree)
+    if any(part.stop <= part.start for part in free_window(space, placed.dirichlet)):
+        raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
+    _warm_up(volume.degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
+    return build(volume, placed, space, options.threads or default_threads(), options.quadrature)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem) -> None:
@@ -86,12 +62,11 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem) -> None:
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
     problem, space = problem.on(volume), trial_space(volume)
-    rule = gauss_rule(space)
-    assembled, _, _ = assemble_data(volume, problem, space, rule)
+    assembled, _, _ = assemble_data(volume, problem, space, quadrature="gauss")
     if len(problem.natural) == 6 and not problem.form.has_reaction:
         balanced(assembled.load)
     if problem.exact is not None:
-        for _, _, x in map_planes(volume, rule):
+        for _, _, x in map_planes(volume, gauss_rule(space)):
             problem.exact_at(x)
 
 
@@ -103,15 +78,14 @@ def _check_types(volume: object, problem: object) -> None:
 
 
 @functools.cache
-def _warm_up(is_scalar: bool) -> None:
+def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool) -> None:
     """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
     log.info("preparing the compiled kernels: some seconds on the first use, then they are cached")
-    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
-    cube = BSplineVolume.uniform(corners, degree=1)
-    space = trial_space(cube, 1)
-    if is_scalar:
-        for kappa in ("1", ["1", "0", "0", "1", "0", "1"]):
-            build(cube, Poisson(exact="x*x", kappa=kappa), space).solve()
-    else:
-        build(cube, Elasticity(exact=("x*x", "y", "z")), space).solve()
-        assemble(cube, space, MassForm(), is_scalar=False).operator.apply(np.zeros((1, *space.shape)))
+    # A large block freed teaches glibc (mallopt(3), M_MMAP_THRESHOLD) to keep freed memory. Else every temporary of a
+    # plane goes back to the system and is faulted in again: formulas take five times as long.
+    np.empty(2**21)
+    knots = [open_uniform_knots(p + 1, p) for p in degrees]
+    rows = [greville(row, p) for row, p in zip(knots, degrees, strict=True)]
+    cube = BSplineVolume(degrees, tuple(knots), np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1))  # type: ignore[arg-type]
+    problem = Poisson(exact="x*x") if is_scalar else Elasticity(exact=("x*x", "y", "z"))
+    build(cube, problem, trial_space(cube, 1, degree)).solve()

@@ -1,7 +1,5 @@
 """Convergence studies: one fixed map, refined exactly, and the rates that follow."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ from parameterize.spline.volume import BSplineVolume
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import Problem
-from .report import SolveReport
+from .solution import SolveReport
 from .solver import solve_problem
 
 

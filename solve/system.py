@@ -1,7 +1,6 @@
 """System: the linear system of a problem on a volume, to be solved here or in a loop of one's own."""
 
-from __future__ import annotations
-
+import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,34 +13,30 @@ from scipy.sparse.linalg import LinearOperator
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .balance import balanced, missing_mean
-from .contradiction import contradictions
-from .discretization.assembly import Assembled, assemble
-from .discretization.dirichlet import boundary_coefficients
-from .discretization.form_operator import FormOperator
-from .discretization.natural import FaceMass, face_rule
-from .discretization.norms import error_norms
-from .discretization.operator import Operator, free_window
-from .discretization.quadrature import GaussRule, operator_rule
-from .discretization.roughness import is_rough
+from .diagnostics import ConvergenceError, judge, solve_notices
+from .discretization.boundary import FaceRule, boundary_coefficients, face_rule
+from .discretization.errors import error_estimate, error_norms, missing_mean
+from .discretization.operator import Assembled, FormOperator, Operator, assemble, free_window
+from .discretization.planes import is_rough
+from .discretization.quadrature import operator_rule
 from .discretization.space import TrialSpace, embedded, longest_edge
-from .estimate import error_estimate
-from .failure import announce, solve_notices
 from .field import Points, SplineField
 from .forms.form import Form, check_law
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
-from .linear.cg import LinearResult, conjugate_gradients
-from .linear.gmres import generalized_residuals
+from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
-from .meaning import doubtful_estimate, doubts
 from .options import SolverOptions
-from .report import SolveReport
-from .solution import Solution
+from .solution import Solution, SolveReport
 from .threads import one_blas_thread
 
 DEVICES = ("cpu", "cuda")
-SAMPLES = (0.07, 0.35, 0.62, 0.91)  # parameters a direction at which a user's law is checked
+SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
+Robin = Mapping[str, tuple[FaceRule, Array]]
+
+LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
+
+log = logging.getLogger(__name__)
 
 
 def check_device(device: str, problem: BoundaryValueProblem) -> None:
@@ -61,17 +56,15 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
 class MassForm(Form):
     """The law of the mass matrix: int u . v."""
 
+    has_reaction = True
+
     def tensor(self, x: Array, component: int = 0) -> Array:
         """Return zeros."""
-        return np.zeros(x.shape[1:])
+        return np.zeros((6, *x.shape[1:]))
 
-    def flux(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return zeros."""
-        return 0.0 * grad
-
-    def react(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return u."""
-        return u
+    def mass(self, x: Array, component: int = 0) -> Array:
+        """Return ones."""
+        return np.ones(x.shape[1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,19 +72,17 @@ class System:
     """A problem on a volume as a linear system A x = b of its N free unknowns, in double precision, without matrices.
 
     A vector (N,) holds the free coefficients in C order of (c, m_u, m_v, m_w): components, and functions a direction,
-    those that Dirichlet data fix left out. `operator`, `mass` and `preconditioner` are SciPy LinearOperators (N, N),
-    `load` is b, (N,), `field` makes a spline of a vector and `vector` a vector of a spline, `solve` a Solution with its
-    report.
+    those that Dirichlet data fix left out; `operator`, `mass` and `preconditioner` are SciPy LinearOperators (N, N).
     """
 
     volume: BSplineVolume
     problem: BoundaryValueProblem
     space: TrialSpace
     assembled: Assembled
-    faces: Mapping[str, FaceMass]  # Robin's terms
+    robin: Robin  # face name -> its rule, and the weights of Robin's term
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
-    right: Array  # b as an array of the free coefficients' shape
+    right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
     threads: int
     setup: float  # process seconds
 
@@ -120,9 +111,8 @@ class System:
     def field(self, x: Array) -> SplineField:
         """Return the spline of the free coefficients x (N,) and of those that are fixed."""
         full = self.known.copy()
-        full[self.window] = np.reshape(x, self.shape)
-        spline = full[0] if len(full) == 1 else np.moveaxis(full, 0, -1)
-        return SplineField(self.space.degrees, self.space.knots, spline)
+        full[self.window] = np.reshape(x, self.right.shape)
+        return self._spline(full)
 
     def vector(self, field: SplineField) -> Array:
         """Return the free coefficients (N,) of a field of this space, or of one that it contains.
@@ -132,36 +122,31 @@ class System:
         full = embedded(field.coefficients, field.degrees, field.knots, self.space)
         return (full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))[self.window].ravel()
 
+    def _spline(self, full: Array) -> SplineField:
+        coefficients = full[0] if len(full) == 1 else np.moveaxis(full, 0, -1)
+        return SplineField(self.space.degrees, self.space.knots, coefficients, self.volume)
+
     @property
     def window(self) -> tuple[slice, ...]:
         """The free coefficients in an array (c, n_u, n_v, n_w)."""
         return (slice(None), *self.assembled.operator.window)
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(c, m_u, m_v, m_w) of the free coefficients."""
-        return self.known[self.window].shape
-
     def multiply(self, free: Array) -> Array:
         """Return A times the free coefficients (c, m_u, m_v, m_w)."""
-        if not self.faces:
-            return self.assembled.operator.apply_free(free)
         full = np.zeros(self.known.shape)
         full[self.window] = free
-        return apply_all(self.assembled, self.faces, full)[self.window]
+        return np.ascontiguousarray(_product(self.assembled, self.robin, full)[self.window])
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
-        if len(self.blocks) == 1:
-            return self.blocks[0](residual)
         return np.stack([block(part) for block, part in zip(self.blocks, residual, strict=True)])
 
     def _linear(self, apply: Callable[[Array], Array]) -> LinearOperator:
         def product(x: Array) -> Array:
             with one_blas_thread():
-                return apply(np.asarray(x, dtype=np.float64).reshape(self.shape)).ravel()
+                return apply(np.asarray(x, dtype=np.float64).reshape(self.right.shape)).ravel()
 
-        size = int(np.prod(self.shape))
+        size = int(np.prod(self.right.shape))
         adjoint = {"rmatvec": product} if self.problem.form.symmetric else {}
         return LinearOperator((size, size), matvec=product, dtype=np.float64, **adjoint)
 
@@ -174,31 +159,32 @@ class System:
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
-        announce(solution, options.strict)
+        for notice in solution.report.notices:
+            log.warning("%s", notice)
+        if options.strict and not solution.report.converged:
+            raise ConvergenceError(solution)
         return solution
 
     def _solve(self, options: SolverOptions) -> Solution:
         volume, problem, space = self.volume, self.problem, self.space
         clock = [time.process_time()]
         result = self.iterate(options)
-        coefficients = self.known.copy()
-        coefficients[self.window] = result.x
+        full = self.known.copy()
+        full[self.window] = result.x
         if self.blocks[0].singular:
-            coefficients += missing_mean(volume, space, coefficients[0], problem)
+            full += missing_mean(volume, space, full[0], problem)
         clock.append(time.process_time())
         errors = estimate = None
         if problem.exact is not None:
-            errors = error_norms(volume, space, coefficients, problem.exact_at, self.threads)
+            errors = error_norms(volume, space, full, problem.exact_at, self.threads)
         if options.estimate or (options.estimate is None and problem.exact is None):
-            estimate = error_estimate(volume, space, coefficients, problem)
+            estimate = error_estimate(volume, space, full, problem)
         clock.append(time.process_time())
-        contradictory = contradictions(volume, problem)
-        judged = doubts(volume, problem, None if contradictory else errors, coefficients.size)
-        doubtful = doubtful_estimate(estimate)
+        doubtful, meaningful = judge(volume, problem, errors, estimate, full.size)
         failed = solve_notices(volume, space, self.assembled, options.certified, result)
         report = SolveReport(
             elements=space.elements,
-            dofs=coefficients.size,
+            dofs=full.size,
             h=longest_edge(volume, space),
             iterations=result.iterations,
             converged=result.converged,
@@ -206,17 +192,16 @@ class System:
             seconds={"setup": self.setup, "solve": clock[1] - clock[0], "errors": clock[2] - clock[1]},
             errors=errors,
             estimate=estimate,
-            notices=(*doubtful, *contradictory, *judged.notices, *failed),
-            meaningful=judged.meaningful and not doubtful,
+            notices=(*doubtful, *failed),
+            meaningful=meaningful,
             residuals=result.residuals,
         )
-        field = self.field(coefficients[self.window])
-        return Solution(space.degrees, space.knots, field.coefficients, volume, report)
+        return Solution(space.degrees, space.knots, self._spline(full).coefficients, volume, report=report)
 
     def iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
         limits = options.tolerance, options.max_iterations
-        guess = None if options.start is None else self.vector(options.start).reshape(self.shape)
+        guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
@@ -226,74 +211,68 @@ class System:
         return iterate(self.multiply, self.right, self.precondition, *limits, guess)
 
 
-def problem_rule(
-    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, quadrature: str = "spline"
-) -> GaussRule:
-    """Return the rule of a problem's operator, once its law is checked; quadrature as in `operator_rule`."""
-    if isinstance(problem, Problem):
-        check_law(problem.form, _samples(volume))
-    return operator_rule(space, quadrature, is_rough(volume, space, problem.form.tensor))
-
-
 def build(
     volume: BSplineVolume,
     problem: BoundaryValueProblem,
     space: TrialSpace,
     threads: int = 1,
-    rule: GaussRule | None = None,
+    quadrature: str = "spline",
 ) -> System:
-    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
-
-    rule: of the operator; default: that of a rough map.
-    """
-    rule = rule or operator_rule(space)
+    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space."""
     start = time.process_time()
     with one_blas_thread():
-        assembled, faces, known = assemble_data(volume, problem, space, rule, threads)
+        assembled, robin, known = assemble_data(volume, problem, space, threads, quadrature)
         operator = assembled.operator
         extra = np.zeros(space.shape)
-        for term in faces.values():
-            term.add_diagonal(extra)
+        for face, weights in robin.values():
+            face.add_mass_diagonal(weights, extra)
         blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
-        robin = {name: term.mean for name, term in faces.items()}
-        inverses = tuple(fast_diagonalization(block, robin, extra) for block in blocks)
+        means = {name: float(weights.sum()) for name, (_, weights) in robin.items()}
+        inverses = tuple(fast_diagonalization(block, means, extra) for block in blocks)
         if isinstance(operator, FormOperator) and inverses[0].singular:
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
                 "solution open: give one face to boundary or robin"
             )
-        right = (assembled.load - apply_all(assembled, faces, known))[:, *operator.window]
+        right = np.ascontiguousarray((assembled.load - _product(assembled, robin, known))[:, *operator.window])
         right = balanced(right) if inverses[0].singular else right
         setup = time.process_time() - start
-    return System(volume, problem, space, assembled, faces, known, inverses, right, threads, setup)
+    return System(volume, problem, space, assembled, robin, known, inverses, right, threads, setup)
 
 
-def apply_all(assembled: Assembled, faces: Mapping[str, FaceMass], coefficients: Array) -> Array:
+def _product(assembled: Assembled, robin: Robin, coefficients: Array) -> Array:
     """Return operator and Robin's terms times coefficients (c, n_u, n_v, n_w)."""
     result = assembled.operator.apply(coefficients)
-    for face in faces.values():
+    for face, weights in robin.values():
         for component, total in zip(coefficients, result, strict=True):
-            face.add_product(component, total)
+            face.add_mass(weights, component, total)
     return result
 
 
 def assemble_data(
-    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, rule: GaussRule, threads: int = 1
-) -> tuple[Assembled, dict[str, FaceMass], Array]:
+    volume: BSplineVolume,
+    problem: BoundaryValueProblem,
+    space: TrialSpace,
+    threads: int = 1,
+    quadrature: str = "spline",
+) -> tuple[Assembled, Robin, Array]:
     """Return operator and load with the data on faces, Robin's terms by face, and the coefficients that are fixed."""
-    form = problem.form
-    couples = isinstance(problem, Problem) and check_law(form, _samples(volume))
+    form, couples = problem.form, False
+    if isinstance(problem, Problem):
+        samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
+        couples = check_law(form, Points.of(samples, (SAMPLES, SAMPLES, SAMPLES)))
+    rough = quadrature == "spline" and is_rough(volume, space, form.tensor)
     assembled = assemble(
         volume,
         space,
         form,
         problem.source_at,
-        rule,
+        operator_rule(space, quadrature, rough),
         window=free_window(space, problem.dirichlet),
-        is_scalar=form.components == 1 and form.symmetric and not couples,
+        component=0 if form.components == 1 and form.symmetric and not couples else None,
         threads=threads,
     )
-    terms = {}
+    robin = {}
     for name in FACE_NAMES:
         if name in problem.dirichlet:
             continue
@@ -302,13 +281,23 @@ def assemble_data(
             data = problem.flux_at(name, face.points, face.normal)
         else:
             alpha, data = problem.robin_at(name, face.points, face.normal)
-            terms[name] = FaceMass(face, alpha * face.measure)
+            robin[name] = (face, alpha * face.measure)
         for density, total in zip(data, assembled.load, strict=True):
-            total[face.layer] += face.integrate(density)
+            total[face.layer] += face.integrate(density * face.measure)
     known = boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet, form.components)
-    return assembled, terms, known
+    return assembled, robin, known
 
 
-def _samples(volume: BSplineVolume) -> Points:
-    row = np.array(SAMPLES)
-    return Points.of(np.moveaxis(volume.grid(row, row, row), -1, 0).reshape(3, -1), (row, row, row))
+def balanced(load: Array) -> Array:
+    """Return the load (1, n_u, n_v, n_w) less its mean: of problems that leave the solution's constant open.
+
+    The basis functions sum to one, so the load is then orthogonal to constants.
+    Raises ValueError where the load's sum, the integral of source and fluxes, is not nearly zero.
+    """
+    total, size = float(load.sum()), float(np.abs(load).sum())
+    if abs(total) > LARGEST_IMBALANCE * size:
+        raise ValueError(
+            f"incompatible Neumann data: source plus flux integrate to {total:.4g}, must be 0 where no Dirichlet face, "
+            "no Robin face and no reaction fixes the solution"
+        )
+    return load - load.mean()

@@ -1,7 +1,5 @@
 """Threads over layers of elements, with results that do not depend on their number."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 
@@ -9,19 +7,9 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from parameterize.arrays import IntArray
-from parameterize.threads import default_threads, in_parallel
-
-__all__ = ["checked_threads", "colours", "default_threads", "in_parallel", "one_blas_thread"]
 
 SHARES = 4  # of the pieces of one colour a thread: some wait less where others take longer
 LAYERS = 4  # of elements in a piece of work, where the degree allows so few
-
-
-def checked_threads(threads: int | None) -> int:
-    """The number of threads asked for, or the default. Raises ValueError for fewer than one."""
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads must be at least 1, got {threads}; leave it out for {default_threads()}")
-    return threads or default_threads()
 
 
 def colours(first: IntArray, degree: int, threads: int) -> tuple[list[IntArray], list[IntArray]]:
@@ -41,9 +29,7 @@ def _joined(pieces: list[IntArray], threads: int) -> list[IntArray]:
     return [np.concatenate(pieces[i::shares]) for i in range(shares)]
 
 
-@functools.cache
-def _controller() -> ThreadpoolController:
-    return ThreadpoolController()
+_controller = functools.cache(ThreadpoolController)  # looks for the libraries at its first use, when they are loaded
 
 
 def one_blas_thread() -> Any:

@@ -81,7 +81,7 @@ def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 @pytest.fixture
 def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let VTK draw a tenth of the pixels: without a graphics card they are what a figure costs."""
-    for module in ("map", "solution", "style"):
+    for module in ("map", "style"):
         monkeypatch.setattr(f"iga_nn.figures.{module}.PANEL", (300, 233))
 
 

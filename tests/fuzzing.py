@@ -39,17 +39,16 @@ import torch
 from mesh_files import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
 
 from iga_nn.errors import InputError, input_errors, one_line
-from iga_nn.io import Content
 from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume
-from iga_nn.options import read_corners
+from iga_nn.options import SurfaceOptions, read_corners
 from iga_nn.samples import sample
 from iga_nn.workflow.verdict import check_surface, check_volume
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
 from parameterize.spline.volume import BSplineVolume
-from parameterize.surface.surface import MAX_FACES, MeshError
+from parameterize.surface.surface import MeshError
 from solve.field import SplineField
 from solve.forms.parser import Expression, ExpressionError
 from solve.study import benchmark_volume
@@ -228,7 +227,7 @@ def check(path):
     if is_volume(path):
         check_volume(path)
     else:
-        check_surface(str(path), None, MAX_FACES)
+        check_surface(str(path), SurfaceOptions())
 
 
 def given(read):
@@ -344,7 +343,7 @@ def foreign_readers():
             kind,
             suffix,
             check,
-            tuple([written(lambda path, v=v, write=write: write(path, Content(v)), suffix)] for v in volumes),
+            tuple([written(lambda path, v=v, write=write: write(path, v), suffix)] for v in volumes),
         )
 
 

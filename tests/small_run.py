@@ -11,14 +11,14 @@ STEPS = (6, 4, 8, 4, 8)
 
 
 def shortened(config):
-    """The same way with a small network, few samples and few steps: one start, two rounds."""
+    """The same way with a small network, few samples and few steps: one start, one try of two rounds."""
     return replace(
         config,
         starts=1,
         network=NetworkConfig(width=16, modules=1, frequencies=3),
         train=replace(config.train, cell=0.2, triangles=200),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
-        spline=replace(config.spline, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2),
+        spline=replace(config.spline, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2, sharp=(0.0,)),
     )
 
 

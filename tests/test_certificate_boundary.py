@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from volumes import bent, mapped
 
-from parameterize.certificate.boundary import check_boundary
-from parameterize.certificate.box_overlap import overlapping_boxes
+from parameterize.certificate.boundary import check_boundary, overlapping_boxes
 from parameterize.certificate.jacobian import certify
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume

@@ -305,6 +305,8 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--out", ""], "out is empty"),
         (["run", "poisson", "cube", "--kappa", "1,2"], "kappa has 2 entries"),
         (["run", "poisson", "cube", "--kappa", "-x"], "--kappa=-x"),
+        (["run", "poisson", "cube", "--kappa", ""], "kappa: the expression is empty"),
+        (["study", "good.npz", "--out", ""], "out is empty"),
         (["run", "poisson", "cube", "--reaction", "q"], "reaction: expression"),
         (["run", "poisson", "cube", "--kappa", "x-0.5"], "kappa must be positive"),
         (["run", "poisson", "cube", "--neumann", "top"], "'top' is no face of the cube; the faces are u0, u1"),

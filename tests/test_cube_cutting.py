@@ -4,7 +4,7 @@ from scipy.spatial import ConvexHull
 from shapes import area, ball, enclosed_volume, is_closed, turned
 
 from parameterize.cube.cutting import cut_along_rays, split_edges, subdivide_long_edges
-from parameterize.surface.edges import edge_table
+from parameterize.surface.geometry import edge_table
 
 
 def surrounding(seed):

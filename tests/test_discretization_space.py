@@ -53,6 +53,10 @@ def test_one_gauss_point_more_where_the_space_is_only_continuous():
     assert trial_space(volume_with([0, 0, 0, 0.5, 0.5, 1, 1, 1], 2)).gauss_points == (3, 3, 3)
 
 
+def test_one_gauss_point_more_on_a_single_span():
+    assert trial_space(box((1, 1, 1), n=1)).gauss_points == (4, 4, 4)
+
+
 def test_h_is_the_longest_edge_over_the_mesh():
     volume = box((4.0, 1.0, 0.25))
     assert longest_edge(volume, trial_space(volume)) == pytest.approx(1.0)

@@ -76,8 +76,8 @@ def test_cut_shows_the_inside(tmp_path, drawing):
 def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
     cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
     volume = replace(cube, control_points=cube.control_points * size)
-    patches = octant.face_patches(volume, 9) + octant.section_patches(volume, 9)
-    corner, view = octant.best_cut([patch.points for patch in patches[:6]])
+    patches = octant.patches_of(volume, 9)
+    corner, view = octant.best_cut(patches[:6])
     outward = 2.0 * np.array(corner) - 1.0
     assert np.all(np.sign(view.towards) == outward)
     shown = octant.without_octant(patches, corner)
@@ -101,7 +101,7 @@ def test_the_error_of_vectors_is_a_length():
     points, errors = sampling.sampled_error(volume, solution, problem, 3)
     x, y, z = np.moveaxis(points[4], -1, 0)
     exact = np.stack([x * y, np.sin(z), x], axis=-1)
-    found = solution.grid(*sampling.face_grid(4, 3)).reshape(3, 3, 3)
+    found = solution.grid(*sampling.all_grids(3)[4]).reshape(3, 3, 3)
     assert errors[4] == pytest.approx(np.linalg.norm(exact - found, axis=-1), abs=1e-14)
 
 

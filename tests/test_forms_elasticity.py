@@ -6,8 +6,7 @@ import pytest
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import ConvergenceError, Elasticity, SplineField, benchmark_volume, convergence, solve_problem
-from solve.discretization.assembly import assemble
-from solve.discretization.operator import free_window
+from solve.discretization.operator import assemble, free_window
 from solve.discretization.quadrature import gauss_rule
 from solve.discretization.space import trial_space
 
@@ -27,7 +26,7 @@ def operator(volume, window_faces=()):
     space, rule = trial_space(volume), gauss_rule(trial_space(volume))
     problem = Elasticity(exact=("x", "y", "z"), **STEEL)
     window = free_window(space, window_faces)
-    return assemble(volume, space, problem, None, rule, window=window, is_scalar=False).operator
+    return assemble(volume, space, problem, None, rule, window=window, component=None).operator
 
 
 def test_linear_displacements_are_exact_on_a_box():
@@ -114,7 +113,7 @@ def test_assembly_runs_on_the_threads_and_gives_the_same_bits_for_any_number():
             return np.stack([x * y, z, np.sin(x)])
 
         body = Elasticity(exact=WAVE, **Elasticity.lame(1.0, 2.0))
-        return assemble(volume, space, body, force, rule, is_scalar=False, threads=threads)
+        return assemble(volume, space, body, force, rule, component=None, threads=threads)
 
     one, two = systems(1), systems(2, together.wait)
     assert len(seen) == 2

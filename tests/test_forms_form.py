@@ -104,11 +104,14 @@ def test_a_scalar_law_is_probed_into_the_factors_of_poisson():
     assert np.allclose(ours.load, theirs.load, atol=1e-12)
 
 
-def test_elasticity_without_its_compiled_version_is_the_same():
+@pytest.mark.parametrize("constant", [False, True])
+def test_elasticity_as_a_law_of_ones_own_is_the_same(constant):
     class Plain(iga_nn.Form):
         components = 3
         flux = iga_nn.Elasticity.flux
         constants = (1.5, 0.7)
+
+    Plain.constant = constant
 
     exact = ("exp(x)*sin(y)", "cos(x*z)", "x*y*z+sin(z)")
     body = iga_nn.Elasticity(exact=exact, traction={"u1": None}, **iga_nn.Elasticity.lame(1.5, 0.7))
@@ -135,6 +138,8 @@ def refused(**members):
         (refused(flux=lambda s, u, grad, x: grad, react=lambda s, u, grad, x: u + 1.0), "react must be linear"),
         (refused(flux=lambda s, u, grad, x: grad, react=lambda s, u, grad, x: grad[:, 0]), "set `symmetric = False`"),
         (refused(flux=lambda s, u, grad, x: -grad), "flux must be coercive"),
+        (refused(flux=lambda s, u, grad, x: x[0] * grad, constant=True), "Own is not constant"),
+        (refused(flux=lambda s, u, grad, x: grad, react=lambda s, u, grad, x: u, constant=True), "is not constant"),
         (refused(flux=lambda s, u, grad, x: grad / (0.0 * x[0])), "must return finite real numbers"),
     ],
 )

@@ -46,6 +46,12 @@ def test_arrays_of_jets_are_arrays():
     assert np.allclose(sum(turned[i, 0].gradient[i] for i in range(3)), POINTS[[1, 2, 0]].sum(axis=0))
 
 
+def test_a_power_may_be_one_of_numpys_integers():
+    """Also of a negative base, which has no logarithm: the derivative of x^2 at -3 is -6."""
+    jet = Jet(np.full(1, -3.0), (np.ones(1), 0.0, 0.0)) ** np.int64(2)
+    assert jet.value == 9.0 and jet.gradient[0] == -6.0
+
+
 def test_what_is_no_number_is_refused():
     with pytest.raises(TypeError):
         Jet(np.ones(2)) + "1"

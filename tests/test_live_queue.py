@@ -10,7 +10,7 @@ from mesh_files import CUBE, TRIANGLES, obj
 
 from iga_nn.live import worker as job_process
 from iga_nn.live.queue import Jobs, safe_name
-from iga_nn.live.worker import End, Line, Step
+from iga_nn.live.worker import End, Step
 from iga_nn.models import resolve
 from iga_nn.options import MapOptions, PoissonOptions
 from parameterize.progress import Progress
@@ -28,7 +28,7 @@ class Runs:
         self.order.append(job.number)
         self.running += 1
         self.most = max(self.most, self.running)
-        yield Line("started")
+        yield "started"
         yield Step(AT, np.zeros((len(job.surface.vertices) + 5, 3)))
         while not (self.let_go.is_set() or job.stop.is_set()):
             time.sleep(0.01)
@@ -126,7 +126,7 @@ def test_only_what_was_accepted_is_started(jobs, runs):
 
 def test_a_run_that_breaks_fails_alone(tmp_path):
     def broken(job):
-        yield Line("started")
+        yield "started"
         raise RuntimeError
 
     jobs = Jobs(tmp_path, resolve_path, broken, lambda job: None)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from volumes import spans_at
 
-from iga_nn.io import Content
 from iga_nn.io.splinepy import write_mfem
 from parameterize.spline.volume import FACE_NAMES
 from solve import Poisson, benchmark_volume, solve_problem
@@ -38,7 +37,7 @@ class MfemPoisson:
 
     def __init__(self, volume, folder):
         self.volume = volume
-        write_mfem(folder / "volume.mesh", Content(volume))
+        write_mfem(folder / "volume.mesh", volume)
         self.mesh = mfem.Mesh(str(folder / "volume.mesh"), 1, 0)
         self.space = mfem.FiniteElementSpace(self.mesh, self.mesh.GetNodes().OwnFEC())
         self.form, self.load = mfem.BilinearForm(self.space), mfem.LinearForm(self.space)

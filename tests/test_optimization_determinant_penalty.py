@@ -63,8 +63,24 @@ def test_activating_twice_counts_once():
     twice.activate(spans[:30])
     twice.activate(spans[10:])
     twice.activate(np.zeros((0, 3), dtype=np.int64))
-    assert np.array_equal(once.active, twice.active)
+    assert np.array_equal(once.weights, twice.weights) and set(once.weights.ravel()) == {1.0}
     assert once.energy_and_gradient(control)[0] == twice.energy_and_gradient(control)[0]
+
+
+def test_stubborn_spans_and_their_neighbours_weigh_more_up_to_a_limit():
+    knots, control, volume = setting(3, 0.1)
+    barrier, spans = SpanBarrier(knots, 3, 0.8), all_spans(volume)
+    barrier.activate(spans[::2])
+    corner = np.array([[0, 0, 0]])
+    for weight in (5.0, 20.0, 20.0):
+        barrier.stiffen(corner, 5.0, 20.0)
+        assert np.all(barrier.weights[:2, :2, :2] == weight)
+    assert set(barrier.weights[2:].ravel()) == {0.0, 1.0}
+    barrier.activate(spans)  # what weighs more already keeps its weight
+    assert np.all(barrier.weights[:2, :2, :2] == 20.0) and barrier.weights[2:].max() == 1.0
+    shortfall = (np.maximum(0.8 - bernstein_coefficients(volume, spans), 0.0) ** 2).mean(axis=(1, 2, 3))
+    expected = (barrier.weights[tuple(spans.T)] * shortfall).sum() / len(spans)
+    assert barrier.energy_and_gradient(control)[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_edge_spans():

@@ -57,6 +57,19 @@ def test_end_to_end(surface, undisturbed):
     assert isinstance(result.boundary, BoundaryMap) and len(result.boundary.cube_faces) == len(result.boundary.faces)
 
 
+def test_the_options_of_the_layout_reach_every_step(surface, undisturbed, caplog):
+    config = tiny_config()
+    unsettled = parameterize(
+        surface, replace(config, layout=replace(config.layout, settle_steps=0)), seed=3, device="cpu"
+    )
+    assert np.array_equal(unsettled.volume.control_points, undisturbed.volume.control_points)
+    assert not np.array_equal(unsettled.boundary.parameters, undisturbed.boundary.parameters)
+    spline = replace(config.spline, few_flips=-1.0, rounds=1)
+    parameterize(surface, replace(config, layout=replace(config.layout, orders=0), spline=spline), seed=3, device="cpu")
+    assert "training ends before stage edges: no path left" in caplog.text
+    assert "the first layout has flipped triangles: no path left" in caplog.text
+
+
 def test_history_has_a_row_a_step(undisturbed):
     stages, counts = np.unique(undisturbed.history["stage"], return_counts=True)
     found = dict(zip(stages.tolist(), counts.tolist(), strict=True))
@@ -240,6 +253,32 @@ def test_a_map_not_certified_is_tried_anew_with_the_cube_turned(surface, monkeyp
     assert (result.history["stage"] == "cube").sum() == 2 * STEPS[2]
     parameterize(surface, tiny_config(), seed=3, device="cpu")
     assert len(seen) == 3
+
+
+def test_the_first_start_is_tried_once_more_with_a_boundary_that_slides_freely(surface, monkeypatch, tmp_path):
+    """The network is trained once; the second try keeps checkpoints of its own."""
+    optimize, seen = run.optimize, []
+
+    def spoiled(control, knots, fit, *args, **options):
+        found = optimize(control, knots, fit, *args, **options)
+        unproved = np.zeros((2 - len(seen), 3), dtype=np.int64)
+        verdict = "undecided" if len(unproved) else "certified"
+        seen.append((fit, replace(found, certificate=replace(found.certificate, verdict=verdict, unproved=unproved))))
+        return seen[-1][1]
+
+    monkeypatch.setattr(run, "optimize", spoiled)
+    config = tiny_config()
+    config = replace(config, spline=replace(config.spline, sharp=(0.0, 30.0, 60.0, 90.0)))
+    result = parameterize(surface, config, seed=3, device="cpu", checkpoint_dir=tmp_path)
+    assert len(seen) == 3  # the third is certified
+    held = [float(np.trace(fit._quadrics, axis1=1, axis2=2).sum()) for fit, _ in seen]
+    assert held[0] > held[1] > held[2]
+    assert np.array_equal(
+        result.volume.control_points, surface.from_unit(np.moveaxis(seen[2][1].control.numpy(), 0, -1))
+    )
+    assert (result.history["stage"] == "cube").sum() == STEPS[2]
+    names = sorted(path.name for path in tmp_path.glob("*.safetensors"))
+    assert names == ["spline-try1.safetensors", "spline-try2.safetensors", "spline.safetensors", "training.safetensors"]
 
 
 @pytest.mark.parametrize("meets", [[True, False], [False], [True, True]])

@@ -2,6 +2,7 @@ import logging
 
 import numpy as np
 import pytest
+from volumes import mapped
 
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
@@ -254,6 +255,14 @@ def test_the_default_quadrature_keeps_the_error_of_one_gauss_point_more_than_the
     )
     assert default.l2 == pytest.approx(reference.l2, rel=5e-3)
     assert default.h1_seminorm == pytest.approx(reference.h1_seminorm, rel=5e-3)
+
+
+@pytest.mark.parametrize("rule", ["spline", "gauss", "gauss+1"])
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+def test_directions_of_one_span_may_have_natural_data_on_both_ends(rule, degree):
+    slab = mapped(lambda u, v, w: (u, v, 0.2 * w), (degree + 3, degree + 3, degree + 1), (degree,) * 3)
+    problem = Poisson(exact="x+2*z", neumann={"w0": None, "w1": None, "v0": None})
+    assert solve_problem(slab, problem, quadrature=rule).report.l2_relative < 1e-9
 
 
 def test_a_quadrature_that_is_unknown_is_refused():

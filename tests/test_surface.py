@@ -26,11 +26,11 @@ from mesh_files import (
 )
 from surface_files import ACCEPTED, REFUSED
 
+from parameterize.surface.geometry import signed_volume
 from parameterize.surface.inside import deepest_point
 from parameterize.surface.readers.common import BYTES_AT_LEAST
 from parameterize.surface.surface import MeshError, load_surface, surface_from_arrays
 from parameterize.surface.triangulation import triangulate
-from parameterize.surface.welding import signed_volume
 
 MODELS = Path(os.environ.get("IGA_NN_DATA", Path(__file__).parents[2] / "shared" / "models"))
 

@@ -110,3 +110,15 @@ def test_a_field_of_other_components_is_refused():
     field = SplineField(volume.degrees, volume.knots, volume.control_points)
     with pytest.raises(ValueError, match=r"source: the field must have 1 component"):
         iga_nn.Poisson(source=field)
+
+
+def test_a_field_of_another_volume_is_refused():
+    """The twisted cubes of 2 and 3 spans are different maps; a map that is equal, or that nobody knows, will do."""
+    field = solve_problem(benchmark_volume(2), iga_nn.Poisson(source="1")).field
+    problem = iga_nn.Poisson(source=field)
+    for volume in (benchmark_volume(3), benchmark_volume(2, amplitude=0.05)):
+        with pytest.raises(ValueError, match="source: the field was found on another volume; give one of the volume"):
+            solve_problem(volume, problem)
+        loose = SplineField(field.degrees, field.knots, field.coefficients)
+        assert solve_problem(volume, iga_nn.Poisson(source=loose)).report.converged
+    assert solve_problem(benchmark_volume(2), problem).report.converged

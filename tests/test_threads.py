@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from solve.threads import checked_threads, colours, default_threads, in_parallel
+from parameterize.threads import default_threads, in_parallel
+from solve.threads import colours
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])
@@ -48,7 +49,4 @@ def test_number_of_threads_follows_the_environment(monkeypatch):
     assert default_threads() == 3
     monkeypatch.delenv("NUMBA_NUM_THREADS")
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
-    assert checked_threads(None) == 2
-    assert checked_threads(5) == 5
-    with pytest.raises(ValueError, match="at least 1"):
-        checked_threads(0)
+    assert default_threads() == 2

@@ -84,6 +84,8 @@ def test_the_checkpoint_stays_until_all_is_solved(formula_training, in_folder, m
 def test_a_finished_result_without_its_files_is_no_answer(formula_training, in_folder):
     formula_training()
     pipeline.parameterize_to("cube", "out")
+    with pytest.raises(InputError, match="leave --vector out"):
+        pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True), vector=True)
     Path("out/volume.npz").unlink()
     with pytest.raises(InputError, match="volume.npz is gone"):
         pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True))
@@ -131,6 +133,11 @@ def test_a_device_that_cannot_solve_the_problem_costs_no_file(in_folder):
 def test_unknown_problem_is_refused():
     with pytest.raises(InputError, match="heat"):
         iga_nn.run("heat", "cube")
+
+
+def test_options_of_another_problem_are_refused():
+    with pytest.raises(InputError, match=r"^elasticity: .* give poisson="):
+        iga_nn.run("poisson", "cube", elasticity=ElasticityOptions())
 
 
 def test_config_follows_the_options():

@@ -5,8 +5,7 @@ import numpy as np
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Poisson
-from solve.discretization.assembly import assemble
-from solve.discretization.operator import free_window
+from solve.discretization.operator import assemble, free_window
 from solve.discretization.space import trial_space
 
 

@@ -33,7 +33,7 @@ from processes import calibrate, processor
 from iga_nn.report.document import versions
 from parameterize.files import save_text
 from solve import Poisson, Problem, benchmark_volume, solve_problem
-from solve.discretization.norms import error_norms
+from solve.discretization.errors import error_norms
 from solve.discretization.space import trial_space
 
 EXACT = "exp(x+z)*sin(y)"
@@ -109,14 +109,13 @@ def run_mfem(n: int, degree: int, _: int) -> dict[str, Any]:
     """MFEM on the map as it is exported, with boundary data projected in L2 on the boundary."""
     import mfem.ser as mfem  # type: ignore[import-not-found]
 
-    from iga_nn.io import Content
     from iga_nn.io.splinepy import write_mfem
 
     exact = mfem.jit.scalar()(lambda x: np.exp(x[0] + x[2]) * np.sin(x[1]))
     source = mfem.jit.scalar()(lambda x: -np.exp(x[0] + x[2]) * np.sin(x[1]))
     with TemporaryDirectory() as folder:
         file = Path(folder) / "map.mesh"
-        write_mfem(file, Content(benchmark_volume(n, degree)))
+        write_mfem(file, benchmark_volume(n, degree))
         mesh = mfem.Mesh(str(file), 1, 0)
     start, wall = time.process_time(), time.perf_counter()
     collection = mfem.NURBSFECollection(degree)

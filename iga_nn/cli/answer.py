@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 from ..levels import ESTIMATES, TITLES
@@ -21,14 +20,9 @@ def exit_code(report: reports.Report) -> int:
     return DONE if reports.is_converged(report) and reports.is_meaningful(report) else NOT_SOLVED
 
 
-def as_json(value: Any) -> str:
-    """Return the JSON text of a report or a part of it."""
-    return json.dumps(reports.plain(value), indent=2)
-
-
 def verdict_as_json(outcome: Outcome) -> str:
     """Return the verdict of a finished run as JSON, for scripts."""
-    return as_json(reports.verdict(outcome.report, outcome.folder))
+    return reports.as_json(reports.verdict(outcome.report, outcome.folder))
 
 
 def verdict_in_words(outcome: Outcome) -> str:

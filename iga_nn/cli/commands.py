@@ -1,4 +1,4 @@
-"""The commands of `iga-nn` and their arguments; nothing is computed here.
+"""Defines the commands of `iga-nn` and their arguments; nothing is computed here.
 
 A command imports what it runs when it runs: `--help` and `--version` load neither numpy nor the packages below.
 """
@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -16,16 +15,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from ..errors import InputError, expected_errors, input_errors, one_line
-from ..options import ElasticityOptions, ElasticityStudyOptions, MapOptions, PoissonOptions, StudyOptions
+from ..options import (
+    PROBLEMS,
+    ElasticityOptions,
+    ElasticityStudyOptions,
+    MapOptions,
+    PoissonOptions,
+    ProblemOptions,
+    StudyOptions,
+    SurfaceOptions,
+)
 from ..version import __version__
 from .exit_codes import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
+from .progress import shown_progress
 
 if TYPE_CHECKING:
-    from parameterize.progress import ProgressCallback
-
     from ..workflow.output_folder import Outcome
-
-FORMULAS = ("--exact", "--source", "--boundary", "--kappa", "--reaction", "--body-force", "--displacement")
 
 app = App(
     name="iga-nn",
@@ -54,7 +59,7 @@ Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.
 
 @dataclass(frozen=True)
 class OutputOptions:
-    """Where the results go, and what is printed.
+    """Say where the results go, and what is printed.
 
     Args:
         out: output folder; the input's stem in the current folder by default.
@@ -71,59 +76,69 @@ class OutputOptions:
 
     @property
     def folder(self) -> dict[str, Any]:
-        """What the pipeline takes of these options."""
+        """Return what the pipeline takes of these options."""
         return {"out": self.out, "force": self.force, "vector": self.vector}
 
 
-Output = Annotated[OutputOptions, Parameter(name="*")]
-Mapping = Annotated[MapOptions, Parameter(name="*")]
-Equation = Annotated[PoissonOptions, Parameter(name="*")]
-Body = Annotated[ElasticityOptions, Parameter(name="*")]
-Study = Annotated[StudyOptions, Parameter(name="*")]
-BodyStudy = Annotated[ElasticityStudyOptions, Parameter(name="*")]
+OutputFlags = Annotated[OutputOptions, Parameter(name="*")]  # each field of the options is a flag
+SurfaceFlags = Annotated[SurfaceOptions, Parameter(name="*")]
+MapFlags = Annotated[MapOptions, Parameter(name="*")]
+PoissonFlags = Annotated[PoissonOptions, Parameter(name="*")]
+ElasticityFlags = Annotated[ElasticityOptions, Parameter(name="*")]
+StudyFlags = Annotated[StudyOptions, Parameter(name="*")]
+ElasticityStudyFlags = Annotated[ElasticityStudyOptions, Parameter(name="*")]
 
-OUTPUT, MAPPING, STUDY = OutputOptions(), MapOptions(), StudyOptions()
-POISSON, BODY, BODY_STUDY = PoissonOptions(), ElasticityOptions(), ElasticityStudyOptions()
+OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
+SURFACE, POISSON, ELASTICITY = SurfaceOptions(), PoissonOptions(), ElasticityOptions()
 
 
 @run_app.command(name="poisson")
 def run_poisson(
-    mesh: Mesh, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING, poisson: Equation = POISSON
+    mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP, poisson: PoissonFlags = POISSON
 ) -> int:
     """Parameterize a surface, certify the spline and solve Poisson's equation on it."""
-    from ..workflow import pipeline
-
-    with _progress(output) as progress:
-        outcome = pipeline.run("poisson", mesh, mapping=mapping, poisson=poisson, progress=progress, **output.folder)
-    return _finish(outcome, output)
+    return _run(mesh, output, mapping, poisson)
 
 
 @run_app.command(name="elasticity")
-def run_elasticity(mesh: Mesh, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING, body: Body = BODY) -> int:
+def run_elasticity(
+    mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP, elasticity: ElasticityFlags = ELASTICITY
+) -> int:
     """Parameterize a surface, certify the spline and solve linear elasticity on it.
 
     named_faces.png shows which face of the volume is u0, u1, v0, v1, w0, w1; --corners decides it beforehand.
     """
+    return _run(mesh, output, mapping, elasticity)
+
+
+def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: ProblemOptions) -> int:
+    """Parameterize a surface, solve a problem on the volume, print the verdict and return the exit code."""
     from ..workflow import pipeline
 
-    with _progress(output) as progress:
-        outcome = pipeline.run("elasticity", mesh, mapping=mapping, elasticity=body, progress=progress, **output.folder)
+    with shown_progress(output.quiet) as progress:
+        known = output.folder | {problem.section: problem}
+        outcome = pipeline.run(problem.section, mesh, mapping=mapping, progress=progress, **known)
     return _finish(outcome, output)
 
 
 @app.command(name="parameterize")
-def parameterize_mesh(mesh: Mesh, /, *, output: Output = OUTPUT, mapping: Mapping = MAPPING) -> int:
+def parameterize_mesh(mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP) -> int:
     """Turn a surface into a certified trivariate B-spline."""
     from ..workflow import pipeline
 
-    with _progress(output) as progress:
+    with shown_progress(output.quiet) as progress:
         outcome = pipeline.parameterize_to(mesh, mapping=mapping, progress=progress, **output.folder)
     return _finish(outcome, output)
 
 
 @solve_app.command(name="poisson")
 def solve_poisson(
-    volume: Volume, /, *, device: Literal["cpu", "cuda"] = "cpu", output: Output = OUTPUT, poisson: Equation = POISSON
+    volume: Volume,
+    /,
+    *,
+    device: Literal["cpu", "cuda"] = "cpu",
+    output: OutputFlags = OUTPUT,
+    poisson: PoissonFlags = POISSON,
 ) -> int:
     """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
 
@@ -133,29 +148,32 @@ def solve_poisson(
     Args:
         device: where the linear system is solved.
     """
-    from ..workflow import pipeline
-
-    with _progress(output):
-        outcome = pipeline.solve_to(volume, problem=poisson, device=device, **output.folder)
-    return _finish(outcome, output)
+    return _solve(volume, output, poisson, device)
 
 
 @solve_app.command(name="elasticity")
-def solve_elasticity(volume: Volume, /, *, output: Output = OUTPUT, body: Body = BODY) -> int:
+def solve_elasticity(
+    volume: Volume, /, *, output: OutputFlags = OUTPUT, elasticity: ElasticityFlags = ELASTICITY
+) -> int:
     """Solve linear elasticity on a volume.npz.
 
     A vector is three formulas separated by semicolons, in quotes: "x*y;0;sin(z)". The volume's six faces u0, u1, v0,
     v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under --traction.
     """
+    return _solve(volume, output, elasticity)
+
+
+def _solve(volume: Path, output: OutputOptions, problem: ProblemOptions, device: str = "cpu") -> int:
+    """Solve a problem on a volume, print the verdict and return the exit code."""
     from ..workflow import pipeline
 
-    with _progress(output):
-        outcome = pipeline.solve_to(volume, problem=body, **output.folder)
+    with shown_progress(output.quiet):
+        outcome = pipeline.solve_to(volume, problem=problem, device=device, **output.folder)
     return _finish(outcome, output)
 
 
 @study_app.default
-def study_volume(volume: Volume, /, *, output: Output = OUTPUT, study: Study = STUDY) -> int:
+def study_volume(volume: Volume, /, *, output: OutputFlags = OUTPUT, study: StudyFlags = STUDY) -> int:
     """Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors and their rates.
 
     Results go to STEM-study in the current folder, unless --out names another.
@@ -164,40 +182,31 @@ def study_volume(volume: Volume, /, *, output: Output = OUTPUT, study: Study = S
 
 
 @study_app.command(name="elasticity")
-def study_elasticity(volume: Volume, /, *, output: Output = OUTPUT, study: BodyStudy = BODY_STUDY) -> int:
+def study_elasticity(
+    volume: Volume, /, *, output: OutputFlags = OUTPUT, study: ElasticityStudyFlags = ELASTICITY_STUDY
+) -> int:
     """Do the same for linear elasticity with a given displacement."""
     return _study(volume, output, study)
 
 
 def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
     """Make a convergence study, print its table and return the exit code."""
+    from ..report import document as reports
     from ..workflow import pipeline
-    from . import answer
+    from .answer import exit_code
 
-    with _progress(output):
+    with shown_progress(output.quiet):
         outcome, table = pipeline.study_to(volume, options=study, **output.folder)
-    _print(answer.as_json(outcome.report["study"]) if output.as_json else f"{table}\nresults in {outcome.folder}")
-    return answer.exit_code(outcome.report)
+    _print(reports.as_json(outcome.report["study"]) if output.as_json else f"{table}\nresults in {outcome.folder}")
+    return exit_code(outcome.report)
 
 
 @app.command(name="check")
-def check(
-    path: str,
-    /,
-    *,
-    component: int | None = None,
-    max_faces: int = MapOptions.max_faces,
-    decimate: bool = False,
-    strict: bool = False,
-    as_json: Json = False,
-) -> int:
+def check(path: str, /, *, surface: SurfaceFlags = SURFACE, strict: bool = False, as_json: Json = False) -> int:
     """Say whether a surface is accepted, or whether a volume is certified; write nothing.
 
     Args:
         path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
-        component: number of the connected component to take, counted from 0.
-        max_faces: refuse surfaces with more faces.
-        decimate: reduce surfaces with more faces to max_faces instead.
         strict: refuse a surface that intersects itself; without this option it is a notice.
     """
     from ..io.formats import is_volume
@@ -206,18 +215,18 @@ def check(
     from . import answer
 
     if not is_volume(path):
-        facts = check_surface(path, component, max_faces, decimate, strict)
-        _print(answer.as_json(facts) if as_json else "accepted\n" + answer.facts_in_words(facts))
+        facts = check_surface(path, surface, strict)
+        _print(reports.as_json(facts) if as_json else "accepted\n" + answer.facts_in_words(facts))
         return DONE
-    if component is not None or max_faces != MapOptions.max_faces or decimate or strict:
+    if surface != SURFACE or strict:
         raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")
     facts = check_volume(path)
-    _print(answer.as_json(facts) if as_json else answer.volume_in_words(facts))
+    _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
 
 
 @app.command(name="sample")
-def write_sample(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> int:
+def write_sample(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> None:
     """Write a surface made by formula as an OBJ file.
 
     Args:
@@ -231,11 +240,10 @@ def write_sample(name: str, /, *, out: ObjFile = None, force: Overwrite = False)
     target = check_new(f"{name}.obj" if out is None else out, ".obj")
     save_new(target, obj_text(surface).encode(), force)
     _print(str(target))
-    return DONE
 
 
 @app.command(name="fetch")
-def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> int:
+def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> None:
     """Write a published model as an OBJ file; download it where it is not at hand.
 
     Args:
@@ -245,13 +253,12 @@ def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) 
 
     for path in fetch_all(name, out, force=force):
         _print(str(path))
-    return DONE
 
 
 @app.command(name="export")
 def export_volume(
     volume: Volume, /, *, to: str, out: Path | None = None, solution: Path | None = None, force: bool = False
-) -> int:
+) -> None:
     """Write a volume in a format that other programs read.
 
     Args:
@@ -265,7 +272,6 @@ def export_volume(
     from ..io.formats import export
 
     _print(str(export(volume, to, out, solution=solution, force=force)))
-    return DONE
 
 
 @app.command(name="app")
@@ -274,9 +280,9 @@ def serve_page(
     port: int = 8080,
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
     max_upload: int = 64,
-    mapping: Mapping = MAPPING,
-    poisson: Equation = POISSON,
-) -> int:
+    mapping: MapFlags = MAP,
+    poisson: PoissonFlags = POISSON,
+) -> None:
     """Serve a page to this computer's browser: drop a surface, watch it become a volume, download the files.
 
     Args:
@@ -287,7 +293,6 @@ def serve_page(
     from ..live.app import serve
 
     serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=mapping, poisson=poisson)
-    return DONE
 
 
 def main(argv: list[str]) -> int:
@@ -297,28 +302,20 @@ def main(argv: list[str]) -> int:
     except KeyboardInterrupt as error:  # its message says how to continue, where that is possible
         print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
-    except CycloptsError as error:
-        print(f"iga-nn: {one_line(error)}{_minus_hint(argv)}", file=sys.stderr)
+    except expected_errors() + (CycloptsError,) as error:
+        hint = _minus_hint(argv) if isinstance(error, CycloptsError) else ""
+        print(f"iga-nn: {one_line(error)}{hint}", file=sys.stderr)
         return BAD_INPUT
-    except expected_errors() as error:
-        print(f"iga-nn: {one_line(error)}", file=sys.stderr)
-        return BAD_INPUT
-    return code if isinstance(code, int) else DONE  # --help and --version return nothing
+    return code if isinstance(code, int) else DONE  # a command that only writes a file returns nothing
 
 
 def _minus_hint(argv: list[str]) -> str:
-    """Return the remedy where a formula was taken for an option."""
+    """Return the remedy where a formula was taken for an option; those declared as `Formula` take one."""
+    formulas = {field.name for kind in PROBLEMS.values() for field in fields(kind) if "Formula" in str(field.type)}
     for option, value in pairwise(argv):
-        if option in FORMULAS and value.startswith("-"):
+        if option.removeprefix("--").replace("-", "_") in formulas and value.startswith("-"):
             return f" A formula that starts with a minus is written {option}={value}"
     return ""
-
-
-def _progress(output: OutputOptions) -> AbstractContextManager[ProgressCallback | None]:
-    """Return the context in which progress is shown."""
-    from .progress import shown_progress
-
-    return shown_progress(output.quiet)
 
 
 def _finish(outcome: Outcome, output: OutputOptions) -> int:

@@ -1,4 +1,4 @@
-"""The exit codes of `iga-nn`; README explains them to users."""
+"""Holds the exit codes of `iga-nn`; README explains them to users."""
 
 DONE = 0
 BAD_INPUT = 2

@@ -39,23 +39,15 @@ class PlainLines:
             self._stage, self._printed = progress.stage, now
 
 
-class TerminalBar:
-    """Updates one bar: the steps of the stage, the time elapsed in all stages and the time left."""
+def terminal_bar(bar: Bar) -> ProgressCallback:
+    """Return what updates one bar: the steps of the stage, the time elapsed in all stages and the time left."""
+    task = bar.add_task("", total=None, state="", visible=False)
 
-    def __init__(self, bar: Bar) -> None:
-        self._bar = bar
-        self._task = bar.add_task("", total=None, state="", visible=False)
+    def show(now: Progress) -> None:
+        state = describe(now)
+        bar.update(task, description=now.stage, completed=now.step, total=now.steps, state=state, visible=True)
 
-    def __call__(self, progress: Progress) -> None:
-        """Take the state after one step."""
-        self._bar.update(
-            self._task,
-            description=progress.stage,
-            completed=progress.step,
-            total=progress.steps,
-            state=describe(progress),
-            visible=True,
-        )
+    return show
 
 
 def describe(progress: Progress) -> str:
@@ -63,7 +55,7 @@ def describe(progress: Progress) -> str:
     minutes, seconds = divmod(round(max(0.0, progress.seconds_left)), 60)
     left = f"{minutes}:{seconds:02d} left"
     folds = f"{progress.folded} fold{'s' * (progress.folded != 1)}"
-    when = f"at most {left}" if progress.stage == "spline" else f"{left}, then the spline fit"
+    when = f"about {left}" if progress.stage == "spline" else f"{left}, then the spline fit"
     return f"{folds}, {when}, loss {progress.loss:.3e}"
 
 
@@ -103,7 +95,7 @@ def shown_progress(quiet: bool) -> Iterator[ProgressCallback | None]:
             yield None
         elif console.is_terminal:
             with Bar(*columns, console=console, transient=True, expand=True, refresh_per_second=4) as bar:
-                yield TerminalBar(bar)
+                yield terminal_bar(bar)
         else:
             yield PlainLines(console)
     finally:

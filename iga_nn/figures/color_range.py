@@ -17,7 +17,7 @@ ROUNDING = 1e-14  # values whose relative difference is smaller count as one
 
 @dataclass(frozen=True)
 class ColorRange:
-    """Limits of a colour scale.
+    """Hold the limits of a colour scale.
 
     remark: stands in place of ticks where the field has one value, such as "0 everywhere".
     """
@@ -42,7 +42,7 @@ class ColorRange:
 
     @property
     def labels(self) -> tuple[str, str]:
-        """The texts at the two ends of a legend."""
+        """Return the texts at the two ends of a legend."""
         form = "{:.1e}" if self.logarithmic else "{:.3g}"
         return (self.remark, "") if self.remark else (form.format(self.low), form.format(self.high))
 

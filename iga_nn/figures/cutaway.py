@@ -11,34 +11,32 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import AXES, BSplineVolume
 
-from .evaluate import FACE_COLORS, face_grid, points_on, section_grid
-from .render import Patch, View, widest_view
+from .evaluate import FACE_COLORS, all_grids, points_on
+from .render import Patch, View, plain_patch, view_of
 
 Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
 
 INSIDE = "#e9e6df"  # colour of the sections, unlike those of the faces
-TILT = 0.45  # radians: shows more than one side
 
 
-def face_patches(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patch]:
-    """Return the images of the six faces, each in its colour. samples: per direction. every: as in Patch."""
-    return [_patch(points_on(volume, face_grid(face, samples)), color, every) for face, color in enumerate(FACE_COLORS)]
+def patches_of(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patch]:
+    """Return the images of the six faces, each in its colour, then those of u, v and w = 1/2, in one colour.
+
+    samples: per direction. every: as in Patch.
+    """
+    places = zip(all_grids(samples), (*FACE_COLORS, INSIDE, INSIDE, INSIDE), strict=True)
+    return [plain_patch(points_on(volume, grid), color, every=every) for grid, color in places]
 
 
-def section_patches(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patch]:
-    """Return the images of u = 1/2, v = 1/2 and w = 1/2, in one colour."""
-    return [_patch(points_on(volume, section_grid(axis, samples)), INSIDE, every) for axis in range(3)]
-
-
-def best_cut(faces: Sequence[Array]) -> tuple[Octant, View]:
+def best_cut(faces: Sequence[Patch]) -> tuple[Octant, View]:
     """Return the octant to leave out and the view that together show most of the cut.
 
-    faces: points (m, m, 3) on the six faces, m odd. The boundary of an octant is closed, so the area of its cut planes
-    that faces the viewer is, with sign, that of its outer faces turned away; these are known from the faces alone.
+    faces: six patches of m x m points, m odd. The boundary of an octant is closed, so the area of its cut planes that
+    faces the viewer is, with sign, that of its outer faces turned away; these are known from the faces alone.
     """
-    view = widest_view(np.concatenate([points.reshape(-1, 3) for points in faces]), tilt=TILT)
+    view, points = view_of(faces), [patch.points for patch in faces]
     choices = [(octant, side) for octant in product((0, 1), (0, 1), (0, 1)) for side in (view, view.turned())]
-    return max(choices, key=lambda choice: float(_outside(faces, choice[0]) @ choice[1].towards))
+    return max(choices, key=lambda choice: float(_outside(points, choice[0]) @ choice[1].towards))
 
 
 def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
@@ -58,12 +56,6 @@ def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
 def octant_label(octant: Octant) -> str:
     """Return the octant in words, such as "u < 1/2, v > 1/2, w < 1/2"."""
     return ", ".join(f"{axis} {'<>'[side]} 1/2" for axis, side in zip(AXES, octant, strict=True))
-
-
-def _patch(points: Array, color: str, every: int) -> Patch:
-    from matplotlib.colors import to_rgb
-
-    return Patch(points, np.broadcast_to(to_rgb(color), points.shape), every=every)
 
 
 def _sides(axis: int, octant: Octant) -> tuple[int, int]:

@@ -14,25 +14,15 @@ from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 from solve.forms.frame import UnitFrame
 
 if TYPE_CHECKING:
-    from solve import Elasticity, Poisson, Solution
+    from solve import Solution
 
-    Problem = Poisson | Elasticity
+    from ..options import Equation
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 
 SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
 MAP = "viridis"  # colour map; perceptually uniform
 FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # also distinct for the colour-blind
-
-
-def face_grid(face: int, samples: int) -> Grid:
-    """Return the parameters of samples x samples points on a face of the cube, numbered as in FACE_NAMES."""
-    return _grid(face // 2, float(face % 2), samples)
-
-
-def section_grid(axis: int, samples: int) -> Grid:
-    """Return the same on the section through the middle of the cube that is normal to an axis."""
-    return _grid(axis, 0.5, samples)
 
 
 def face_window(parameter: ArrayLike, half: float, samples: int) -> Grid:
@@ -45,13 +35,13 @@ def face_window(parameter: ArrayLike, half: float, samples: int) -> Grid:
 
 
 def all_grids(samples: int) -> list[Grid]:
-    """Return the grids of the six faces, then those of the three mid-sections."""
-    return [face_grid(face, samples) for face in range(6)] + [section_grid(axis, samples) for axis in range(3)]
-
-
-def _grid(axis: int, value: float, samples: int) -> Grid:
-    u, v, w = (np.array([value]) if a == axis else np.linspace(0.0, 1.0, samples) for a in range(3))
-    return u, v, w
+    """Return the grids, samples x samples, of the six faces in the order of FACE_NAMES, then those of SECTIONS."""
+    places = [(axis, side) for axis in range(3) for side in (0.0, 1.0)] + [(axis, 0.5) for axis in range(3)]
+    even, grids = np.linspace(0.0, 1.0, samples), []
+    for axis, value in places:
+        u, v, w = (np.array([value]) if a == axis else even for a in range(3))
+        grids.append((u, v, w))
+    return grids
 
 
 def points_on(volume: BSplineVolume, grid: Grid) -> Array:
@@ -71,7 +61,7 @@ def solution_on(solution: Solution, grid: Grid) -> Array:
     return values if values.ndim == 2 else np.asarray(np.linalg.norm(values, axis=-1))
 
 
-def error_at(found: Array, problem: Problem, points: Array) -> Array:
+def error_at(found: Array, problem: Equation, points: Array) -> Array:
     """Return |u - u_h| at points (..., 3). found: u_h there, (...), or vectors (..., 3)."""
     exact, _ = problem.exact_at(np.moveaxis(points, -1, 0))
     if found.ndim < points.ndim:
@@ -80,7 +70,7 @@ def error_at(found: Array, problem: Problem, points: Array) -> Array:
 
 
 def sampled_error(
-    volume: BSplineVolume, solution: Solution, problem: Problem, samples: int
+    volume: BSplineVolume, solution: Solution, problem: Equation, samples: int
 ) -> tuple[list[Array], list[Array]]:
     """Return points (samples, samples, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
     problem = problem.on(volume)

@@ -12,10 +12,10 @@ from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import BSplineVolume
 
 from .color_range import ColorRange
-from .cutaway import best_cut, face_patches, octant_label, section_patches, without_octant
-from .evaluate import SECTIONS, all_grids, distortions, face_grid, face_window, points_on, section_grid
-from .render import Patch, draw, widest_view
-from .style import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, view_of
+from .cutaway import best_cut, octant_label, patches_of, without_octant
+from .evaluate import SECTIONS, all_grids, distortions, face_window, points_on
+from .render import Patch, draw, plain_patch, view_of
+from .style import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, show_section
 
 EVERY = 14  # samples between two parameter lines: a tenth of the cube
 DISTORTION = "tanh(√ARAP / 2), at volume 1"
@@ -29,12 +29,12 @@ def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) ->
 
     marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    _draw_around(path, face_patches(volume, SAMPLES), "Images of the six faces of the unit cube", marks)
+    _draw_around(path, patches_of(volume, SAMPLES)[:6], "Images of the six faces of the unit cube", marks)
 
 
 def draw_lines(path: Path, volume: BSplineVolume) -> None:
     """Draw lines of constant parameters, a tenth apart, on the images of the six faces, from the front and behind."""
-    _draw_around(path, face_patches(volume, SAMPLES, EVERY), "Lines of constant u, v, w, a tenth apart")
+    _draw_around(path, patches_of(volume, SAMPLES, EVERY)[:6], "Lines of constant u, v, w, a tenth apart")
 
 
 def _draw_around(path: Path, patches: list[Patch], title: str, marks: Array | None = None) -> None:
@@ -50,9 +50,8 @@ def draw_cut(path: Path, volume: BSplineVolume) -> None:
 
     The octant and the view are those that show most of the cut.
     """
-    faces = face_patches(volume, SAMPLES, EVERY)
-    octant, view = best_cut([patch.points for patch in faces])
-    named = faces + section_patches(volume, SAMPLES, EVERY)
+    named = patches_of(volume, SAMPLES, EVERY)
+    octant, view = best_cut(named[:6])
     distorted = [
         replace(patch, colors=colors(values, SHARES))
         for patch, values in zip(named, distortions(volume, all_grids(SAMPLES)), strict=True)
@@ -69,12 +68,9 @@ def draw_cut(path: Path, volume: BSplineVolume) -> None:
 def draw_distortion(path: Path, volume: BSplineVolume) -> None:
     """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2."""
     figure, (panels,) = panels_of(1, 3)
-    grids = [section_grid(axis, SAMPLES) for axis in range(3)]
-    for axis, (panel, values) in enumerate(zip(panels, distortions(volume, grids), strict=True)):
-        points = points_on(volume, grids[axis])
-        patch = Patch(points, colors(values, SHARES), lit=False)
-        panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
-        panel.set_title(SECTIONS[axis], fontsize=13)
+    grids = all_grids(SAMPLES)[6:]
+    for panel, title, grid, values in zip(panels, SECTIONS, grids, distortions(volume, grids), strict=True):
+        show_section(panel, title, points_on(volume, grid), colors(values, SHARES))
     color_bar(figure, panels, SHARES, DISTORTION)
     figure.suptitle("Distortion on the mid-sections", fontsize=14)
     save(figure, path)
@@ -90,13 +86,9 @@ def draw_folds(path: Path, volume: BSplineVolume, places: Array) -> None:
 
 def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
     """Draw the place where the boundary meets itself: on the whole boundary, and the two parts there from two sides."""
-    from matplotlib.colors import to_rgb
-
     mark = np.array([meeting.point])
-    parts = []
-    for parameter, color in zip(meeting.parameters, MEETING_COLORS, strict=True):
-        points = points_on(volume, face_window(parameter, WINDOW, SAMPLES))
-        parts.append(Patch(points, np.broadcast_to(to_rgb(color), points.shape), opacity=0.7))
+    windows = [points_on(volume, face_window(parameter, WINDOW, SAMPLES)) for parameter in meeting.parameters]
+    parts = [plain_patch(points, color, opacity=0.7) for points, color in zip(windows, MEETING_COLORS, strict=True)]
     figure, (panels,) = panels_of(1, 3)
     glass = _glass(volume)
     panels[0].imshow(draw(glass, view_of(glass), PANEL, mark))
@@ -108,5 +100,4 @@ def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
 
 def _glass(volume: BSplineVolume) -> list[Patch]:
     """Return the six faces as transparent patches."""
-    points = [points_on(volume, face_grid(face, SAMPLES)) for face in range(6)]
-    return [Patch(p, np.full(p.shape, 0.6), opacity=0.25) for p in points]
+    return [plain_patch(points_on(volume, grid), "0.6", opacity=0.25) for grid in all_grids(SAMPLES)[:6]]

@@ -18,6 +18,7 @@ from parameterize.arrays import Array
 
 log = logging.getLogger(__name__)
 
+TILT = 0.45  # radians: shows more than one side of a solid
 LINE_WIDTH = 1.6  # pixels
 NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: keeps them before a surface
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
@@ -33,7 +34,7 @@ raise SystemExit(0 if image.std() > 1.0 else 1)
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A surface patch given by samples on a tensor grid.
+    """Hold a surface patch given by samples on a tensor grid.
 
     points: (m, n, 3). colors: (m, n, 3) red, green, blue in 0..1, shown without shading where `lit` is false.
     every: samples from one parameter line to the next in both directions; 0 draws none.
@@ -49,7 +50,7 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Orthonormal directions of a camera: to the right, up, and towards the viewer."""
+    """Hold the orthonormal directions of a camera: to the right, up, and towards the viewer."""
 
     right: Array
     up: Array
@@ -75,7 +76,7 @@ def can_draw() -> bool:
 
 
 def _without_display() -> None:
-    """Without an X server, let VTK use EGL at once instead of trying X first and warning."""
+    """Let VTK use EGL at once where there is no X server, instead of trying X first and warning."""
     if sys.platform == "linux" and not os.environ.get("DISPLAY"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
@@ -95,6 +96,18 @@ def widest_view(points: Array, tilt: float = 0.0) -> View:
     right = np.cross(up, towards)
     right /= np.linalg.norm(right)
     return View(right, np.cross(towards, right), towards)
+
+
+def plain_patch(points: Array, color: str, **look: Any) -> Patch:
+    """Return a patch in one of matplotlib's colours. points: (m, n, 3)."""
+    from matplotlib.colors import to_rgb
+
+    return Patch(points, np.broadcast_to(to_rgb(color), points.shape), **look)
+
+
+def view_of(patches: Sequence[Patch]) -> View:
+    """Return the view that shows most of the patches, a little from above."""
+    return widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=TILT)
 
 
 def draw(

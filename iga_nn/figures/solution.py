@@ -10,16 +10,16 @@ from parameterize.spline.volume import BSplineVolume
 from ..levels import EXACT_ERRORS, TITLES
 from .color_range import error_range, even_range
 from .evaluate import SECTIONS, all_grids, points_on, sampled_error, solution_on
-from .render import Patch, draw, widest_view
-from .style import PANEL, SAMPLES, color_bar, colors, panels_of, save, show_around
+from .render import Patch
+from .style import SAMPLES, color_bar, colors, panels_of, save, show_around, show_section
 
 if TYPE_CHECKING:
-    from solve import Elasticity, Poisson, Solution
+    from solve import Solution
 
-    Problem = Poisson | Elasticity
+    from ..options import Equation
 
 
-def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Problem) -> None:
+def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Equation) -> None:
     """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms."""
     points, errors = sampled_error(volume, solution, problem, SAMPLES)
     limits = error_range([errors])
@@ -27,10 +27,8 @@ def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: P
     boundary = [Patch(p, colors(e, limits)) for p, e in zip(points[:6], errors[:6], strict=True)]
     show_around(rows[0][:2], boundary)
     _write_numbers(rows[0][2], solution)
-    for axis, panel in enumerate(rows[1]):
-        patch = Patch(points[6 + axis], colors(errors[6 + axis], limits), lit=False)
-        panel.imshow(draw([patch], widest_view(patch.points.reshape(-1, 3)), PANEL))
-        panel.set_title(SECTIONS[axis], fontsize=13)
+    for panel, title, where, values in zip(rows[1], SECTIONS, points[6:], errors[6:], strict=True):
+        show_section(panel, title, where, colors(values, limits))
     color_bar(figure, rows, limits, r"$|u - u_h|$")
     figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
     save(figure, path)

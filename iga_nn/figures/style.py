@@ -13,7 +13,7 @@ from parameterize.files import replacing
 
 from .color_range import ColorRange
 from .evaluate import FACE_COLORS, MAP, face_labels
-from .render import Patch, View, draw, widest_view
+from .render import Patch, draw, view_of, widest_view
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,13 +24,10 @@ PANEL = (900, 700)  # pixels of one view
 
 def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
     """Return a figure and its axes outside pyplot: it need not be closed and asks for no window system."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=inches, dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    height_ratios = grid.pop("height_ratios", None)
-    return figure, figure.subplots(rows, columns, height_ratios=height_ratios, **grid)
+    return figure, figure.subplots(rows, columns, **grid)
 
 
 def panels_of(rows: int, columns: int) -> tuple[Figure, Any]:
@@ -49,9 +46,11 @@ def show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -
         panel.set_title(title, fontsize=13)
 
 
-def view_of(patches: list[Patch]) -> View:
-    """Return the view that shows most of the patches, a little from above."""
-    return widest_view(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), tilt=0.45)
+def show_section(panel: Any, title: str, points: Array, colors: Array) -> None:
+    """Draw points (m, n, 3) on a section in colours (m, n, 3), without shading, as the reader sees most of it."""
+    patch = Patch(points, colors, lit=False)
+    panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
+    panel.set_title(title, fontsize=13)
 
 
 def name_faces(figure: Figure) -> None:

@@ -39,44 +39,44 @@ from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, input_errors
 from ..new_file import check_new
+from ..options import PROBLEMS
 from ..report import document as reports
-from . import Content, splinepy, vtk
+from . import splinepy, vtk
 from .splinepy_gate import kind_of
 
 if TYPE_CHECKING:
     from solve.field import SplineField
 
-    from ..figures.evaluate import Problem
+    from ..options import Equation
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
-_PROBLEMS = ("poisson", "elasticity")  # sections of report.json with a solution.npz
 
 
 @dataclass(frozen=True)
 class Format:
-    """A format of another program. ending: of its files, after the volume's stem. write: puts the content into a file.
+    """Hold a format of another program.
 
+    ending: of its files, after the volume's stem. write: puts the volume into a file; it is also given the solution and
+    its problem, None where there are none.
     read: None where the format is only written. field_ending, write_field: of the second file, beside the volume's,
-    that takes the solution; None where `write` takes it.
+    that takes the solution. is_whole: `write` puts the solution into the volume's file. A format that does neither
+    refuses a solution.
     """
 
     ending: str
-    write: Callable[[Path, Content], None]
+    write: Callable[..., None]
     read: Callable[[Path], BSplineVolume] | None = None
     field_ending: str = ""
     write_field: Callable[[Path, SplineField], None] | None = None
+    is_whole: bool = False
 
 
 FORMATS = {
-    "gismo": Format(
-        ".xml", splinepy.write_gismo, partial(splinepy.read, kind="gismo"), "_u.xml", splinepy.write_gismo_field
-    ),
+    "gismo": Format(".xml", splinepy.write_gismo, partial(splinepy.read, kind="gismo"), "_u.xml", splinepy.write_gismo),
     "mfem": Format(".mesh", splinepy.write_mfem, partial(splinepy.read, kind="mfem"), ".gf", splinepy.write_mfem_field),
-    "vtk": Format("_bezier.vtu", vtk.write_bezier),
-    "view": Format("_view.vtu", vtk.write_view),
-    "json": Format(
-        ".json", splinepy.write_json, partial(splinepy.read, kind="json"), "_u.json", splinepy.write_json_field
-    ),
+    "vtk": Format("_bezier.vtu", vtk.write_bezier, is_whole=True),
+    "view": Format("_view.vtu", vtk.write_view, is_whole=True),
+    "json": Format(".json", splinepy.write_json, partial(splinepy.read, kind="json"), "_u.json", splinepy.write_json),
 }
 
 
@@ -133,6 +133,8 @@ def export(
     if to not in FORMATS:
         raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines")
     chosen = FORMATS[to]
+    if solution and not (chosen.is_whole or chosen.write_field):
+        raise InputError(f"format {to!r}: holds no solution; leave --solution out, or export it --to vtk")
     target = check_new(
         Path(volume).stem + chosen.ending if out is None else out, chosen.ending[chosen.ending.index(".") :]
     )
@@ -140,36 +142,24 @@ def export(
     for file in (target, beside):
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
-    content = _content(volume, solution)
+    loaded = load_volume(volume)
+    field, problem = (None, None) if solution is None else _load_solution(Path(solution), loaded)
     try:
         with replacing(target) as temporary:
-            chosen.write(temporary, content)
-            if content.field is not None and chosen.write_field is not None:
+            chosen.write(temporary, loaded, field, problem)
+            if field is not None and chosen.write_field is not None:
                 with replacing(beside) as temporary_beside:
-                    chosen.write_field(temporary_beside, content.field)
+                    chosen.write_field(temporary_beside, field)
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
     return target
 
 
-def _content(volume: str | Path, solution: str | Path | None) -> Content:
-    """Read a volume, and a solution with the problem that the report beside it names. Raises InputError."""
-    loaded = load_volume(volume)
-    if solution is None:
-        return Content(loaded)
-    section = _section_beside(Path(solution))
-    field = _load_solution(Path(solution), loaded, section)
-    return Content(loaded, field, _problem(*section) if section else None)
+def _load_solution(path: Path, volume: BSplineVolume) -> tuple[SplineField, Equation | None]:
+    """Return a solution and the problem that the report beside it names, None where its exact solution is not known.
 
-
-def _section_beside(solution: Path) -> tuple[str, dict[str, Any]] | None:
-    """Return name and section of the problem in the report beside solution.npz, None where there is none."""
-    report = reports.read(solution.parent) or {}
-    return next(((name, report[name]) for name in _PROBLEMS if isinstance(report.get(name), dict)), None)
-
-
-def _load_solution(path: Path, volume: BSplineVolume, section: tuple[str, dict[str, Any]] | None) -> SplineField:
-    """Return the solution after checks that it belongs to the volume: by its knots, and by the h of its report."""
+    Raises InputError where the solution does not belong to the volume: by its knots, or by the h of its report.
+    """
     from solve.discretization.space import TrialSpace, longest_edge
     from solve.field import SplineField
 
@@ -179,31 +169,23 @@ def _load_solution(path: Path, volume: BSplineVolume, section: tuple[str, dict[s
         raise InputError(f"{path}: coefficients must have shape (m_u, m_v, m_w) or (.., 3)")
     if not all(np.isin(own, finer).all() for own, finer in zip(volume.knots, field.knots, strict=True)):
         raise InputError(f"{path}: belongs to another volume: its knots are not those of the map, refined")
-    there = _mesh_size(section[1], field) if section else None
-    if there is not None:
+    report = reports.read(path.parent) or {}
+    name = next((name for name in PROBLEMS if isinstance(report.get(name), dict)), "")
+    section = report.get(name, {})
+    if (there := _mesh_size(section, field)) is not None:
         here = longest_edge(volume, TrialSpace(field.degrees, field.knots))
         if not np.isclose(here, there, rtol=1e-9):
             raise InputError(
                 f"{path}: belongs to another volume: the longest edge of its elements is {there:.6g}, here {here:.6g}"
             )
-    return field
+    exact = section.get("exact")
+    return field, PROBLEMS[name](exact=exact).problem() if isinstance(exact, str) else None
 
 
 def _mesh_size(section: dict[str, Any], field: SplineField) -> float | None:
-    """Return h of the finest level, None where the section is not the field's or was edited."""
+    """Return h of the finest level, None where the section is not the field's, is empty or was edited."""
     try:
         finest = section["levels"][-1]
         return float(finest["h"]) if finest["dofs"] == field.coefficients.size else None
     except (LookupError, TypeError, ValueError):
         return None
-
-
-def _problem(name: str, section: dict[str, Any]) -> Problem | None:
-    """Return a problem with the exact solution of that section, None where it has none."""
-    exact = section.get("exact")
-    if not isinstance(exact, str):
-        return None
-    from solve import Elasticity, Poisson
-
-    with input_errors():
-        return Poisson(exact=exact) if name == "poisson" else Elasticity(exact=exact.split(";"))

@@ -24,12 +24,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, insertion_into
 from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, one_line
-from . import Content
 from .splinepy_gate import checked_text
 
 if TYPE_CHECKING:
@@ -39,33 +37,23 @@ INSTALL = "pip install 'iga-nn[interop]'"
 WEIGHTS_ALIKE = 1e-12  # relative
 
 
-def write_gismo(path: Path, content: Content) -> None:
-    """Write a volume as G+Smo XML."""
-    write_gismo_field(path, content.volume)
-
-
-def write_gismo_field(path: Path, spline: BSplineVolume | SplineField) -> None:
-    """Write a spline as G+Smo XML."""
+def write_gismo(path: Path, spline: BSplineVolume | SplineField, *_: object) -> None:
+    """Write a volume or a solution as G+Smo XML; what else is known of it has no place there."""
     splinepy = _splinepy()
     patches = splinepy.Multipatch([_to_splinepy(spline)])
     patches.interfaces = np.full((1, 6), -1)  # no neighbours: splinepy cannot look for those of scalar splines
     splinepy.io.gismo.export(str(path), patches)
 
 
-def write_json(path: Path, content: Content) -> None:
-    """Write a volume as splinepy's JSON."""
-    write_json_field(path, content.volume)
-
-
-def write_json_field(path: Path, spline: BSplineVolume | SplineField) -> None:
-    """Write a spline as splinepy's JSON."""
+def write_json(path: Path, spline: BSplineVolume | SplineField, *_: object) -> None:
+    """Write a volume or a solution as splinepy's JSON; what else is known of it has no place there."""
     _splinepy().io.json.export(str(path), [_to_splinepy(spline)])
 
 
-def write_mfem(path: Path, content: Content) -> None:
+def write_mfem(path: Path, volume: BSplineVolume, solution: SplineField | None = None, *_: object) -> None:
     """Write a volume as an MFEM NURBS mesh, on the knots of the solution where there is one."""
-    volume = content.volume if content.field is None else _on_knots_of(content.field, content.volume)
-    _splinepy().io.mfem.export(str(path), _to_splinepy(volume).nurbs)
+    shown = volume if solution is None else _on_knots_of(solution, volume)
+    _splinepy().io.mfem.export(str(path), _to_splinepy(shown).nurbs)
 
 
 def write_mfem_field(path: Path, field: SplineField) -> None:
@@ -127,15 +115,11 @@ def _from_splinepy(spline: Any) -> BSplineVolume:
     rows = np.array(full.control_points, dtype=np.float64)
     net = rows.reshape(*reversed(full.control_mesh_resolutions), 3).transpose(2, 1, 0, 3)
     knots = [np.array(row, dtype=np.float64) for row in full.knot_vectors]
-    k_u, k_v, k_w = ((row - row[0]) / (row[-1] - row[0]) for row in map(_spanning, knots))
+    if not all(np.all(np.isfinite(row)) and row[-1] > row[0] for row in knots):
+        raise ValueError("knots must be finite and span an interval")
+    k_u, k_v, k_w = ((row - row[0]) / (row[-1] - row[0]) for row in knots)
     p_u, p_v, p_w = (int(p) for p in full.degrees)
     return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), np.ascontiguousarray(net))
-
-
-def _spanning(knots: Array) -> Array:
-    if not (np.all(np.isfinite(knots)) and knots[-1] > knots[0]):
-        raise ValueError("knots must be finite and span an interval")
-    return knots
 
 
 def _splinepy() -> Any:

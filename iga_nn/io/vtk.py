@@ -16,7 +16,7 @@ with a solution, `u` and (the exact solution being known) `error` = |u - u_h|. D
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,25 +27,25 @@ from scipy.sparse import csr_array
 from parameterize.arrays import Array
 from parameterize.quality.quality import arap
 from parameterize.spline.bernstein import elevation, extraction
-from parameterize.spline.bspline import apply_along, divided_spans, insert_knots
+from parameterize.spline.bspline import apply_along, divided_spans, insert_knots, sparse_rows
 from parameterize.spline.volume import BSplineVolume
 from solve.forms.frame import UnitFrame
 
 from ..figures.evaluate import error_at
-from . import Content
 
 if TYPE_CHECKING:
     from solve.field import SplineField
+
+    from ..options import Equation
 
 SAMPLES = 3  # intervals of the view per span and direction
 BEZIER_HEXAHEDRON = 79
 
 
-def write_bezier(path: Path, content: Content) -> None:
+def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None = None, *_: object) -> None:
     """Write the exact cells; a solution becomes the point data `u`."""
     import pyvista
 
-    volume, solution = content.volume, content.field
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
     breaks = [np.unique(np.concatenate([s.knots[a] for s in shown])) for a in range(3)]
     degrees = [max(s.degrees[a] for s in shown) for a in range(3)]
@@ -53,19 +53,22 @@ def write_bezier(path: Path, content: Content) -> None:
     cells = _cells([len(b) - 1 for b in breaks], degrees)  # (s, nodes of a cell)
     counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
     grid = pyvista.UnstructuredGrid(counted.ravel(), np.full(len(cells), BEZIER_HEXAHEDRON), points)
-    _mark_active(grid.GetCellData().SetHigherOrderDegrees, "HigherOrderDegrees", np.tile(degrees, (len(cells), 1)))
-    _mark_active(grid.GetPointData().SetRationalWeights, "RationalWeights", np.ones(len(points)))
+    grid.cell_data.set_array(np.tile(degrees, (len(cells), 1)).astype(np.float64), "HigherOrderDegrees")
+    grid.point_data.set_array(np.ones(len(points)), "RationalWeights")
+    grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
+    grid.GetPointData().SetActiveRationalWeights("RationalWeights")
     if solution is not None:
         values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)
         grid.point_data["u"] = values.reshape(-1, *values.shape[3:])
     _write(path, grid)
 
 
-def write_view(path: Path, content: Content) -> None:
+def write_view(
+    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Equation | None = None
+) -> None:
     """Write samples of the map, the solution and, where its problem has an exact solution, the error."""
     import pyvista
 
-    volume, solution, problem = content.volume, content.field, content.problem
     u, v, w = (divided_spans(knots, SAMPLES) for knots in volume.knots)
     points = volume.grid(u, v, w)  # (m_u, m_v, m_w, 3)
     jacobians = volume.grid_jacobian(u, v, w)
@@ -78,14 +81,6 @@ def write_view(path: Path, content: Content) -> None:
     for name, values in fields.items():
         grid.point_data[name] = values.reshape((-1, *values.shape[3:]), order="F")  # VTK counts the first index fastest
     _write(path, grid)
-
-
-def _mark_active(mark: Callable[[Any], object], name: str, values: NDArray[Any]) -> None:
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-
-    array = numpy_to_vtk(np.asarray(values, dtype=np.float64), deep=True)
-    array.SetName(name)
-    mark(array)
 
 
 def _bernstein(
@@ -104,12 +99,10 @@ def _span_matrix(knots: Array, degree: int, raised: int) -> csr_array:
     """Return the matrix (s q + 1, n) from B-spline to Bernstein coefficients of degree q; neighbours share one."""
     first, weights = extraction(knots, degree)
     blocks = elevation(degree, raised) @ weights  # (s, q + 1, degree + 1)
-    rows = np.arange(len(first))[:, None] * raised + np.arange(raised + 1)
-    owned = np.ones(rows.shape, dtype=bool)
+    owned = np.ones(blocks.shape[:2], dtype=bool)
     owned[1:, 0] = False
     columns = np.broadcast_to((first[:, None] + np.arange(degree + 1))[:, None, :], blocks.shape)
-    places = (np.repeat(rows[owned], degree + 1), columns[owned].ravel())
-    return csr_array((blocks[owned].ravel(), places), shape=(len(first) * raised + 1, len(knots) - degree - 1))
+    return sparse_rows(blocks[owned], columns[owned], len(knots) - degree - 1)
 
 
 def _cells(spans: Sequence[int], degrees: Sequence[int]) -> NDArray[np.int64]:

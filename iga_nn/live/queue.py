@@ -20,7 +20,7 @@ from parameterize.surface.surface import MeshError, Surface
 
 from ..errors import one_line
 from ..workflow.output_folder import default_folder
-from .worker import Line, Message, Step
+from .worker import End, Message, Step
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ NAME_LENGTH = 80
 
 @dataclass(eq=False)
 class Job:
-    """A surface's file in a folder of its own, and its state.
+    """Hold a surface's file in a folder of its own, and its state.
 
     text: why it was refused or failed. mapped: where the training maps the surface's vertices, (n, 3) in the cube.
     losses: those of the training that were reported. log: the lines of the run.
@@ -50,12 +50,12 @@ class Job:
 
     @property
     def path(self) -> Path:
-        """Path of the surface's file."""
+        """Return the path of the surface's file."""
         return self.folder / self.name
 
     @property
     def results(self) -> Path:
-        """The output folder of the run."""
+        """Return the output folder of the run."""
         return self.folder / default_folder(self.name)
 
 
@@ -64,7 +64,7 @@ Run = Callable[[Job], Iterator[Message]]
 
 
 class Jobs:
-    """All jobs, in the order they came.
+    """Keep all jobs, in the order they came.
 
     check: reads a surface or raises MeshError. run: yields the messages of a job. changed: is called after every
     change, from the thread that made it.
@@ -157,10 +157,10 @@ class Jobs:
             for message in self._run(job):
                 if isinstance(message, Step):
                     self._take(job, message)
-                elif isinstance(message, Line):
-                    job.log.append(message.text)
-                else:
+                elif isinstance(message, End):
                     state, text = message.state, message.text
+                else:
+                    job.log.append(message)
                 self._changed(job)
         finally:
             with self._lock:

@@ -11,6 +11,7 @@ import logging
 import webbrowser
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Page:
-    """One running page: its trame server, its routes, its jobs. max_upload: megabytes a file may have."""
+    """Serve one page: its trame server, its routes, its jobs. max_upload: megabytes a file may have."""
 
     def __init__(self, root: Path, max_upload: int, mapping: MapOptions, poisson: PoissonOptions) -> None:
         self._server: Any = get_server("iga-nn", client_type="vue3")
@@ -60,7 +61,7 @@ class Page:
         server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES)})
         server.state.client_only("shown")
         for name, act in {"start": self.jobs.start, "stop": self.jobs.stop}.items():
-            server.trigger(name)(self._on_job(act))
+            server.trigger(name)(partial(self._act, act))
         self._lay_out()
         server.controller.on_server_bind.add(self._bind)
 
@@ -91,19 +92,15 @@ class Page:
     # Jobs
 
     def _check(self, path: Path) -> Surface:
-        given = self._mapping
-        return resolve(str(path), component=given.component, max_faces=given.max_faces, decimate=given.decimate)
+        return resolve(str(path), **self._mapping.reading())
 
     def _run(self, job: Job) -> Iterator[Message]:
         mapping = replace(self._mapping, resume=has_checkpoint(job.results))
         return job_process.run(job.folder, job.name, mapping, self._poisson, job.stop)
 
-    def _on_job(self, act: Callable[[Job], None]) -> Callable[[int], None]:
-        def on_number(number: int) -> None:
-            if job := self.jobs.find(number):
-                act(job)
-
-        return on_number
+    def _act(self, act: Callable[[Job], None], number: int) -> None:
+        if job := self.jobs.find(number):
+            act(job)
 
     def _tell(self, job: Job) -> None:
         """Show a change in every tab; may be called from any thread."""

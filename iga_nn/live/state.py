@@ -58,7 +58,7 @@ def row(job: Job, before: int) -> dict[str, Any]:
         minutes, seconds = divmod(round(max(0.0, now.seconds_left)), 60)
         said["facts"] = [
             ["Stage", STAGES.get(now.stage, now.stage), f"step {now.step} of {now.steps}"],
-            ["Time left", f"{minutes}:{seconds:02d}", "at most" if now.stage == "spline" else "until the spline"],
+            ["Time left", f"{minutes}:{seconds:02d}", "about" if now.stage == "spline" else "until the spline"],
             ["Loss", f"{now.loss:.2e}", "minimised by the training"],
             ["Folded samples", f"{now.folded:,}", "0 is the aim"],
         ]

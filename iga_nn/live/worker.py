@@ -32,28 +32,21 @@ GRACE = 3.0  # seconds a job has to stop by itself, leaving a checkpoint
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The training after one step. mapped: where it maps the surface's vertices and those added to them, (n, 3)."""
+    """Hold the training after one step. mapped: where the surface's vertices and those added to them are, (n, 3)."""
 
     progress: Progress
     mapped: Array | None
 
 
 @dataclass(frozen=True)
-class Line:
-    """A line of the log."""
-
-    text: str
-
-
-@dataclass(frozen=True)
 class End:
-    """How the job ended. text: why it failed."""
+    """Say how the job ended. text: why it failed."""
 
     state: Literal["done", "failed", "stopped"]
     text: str = ""
 
 
-Message = Step | Line | End
+Message = Step | str | End  # a string is a line of the log
 
 
 def run(folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions, stop: Event) -> Iterator[Message]:
@@ -132,7 +125,7 @@ class _Teller(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Send a line of the log."""
-        self._sender.send(Line(record.getMessage()))
+        self._sender.send(record.getMessage())
 
     def step(self, progress: Progress) -> None:
         """Report the state after a step of the training."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array, in_brackets
-from parameterize.spline.bspline import breakpoints
+from parameterize.spline.bspline import midpoints
 
 from ..options import MAX_CONTROL_POINTS
 from .document import Report, is_certified
@@ -25,9 +25,7 @@ SHOWN = 5  # places
 
 def span_parameters(volume: BSplineVolume, spans: NDArray[np.int64]) -> Array:
     """Return the midpoints (k, 3), in the cube, of knot spans numbered by (k, 3)."""
-    breaks = [breakpoints(knots) for knots in volume.knots]
-    middles = [0.5 * (b[spans[:, axis]] + b[spans[:, axis] + 1]) for axis, b in enumerate(breaks)]
-    return np.stack(middles, axis=1)
+    return np.stack([midpoints(knots)[spans[:, axis]] for axis, knots in enumerate(volume.knots)], axis=1)
 
 
 def span_places(volume: BSplineVolume, spans: NDArray[np.int64]) -> Array:

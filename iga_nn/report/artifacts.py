@@ -8,17 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
+
+from ..options import PROBLEMS
 
 Part = Literal["report", "map", "solution", "study"]
 
 REPORT, PAGE = "report.json", "report.html"
-SECTIONS: dict[str, Part] = {"config": "map", "poisson": "solution", "elasticity": "solution", "study": "study"}
+SOLVED = {name: kind.title for name, kind in PROBLEMS.items()} | {"study": "convergence study"}  # section -> title
+SECTIONS: dict[str, Part] = {"config": "map", **dict.fromkeys(PROBLEMS, "solution"), "study": "study"}
 
 
 @dataclass(frozen=True)
 class Artifact:
-    """One file of an output folder.
+    """Describe one file of an output folder.
 
     part: the part of a run that writes it. shows: what the file holds or the figure shows; the heading of a figure.
     arrays: names in an archive. draw: the function of `iga_nn.figures` that draws the figure from `takes`, the names of
@@ -34,19 +38,17 @@ class Artifact:
     takes: tuple[str, ...] = ()
     is_curve: bool = False
 
-    @property
-    def files(self) -> tuple[str, ...]:
-        """All names the file may be written under."""
-        return (self.file, self.file.replace(".png", ".pdf")) if self.is_curve else (self.file,)
-
 
 _KNOTS = ("degrees", "knots_u", "knots_v", "knots_w")
 _BOUNDARY = ("vertices", "parameters", "faces")
 _ERROR = ("volume", "solution", "problem")
 
 
-def _figure(file: str, part: Part, shows: str, draw: str, *takes: str) -> Artifact:
-    return Artifact(file, part, shows, draw=draw, takes=takes, is_curve=draw in ("draw_history", "draw_study"))
+def _figure(file: str, part: Part, shows: str, draw: str, *takes: str, is_curve: bool = False) -> Artifact:
+    return Artifact(file, part, shows, draw=draw, takes=takes, is_curve=is_curve)
+
+
+_curve = partial(_figure, is_curve=True)
 
 
 ARTIFACTS = (  # in the order of the pages
@@ -63,17 +65,18 @@ ARTIFACTS = (  # in the order of the pages
     _figure("lines.png", "map", "parameter lines on the cube's faces", "draw_lines", "volume"),
     _figure("cut.png", "map", "the volume cut open, with the distortion inside", "draw_cut", "volume"),
     _figure("distortion.png", "map", "distortion on three sections", "draw_distortion", "volume"),
-    _figure("history.png", "map", "loss over the training steps", "draw_history", "history"),
+    _curve("history.png", "map", "loss over the training steps", "draw_history", "history"),
     _figure("named_faces.png", "solution", "the volume's faces by name", "draw_faces", "named_volume"),
-    _figure("convergence.png", "solution", "errors over the mesh size", "draw_study", "levels"),
+    _curve("convergence.png", "solution", "errors over the mesh size", "draw_study", "levels"),
     _figure("error.png", "solution", "error on the boundary and on three sections", "draw_error", *_ERROR),
-    _figure("study.png", "study", "errors of the convergence study over the mesh size", "draw_study", "study"),
+    _curve("study.png", "study", "errors of the convergence study over the mesh size", "draw_study", "study"),
 )
 
 
 def files_of(*parts: Part) -> list[str]:
     """Return the names of all files that these parts of a run may write."""
-    return [name for artifact in ARTIFACTS if artifact.part in parts for name in artifact.files]
+    chosen = [artifact for artifact in ARTIFACTS if artifact.part in parts]
+    return [each.file for each in chosen] + [each.file.replace(".png", ".pdf") for each in chosen if each.is_curve]
 
 
 def figures_of(report: Mapping[str, Any]) -> list[Artifact]:

@@ -17,7 +17,7 @@ from parameterize.files import save_text
 
 from ..levels import ESTIMATES, EXACT_ERRORS
 from ..version import __version__
-from .artifacts import REPORT
+from .artifacts import REPORT, SOLVED
 
 SCHEMA = 1
 
@@ -50,9 +50,14 @@ def plain(value: Any) -> Any:
     return value
 
 
+def as_json(value: Any) -> str:
+    """Return the JSON text of a report or a part of it."""
+    return json.dumps(plain(value), indent=2, allow_nan=False)
+
+
 def write(folder: Path, report: Mapping[str, Any]) -> None:
     """Write report.json; atomic."""
-    save_text(folder / REPORT, json.dumps(plain(report), indent=2, allow_nan=False) + "\n")
+    save_text(folder / REPORT, as_json(report) + "\n")
 
 
 def read(folder: Path) -> Report | None:
@@ -88,7 +93,7 @@ def is_meaningful(report: Report) -> bool:
 
 def solved(report: Report) -> Report:
     """Return the section of the problem that was solved, empty where nothing was solved."""
-    return next((report[name] for name in ("poisson", "elasticity", "study") if name in report), {})
+    return next((report[name] for name in SOLVED if name in report), {})
 
 
 def one_to_one(report: Report) -> str:

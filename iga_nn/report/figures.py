@@ -22,12 +22,12 @@ def draw_figures(folder: Path, part: Part, known: Mapping[str, Any], endings: Se
     endings: of the files a curve is written to.
     """
     failures: dict[str, str] = {}
-    wanted = [a for a in ARTIFACTS if a.draw and a.part == part and known.keys() >= set(a.takes)]
-    solid = [artifact for artifact in wanted if not artifact.is_curve]
-    if solid and not figures.can_draw():
-        failures = {artifact.file: figures.CANNOT_DRAW for artifact in solid}
-        wanted = [artifact for artifact in wanted if artifact.is_curve]
-    for artifact in wanted:
+    for artifact in ARTIFACTS:
+        if not artifact.draw or artifact.part != part or not known.keys() >= set(artifact.takes):
+            continue
+        if not artifact.is_curve and not figures.can_draw():
+            failures[artifact.file] = figures.CANNOT_DRAW
+            continue
         for ending in endings if artifact.is_curve else PNG:
             path = (folder / artifact.file).with_suffix(ending)
             try:

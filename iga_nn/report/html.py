@@ -6,7 +6,6 @@ The page is laid out by the template page.html, which escapes whatever it is giv
 from __future__ import annotations
 
 import base64
-import json
 import logging
 from html import escape
 from importlib.resources import files
@@ -19,7 +18,7 @@ from ..errors import one_line
 from ..levels import TITLES, capitalized, number
 from . import document as reports
 from .advice import in_words
-from .artifacts import PAGE, figures_of
+from .artifacts import PAGE, SOLVED, figures_of
 from .document import Report
 
 if TYPE_CHECKING:
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-SOLVED = {"poisson": "Poisson's equation", "elasticity": "linear elasticity", "study": "convergence study"}
 MEANINGS = {
     "certified": "det J > 0 is proved on the whole cube, rounding errors included.",
     "folded": "The map folds: det J is negative somewhere. Do not trust what is solved on it.",
@@ -50,7 +48,7 @@ def write(folder: Path, report: Report, scene: Scene | None) -> None:
 
 
 def _bare(report: Report, reason: str) -> str:
-    whole = escape(json.dumps(reports.plain(report), indent=2))
+    whole = escape(reports.as_json(report))
     return (
         '<!doctype html><html lang="en"><meta charset="utf-8"><title>iga-nn</title>'
         f"<p>This page could not be laid out ({escape(reason)}); this is report.json:</p><pre>{whole}</pre></html>"

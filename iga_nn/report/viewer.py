@@ -20,21 +20,22 @@ from parameterize.spline.volume import BSplineVolume
 from ..figures import evaluate
 from ..figures.color_range import ColorRange, error_range, even_range
 from ..figures.evaluate import distortions, points_on, solution_on
-from ..figures.render import widest_view
+from ..figures.render import TILT, widest_view
 
 if TYPE_CHECKING:
     from solve import Solution
 
-    from ..figures.evaluate import Problem
+    from ..options import Equation
 
 SAMPLES = 81  # per direction of a patch
-TILT = 0.45  # radians: shows more than one side
 
 Scene = dict[str, Any]
 
 
-def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: Problem | None = None) -> Scene:
+def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: Equation | None = None) -> Scene:
     """Return what viewer.js draws, in JSON's own types; solution and error only where they are known and finite."""
+    from matplotlib import colormaps
+
     grids = evaluate.all_grids(SAMPLES)
     points = [points_on(volume, grid) for grid in grids]
     fields = [_field("distortion", "tanh(√ARAP / 2), volume 1", distortions(volume, grids), ColorRange(0.0, 1.0))]
@@ -59,7 +60,7 @@ def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: P
         "places": _packed((cloud - low) / np.where(high > low, high - low, 1.0), np.uint16),
         "colors": list(evaluate.FACE_COLORS),
         "labels": evaluate.face_labels(),
-        "map": _color_map(),
+        "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3]),  # (256, 3)
         "fields": fields,
     }
 
@@ -68,12 +69,6 @@ def _field(name: str, title: str, patches: Sequence[Array], limits: ColorRange) 
     """Return the values on the nine patches, coloured between the limits."""
     low, high = limits.labels
     return {"name": name, "title": title, "low": low, "high": high, "values": _packed(limits.shares(np.stack(patches)))}
-
-
-def _color_map() -> str:
-    from matplotlib import colormaps
-
-    return _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3])  # (256, 3)
 
 
 def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint8) -> str:

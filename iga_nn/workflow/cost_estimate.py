@@ -34,7 +34,7 @@ REST = 1000.0  # libraries loaded, figures drawn
 
 # Products
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
-EASY, HARD = (7, 14), (10, 18)  # rounds, and Newton steps a round
+EASY, HARD = (5, 16), (11, 14)  # rounds, and Newton steps a round
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
@@ -42,7 +42,7 @@ LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8
 
 @dataclass(frozen=True)
 class Forecast:
-    """The cost of one start, the section `estimate` of report.json.
+    """Hold the cost of one start, the section `estimate` of report.json.
 
     seconds: for an easy and for a hard surface. memory_mb: peak of the resident memory.
     """

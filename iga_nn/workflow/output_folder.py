@@ -26,7 +26,7 @@ CHECKPOINT = "checkpoint"
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A finished output folder and what its report.json says."""
+    """Hold a finished output folder and what its report.json says."""
 
     folder: Path
     report: reports.Report
@@ -34,7 +34,7 @@ class Outcome:
 
 @dataclass
 class RunFolder:
-    """One output folder that is being filled: its report so far, and the clock.
+    """Fill one output folder: its report so far, and the clock.
 
     vector: write plots of curves as PDF, too. finished: the result that a resumed run found; nothing is left to do.
     """
@@ -60,17 +60,22 @@ class RunFolder:
         report as `not_drawn`, with the reason.
         """
         endings = (".png", ".pdf") if self.vector else (".png",)
-        with self.timed("report"):  # importing matplotlib and VTK takes part of it
+        with self.drawing("figures"):
+            from ..report.figures import draw_figures
+
+            self._note_failures(draw_figures(self.folder, part, known, endings))
+
+    @contextmanager
+    def drawing(self, what: str) -> Iterator[None]:
+        """Let the block draw: where it fails, in importing matplotlib or VTK for example, the report says so."""
+        with self.timed("report"):
             try:
-                from ..report.figures import draw_figures
+                yield
+            except Exception as error:  # no figure ends a run
+                self._note_failures({what: one_line(error) or type(error).__name__})
+                log.warning("%s could not be drawn: %s", what, one_line(error))
 
-                self.note_failures(draw_figures(self.folder, part, known, endings))
-            except Exception as error:  # matplotlib is missing, for example; no figure ends a run
-                self.note_failures({"figures": one_line(error) or type(error).__name__})
-                log.warning("figures could not be drawn: %s", one_line(error))
-
-    def note_failures(self, failures: dict[str, str]) -> None:
-        """Keep for the report what could not be drawn, and why."""
+    def _note_failures(self, failures: dict[str, str]) -> None:
         if failures:
             self.report["not_drawn"] = self.report.get("not_drawn", {}) | failures
 
@@ -136,12 +141,12 @@ def _finished_result(folder: Path, force: bool, resume: bool) -> Outcome | None:
     if force:
         return None
     known = reports.read(folder)
-    is_finished = known is not None and reports.is_finished(known)
-    if is_finished and not resume:
+    finished = Outcome(folder, known) if known and reports.is_finished(known) else None
+    if finished and not resume:
         raise InputError(f"{folder}: holds a finished result; --force replaces it, --out names another folder")
     if has_checkpoint(folder) and not resume:
         raise InputError(f"{folder}: holds an interrupted run; --resume continues it, --force starts anew")
-    return Outcome(folder, known) if known is not None and is_finished else None
+    return finished
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,49 +17,49 @@ from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
-from ..options import ElasticityOptions, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
+from ..options import PROBLEMS, Equation, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
 from ..report import document as reports
 from ..report import html, tables
-from .output_folder import Outcome, RunFolder, open_folder
+from .mapping import map_surface
+from .output_folder import Outcome, RunFolder, default_folder, open_folder
 from .repeat import command_line, gives_the_same
 from .solving import described, notices_of, reported, scene_of, solve_levels, verdict_of
-from .train import map_surface
 from .verdict import write_certificate
 
 if TYPE_CHECKING:
     from parameterize.progress import ProgressCallback
-    from solve import ConvergenceRow, Elasticity, Poisson, Solution
+    from solve import ConvergenceRow, Solution
 
 log = logging.getLogger(__name__)
 
 
 def run(
-    problem: Literal["poisson", "elasticity"],
+    problem: str,
     mesh: str | Path,
     out: str | Path | None = None,
     *,
     mapping: MapOptions | None = None,
-    poisson: PoissonOptions | None = None,
-    elasticity: ElasticityOptions | None = None,
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
+    **given: ProblemOptions | None,
 ) -> Outcome:
     """Parameterize a surface, solve a problem on the volume and return the output folder with its report.
 
+    problem: "poisson" or "elasticity"; its options are given under the same name, poisson=PoissonOptions(...).
     mesh: path of a closed surface, or the name of a sample or a model. out: the output folder, by default the input's
     stem in the current folder; README lists its files. vector: write plots of curves as PDF, too.
     Raises MeshError for a surface that is not accepted, solve.ExpressionError for a formula, InputError for other
     options and for an output folder that holds a result (unless `force`) or cannot be written.
     """
-    known: dict[str, ProblemOptions] = {"poisson": poisson or PoissonOptions()}
-    known["elasticity"] = elasticity or ElasticityOptions()
-    if problem not in known:
-        raise InputError(f"problem {problem!r}: 'poisson' and 'elasticity' can be solved")
-    mapping, options = mapping or MapOptions(), known[problem]
+    if problem not in PROBLEMS:
+        raise InputError(f"problem {problem!r}: choose one of {', '.join(PROBLEMS)}")
+    mapping, options = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
+    if others := [name for name, value in given.items() if value is not None]:
+        raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
     equation, spline = options.problem(), mapping.config().spline
     blank = BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree)
-    unknowns = check_size(blank, max(options.refine), options.degree, options.components)
+    unknowns = check_size(blank, max(options.refine), options.degree, equation.form.components)
     command = command_line(f"run {problem}", mesh, mapping, options, out=out)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
@@ -67,7 +67,7 @@ def run(
                 path = state.folder / "volume.npz"
                 hint = f"`iga-nn solve {problem} {path}` solves on it"
                 raise InputError(f"{state.folder}: holds a finished volume; {hint}")
-            return _finished_by(command, state.finished)
+            return _finished_by(command, state.finished, vector)
         volume = map_surface(state, mesh, mapping, progress, command, equation, unknowns).volume
         solution = solve_levels(state, volume, equation, options)
         return _finish(state, volume, solution, equation)
@@ -87,7 +87,7 @@ def parameterize_to(
     command = command_line("parameterize", mesh, mapping, out=out)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
-            return _finished_by(command, state.finished)
+            return _finished_by(command, state.finished, vector)
         return _finish(state, map_surface(state, mesh, mapping, progress, command).volume)
 
 
@@ -110,7 +110,7 @@ def solve_to(
     options, path = problem or PoissonOptions(), Path(volume)
     equation = options.problem()
     loaded = load_volume(path)
-    check_size(loaded, max(options.refine), options.degree, options.components)
+    check_size(loaded, max(options.refine), options.degree, equation.form.components)
     with input_errors():
         check_problem(loaded, equation)
         check_device(device, equation)
@@ -143,10 +143,10 @@ def study_to(
     loaded = load_volume(path)
     degrees = sorted(options.degree) or [max(loaded.degrees)]
     for degree in degrees:
-        check_size(loaded, levels[-1], degree, options.components)
+        check_size(loaded, levels[-1], degree, equation.form.components)
     with input_errors():
         check_problem(loaded, equation)
-    with open_folder(path, out or f"{path.name.split('.')[0]}-study", force, vector=vector) as state:
+    with open_folder(path, f"{default_folder(path)}-study" if out is None else out, force, vector=vector) as state:
         state.begin("study")
         write_certificate(state, path, loaded, command_line(options.command, path, options, out=out))
         study: dict[int, list[ConvergenceRow]] = {}
@@ -162,7 +162,7 @@ def study_to(
         return _finish(state, loaded), tables.as_table(study)
 
 
-def _finished_by(command: str, finished: Outcome) -> Outcome:
+def _finished_by(command: str, finished: Outcome, vector: bool) -> Outcome:
     """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone."""
     folder, made_by = finished.folder, finished.report.get("command", "")
     if not gives_the_same(made_by, command):
@@ -170,6 +170,8 @@ def _finished_by(command: str, finished: Outcome) -> Outcome:
     wanted = ["volume.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
     if gone := [name for name in wanted if not (folder / name).is_file()]:
         raise InputError(f"{folder}: {gone[0]} is gone from this finished result; --force makes it anew")
+    if vector and not (folder / "history.pdf").is_file():
+        raise InputError(f"{folder}: is finished, without PDFs; leave --vector out, or make it anew with --force")
     log.info("%s: finished already", folder)
     return finished
 
@@ -178,7 +180,7 @@ def _finish(
     state: RunFolder,
     volume: BSplineVolume,
     solution: Solution | None = None,
-    equation: Poisson | Elasticity | None = None,
+    equation: Equation | None = None,
 ) -> Outcome:
     """Finish the report, write the page that shows it and return the output folder."""
     scene = scene_of(state, volume, solution, equation)

@@ -13,29 +13,38 @@ import numpy as np
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
-from ..options import ProblemOptions
+from ..options import Equation, ProblemOptions
 from ..report import document as reports
 from ..report import html
 from .output_folder import RunFolder
 
 if TYPE_CHECKING:
     from parameterize.spline.volume import BSplineVolume
-    from solve import Elasticity, Poisson, Solution, SolveReport
+    from solve import Solution, SolveReport
 
 log = logging.getLogger(__name__)
 
 
 def solve_levels(
-    state: RunFolder, volume: BSplineVolume, equation: Poisson | Elasticity, options: ProblemOptions, **solver: Any
+    state: RunFolder, volume: BSplineVolume, equation: Equation, options: ProblemOptions, **solver: Any
 ) -> Solution:
-    """Solve on every level, write the report of all and the solution of each, and return the finest one.
+    """Solve level after level, each from the one before, write the report of all, and return the finest solution.
 
-    solver: keywords of `solve.solve_problem`.
+    solution.npz holds the finest so far. solver: keywords of `solve.solve_problem`.
     """
-    from solve import rates
+    from solve import rates, solve_problem
 
+    solutions: list[Solution] = []
+    solver |= options.solver() | {"certified": verdict_of(state)}
     with reported(state, volume), state.timed("solve"):
-        solutions = list(_solutions(state, volume, equation, options, **solver))
+        for level in sorted(options.refine):
+            with input_errors():
+                solution = solve_problem(volume, equation, refine=level, **solver)
+            log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
+            solution.save(state.folder / "solution.npz")
+            solutions.append(solution)
+            if equation.form.components == 1:
+                solver["start"] = solution
     found = [solution.report for solution in solutions]
     asked = {name: given for name, given in asdict(options).items() if name not in ("refine", "degree")}
     known = asked | described(equation, volume)
@@ -51,33 +60,9 @@ def solve_levels(
     return solutions[-1]
 
 
-def _solutions(
-    state: RunFolder, volume: BSplineVolume, equation: Poisson | Elasticity, options: ProblemOptions, **solver: Any
-) -> Iterator[Solution]:
-    """Solve level after level, each from the solution before; solution.npz holds the finest so far."""
-    from solve import Poisson, solve_problem
-
-    for level in sorted(set(options.refine)):
-        with input_errors():
-            solution = solve_problem(
-                volume,
-                equation,
-                refine=level,
-                degree=options.degree,
-                quadrature=options.quadrature,
-                certified=verdict_of(state),
-                **solver,
-            )
-        log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
-        solution.save(state.folder / "solution.npz")
-        yield solution
-        if isinstance(equation, Poisson):
-            solver["start"] = solution
-
-
 @contextmanager
 def reported(state: RunFolder, volume: BSplineVolume) -> Iterator[None]:
-    """Where the block refuses the problem, say so in the report and write the page of what is known without it."""
+    """Say in the report that the block refused the problem, and write the page of what is known without it."""
     try:
         yield
     except InputError as error:
@@ -92,9 +77,7 @@ def verdict_of(state: RunFolder) -> str:
     return str(state.report["parameterization"]["bijective"])
 
 
-def _draw_errors(
-    state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Poisson | Elasticity
-) -> None:
+def _draw_errors(state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation) -> None:
     """Draw the error where the exact solution is known, and the convergence where there are several levels."""
     from solve import ConvergenceRow
 
@@ -108,7 +91,7 @@ def _draw_errors(
     state.draw("solution", **known)
 
 
-def described(equation: Poisson | Elasticity, volume: BSplineVolume) -> dict[str, Any]:
+def described(equation: Equation, volume: BSplineVolume) -> dict[str, Any]:
     """Return what the report says of a problem beside the options: the exact solution, and the meaning of X, Y, Z."""
     given: dict[str, Any] = {"exact": equation.exact} if isinstance(equation.exact, str) else {}
     return given | ({"frame": UnitFrame.of(volume).as_dict()} if equation.is_scaled else {})
@@ -121,12 +104,8 @@ def notices_of(found: Iterable[SolveReport]) -> list[str]:
 
 def scene_of(state: RunFolder, volume: BSplineVolume, *solved: Any) -> Any:
     """Return the interactive view of a volume and what is solved on it; None where it cannot be drawn."""
-    with state.timed("report"):
-        try:
-            from ..report import viewer
+    with state.drawing("interactive view"):
+        from ..report import viewer
 
-            return viewer.scene_of(volume, *solved)
-        except Exception as error:  # no figure ends a run
-            log.warning("the interactive view could not be drawn: %s", one_line(error))
-            state.note_failures({"interactive view": one_line(error) or type(error).__name__})
-            return None
+        return viewer.scene_of(volume, *solved)
+    return None

@@ -15,22 +15,20 @@ from ..report import document as reports
 if TYPE_CHECKING:
     from parameterize.spline.volume import BSplineVolume
 
-    from ..options import MapOptions
+    from ..options import MapOptions, SurfaceOptions
     from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 
 
-def check_surface(
-    mesh: str, component: int | None, max_faces: int, decimate: bool = False, strict: bool = False
-) -> dict[str, Any]:
+def check_surface(mesh: str, options: SurfaceOptions, strict: bool = False) -> dict[str, Any]:
     """Return the section `input` of report.json for a surface that is accepted. Raises MeshError where it is not.
 
-    decimate: reduce a larger surface to max_faces. strict: also refuse a surface that intersects itself.
+    strict: also refuse a surface that intersects itself.
     """
     from ..models import resolve
 
-    surface = resolve(mesh, component=component, max_faces=max_faces, decimate=decimate)
+    surface = resolve(mesh, **options.reading())
     if strict:
         surface.refuse_crossings()
     return surface.summary()

@@ -5,20 +5,17 @@ patches (bezier_patches.py), and every pair of patches is settled by a proof (pa
 looked at again. Where nothing is proved, two parameters of one point are searched for.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
+import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Array, IntArray, in_brackets
 from ..cube.cube import VARYING_AXES
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
 from .bezier_patches import Pieces, as_rows, boundary_pieces, contact, halved
-from .box_overlap import overlapping_boxes
 from .patch_proofs import settled
 
 Point = tuple[float, float, float]
@@ -53,7 +50,7 @@ class BoundaryCheck:
     undecided: int
 
     def as_dict(self) -> dict[str, Any]:
-        """Entries of the section `parameterization` of report.json."""
+        """Return entries of the section `parameterization` of report.json."""
         meeting = self.meeting
         place = meeting and {"parameters": [list(row) for row in meeting.parameters], "point": list(meeting.point)}
         return {"boundary_injective": self.injective, "boundary_meeting": place}
@@ -80,8 +77,8 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryChe
             return BoundaryCheck(True, None, 0)
         met = _search(local, pieces, pairs, error)
         if met is not None:
-            meeting = Meeting((_as_point(met[0]), _as_point(met[1])), _as_point(volume(met[0])[0]))
-            return BoundaryCheck(False, meeting, len(pairs))
+            p, q, point = (tuple(row.tolist()) for row in (*met, volume(met[0])[0]))
+            return BoundaryCheck(False, Meeting((p, q), point), len(pairs))
         if hopeless or depth == max_depth:
             break
         pieces, pairs = halved(pieces, pairs)
@@ -89,7 +86,7 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryChe
 
 
 def _local(volume: BSplineVolume) -> BSplineVolume:
-    """The volume with its middle moved to the origin, and scaled by a power of two to magnitude 1.
+    """Return the volume with its middle moved to the origin, and scaled by a power of two to magnitude 1.
 
     That is one rounding for each coordinate, relative to the difference from the middle, however far away that is.
     """
@@ -100,7 +97,7 @@ def _local(volume: BSplineVolume) -> BSplineVolume:
 
 
 def _rounding(local: BSplineVolume, max_depth: int) -> float:
-    """Bound of the rounding error of a Bezier control point's coordinate.
+    """Return a bound of the rounding error of a Bezier control point's coordinate.
 
     No weight is negative and all sum to 1, so that each rounding changes a sum by at most the unit roundoff times the
     largest coordinate: 6 p + 2 a direction for the extraction (bernstein.py), 2 p + 2 for the elevation, p + 1 a
@@ -113,7 +110,7 @@ def _rounding(local: BSplineVolume, max_depth: int) -> float:
 
 
 def _search(local: BSplineVolume, pieces: Pieces, pairs: IntArray, error: float) -> tuple[Array, Array] | None:
-    """Two parameters of a common point of pieces that do not touch in the cube.
+    """Return two parameters of a common point of pieces that do not touch in the cube.
 
     Newton's method starts from the middle of some pairs. Beside an edge of the cube it tends to two equal parameters:
     so the gap must be rounding, and the parameters farther apart than their errors, gap / (least slope), can explain.
@@ -145,22 +142,47 @@ def _search(local: BSplineVolume, pieces: Pieces, pairs: IntArray, error: float)
     return where[0][best], where[1][best]
 
 
-def _slopes(volume: BSplineVolume, where: list[Array], tangents: list[NDArray[np.int64]]) -> Array:
-    """Derivative (k, 3, 4) of F(p) - F(q) in the two free parameters of each."""
-    parts = [
-        np.take_along_axis(volume.jacobian(points), axes[:, None, :], axis=2)
-        for points, axes in zip(where, tangents, strict=True)
-    ]
-    return np.concatenate([parts[0], -parts[1]], axis=2)
+def _slopes(volume: BSplineVolume, where: list[Array], tangents: list[IntArray]) -> Array:
+    """Return the derivative (k, 3, 4) of F(p) - F(q) in the two free parameters of each."""
+    of_p, of_q = (np.take_along_axis(volume.jacobian(where[k]), tangents[k][:, None], axis=2) for k in range(2))
+    return np.concatenate([of_p, -of_q], axis=2)
 
 
-def _middles(volume: BSplineVolume, pieces: Pieces, rows: NDArray[np.int64]) -> Array:
-    """Parameters (k, 3) of the middle of pieces."""
+def _middles(volume: BSplineVolume, pieces: Pieces, rows: IntArray) -> Array:
+    """Return the parameters (k, 3) of the middle of pieces."""
     middle = (pieces.low[rows] + pieces.high[rows]) / 2.0 ** (pieces.depth + 1)
     breaks = [breakpoints(knots) for knots in volume.knots]
     return np.stack([np.interp(middle[:, a], np.arange(len(breaks[a])), breaks[a]) for a in range(3)], axis=1)
 
 
-def _as_point(row: Array) -> Point:
-    x, y, z = row.tolist()
-    return x, y, z
+def overlapping_boxes(low: Array, high: Array) -> IntArray:
+    """Return all pairs (k, 2) of closed boxes low, high (n, 3) that share a point; i != j, each pair once."""
+    if len(low) == 0:
+        return np.empty((0, 2), dtype=np.int64)
+    spread = (high.max(axis=0) - low.min(axis=0)) / np.maximum((high - low).mean(axis=0), np.finfo(np.float64).tiny)
+    first = int(spread.argmax())  # the axis along which the boxes are shortest, compared with all of them
+    axes = [first, (first + 1) % 3, (first + 2) % 3]
+    order = np.argsort(low[:, first], kind="stable")
+    sorted_low, sorted_high = (np.ascontiguousarray(side[order][:, axes]) for side in (low, high))
+    found = np.empty((_sweep(sorted_low, sorted_high, np.empty((0, 2), dtype=np.int64)), 2), dtype=np.int64)
+    _sweep(sorted_low, sorted_high, found)
+    return order[found]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _sweep(low: Array, high: Array, out: IntArray) -> int:
+    """Write overlapping pairs into `out` as far as it reaches; return how many there are.
+
+    `low` is sorted by its first column.
+    """
+    count = 0
+    for i in range(len(low)):
+        for j in range(i + 1, len(low)):
+            if low[j, 0] > high[i, 0]:
+                break
+            apart = low[j, 1] > high[i, 1] or low[i, 1] > high[j, 1] or low[j, 2] > high[i, 2] or low[i, 2] > high[j, 2]
+            if not apart:
+                if count < len(out):
+                    out[count, 0], out[count, 1] = i, j
+                count += 1
+    return count

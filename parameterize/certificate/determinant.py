@@ -4,8 +4,6 @@ The control points of the three derivatives are brought to Bernstein form, and t
 product rule for Bernstein polynomials: of degree 3 p - 1 a direction. No interpolation, so that errors stay small.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Array, IntArray
@@ -43,17 +41,15 @@ class DeterminantForm:
         self.unscale = np.einsum("i,j,k->ijk", *weights)[..., None]  # (d_u, d_v, d_w, 1)
 
     def numbers(self, flat: IntArray) -> IntArray:
-        """Flat span numbers (k,) as rows (i, j, l): (k, 3)."""
+        """Return flat span numbers (k,) as rows (i, j, l): (k, 3)."""
         return np.stack(np.unravel_index(flat, self.n_spans), axis=-1).astype(np.int64)
 
     def span_sizes(self) -> Array:
-        """Parametric volume of every span, (n_spans in all,)."""
-        u, v, w = (np.diff(b) for b in self.breaks)
-        sizes: Array = np.einsum("i,j,k->ijk", u, v, w).ravel()
-        return sizes
+        """Return the parametric volume of every span, (n_spans in all,)."""
+        return np.asarray(np.einsum("i,j,k->ijk", *(np.diff(b) for b in self.breaks)).ravel())
 
     def survey(self) -> tuple[Array, Array, Array]:
-        """For all spans: lower bound of det J, least value at the 8 corners, mean; (n_spans in all,) each."""
+        """Return for all spans: lower bound of det J, least value at the 8 corners, mean; (n_spans in all,) each."""
 
         def part(chunk: IntArray) -> tuple[Array, Array, Array]:
             values, permanents = self.coefficients(self.numbers(chunk))
@@ -61,29 +57,30 @@ class DeterminantForm:
             return bounds, corners_of(values).min(axis=(0, 1, 2)), values.mean(axis=(0, 1, 2))
 
         chunks = [np.arange(i, min(i + CHUNK, self.span_count)) for i in range(0, self.span_count, CHUNK)]
-        bounds, corners, means = (np.concatenate(parts) for parts in zip(*in_parallel(part, chunks), strict=True))
+        bounds, corners, means = map(np.concatenate, zip(*in_parallel(part, chunks), strict=True))
         return bounds, corners, means
 
     def coefficients(self, spans: IntArray) -> tuple[Array, Array]:
-        """Bernstein coefficients on spans (k, 3): (d_u, d_v, d_w, k); and the permanents (k,) that bound them."""
+        """Return Bernstein coefficients on spans (k, 3), (d_u, d_v, d_w, k), and permanents (k,) that bound them."""
         local, sizes = zip(*(self._derivative(b, spans) for b in range(3)), strict=True)
         f_u, f_v, f_w = local  # (3, n_0, n_1, n_2, k) each, scaled Bernstein form
         cross = cross_products(f_v, f_w)
         determinant = np.zeros((*(3 * p for p in self.degrees), len(spans)))
-        for a in range(3):
-            add_products(f_u[a], cross[a], 1.0, determinant)
+        for one, other in zip(f_u, cross, strict=True):
+            add_products(one, other, 1.0, determinant)
         determinant *= self.unscale
-        return determinant, _permanent(np.stack(sizes, axis=1))
+        (a, b, c), (d, e, f), (g, h, i) = np.stack(sizes, axis=1)
+        return determinant, a * (e * i + f * h) + b * (d * i + f * g) + c * (d * h + e * g)
 
     def errors(self, permanents: Array, depth: int = 0) -> Array:
-        """Bound of the rounding error in the coefficients, `depth` halvings included: (k,).
+        """Return a bound of the rounding error in the coefficients, `depth` halvings included: (k,).
 
         A halving is one product with weights that sum to 1 a direction: as many roundings as it has terms.
         """
         return _gamma(self.roundings + depth * sum(3 * p for p in self.degrees)) * permanents + _UNDERFLOW
 
     def _derivative(self, b: int, spans: IntArray) -> tuple[Array, Array]:
-        """The b-th derivative on spans (k, 3): scaled Bernstein form (3, n_0, n_1, n_2, k), magnitudes (3, k)."""
+        """Return the b-th derivative on spans (k, 3): scaled Bernstein form (3, n_0, n_1, n_2, k), sizes (3, k)."""
         (first_u, to_u), (first_v, to_v), (first_w, to_w) = self.bases[b]
         row, column, layer = spans.T
         rows = (first_u[row] + np.arange(to_u.shape[1])[:, None])[:, None, None]  # (n_0, 1, 1, k)
@@ -98,14 +95,13 @@ class DeterminantForm:
 
 
 def corners_of(values: Array, first: int = 0) -> Array:
-    """Those coefficients that are values at corners, (..., 2, 2, 2, ...); directions: three axes from `first` on."""
+    """Return the coefficients that are values at corners, (..., 2, 2, 2, ...), of the three axes from `first` on."""
     steps = (slice(None, None, n - 1) for n in values.shape[first : first + 3])
-    picked: Array = values[(slice(None),) * first + tuple(steps)]
-    return picked
+    return np.asarray(values[(slice(None),) * first + tuple(steps)])
 
 
 def _differences(points: Array, knots: Array, degree: int, axis: int) -> tuple[Array, IntArray]:
-    """Control points (3, ...) of the derivative along a parametric axis (The NURBS Book, eq. 3.7): m, e of m * 2**e.
+    """Return control points (3, ...) of the derivative along an axis (The NURBS Book, eq. 3.7): m, e of m * 2**e.
 
     Every m is 0 or in [1/4, 1), so that no product underflows.
     """
@@ -123,7 +119,7 @@ def _differences(points: Array, knots: Array, degree: int, axis: int) -> tuple[A
 
 
 def _to_unit_magnitude(derivatives: list[tuple[Array, IntArray]]) -> tuple[list[Array], int]:
-    """The three derivatives' control points m * 2**e / 2**(r_a + c_b), and the sum of all r_a and c_b.
+    """Return the three derivatives' control points m * 2**e / 2**(r_a + c_b), and the sum of all r_a and c_b.
 
     r_a belongs to a component and c_b to a derivative. All magnitudes are below 1, and in each row and each column of J
     some reach 1/4. This is the only rounding: what is below 2**-1022 then is off by at most 2**-1075.
@@ -137,21 +133,14 @@ def _to_unit_magnitude(derivatives: list[tuple[Array, IntArray]]) -> tuple[list[
 
 
 def _scaled_extraction(knots: Array, degree: int, derivative: bool) -> tuple[IntArray, Array]:
-    """Extraction to scaled Bernstein form for the basis, or for the basis of its derivative."""
+    """Return the extraction to scaled Bernstein form for the basis, or for the basis of its derivative."""
     lowered = int(derivative)
     first, weights = extraction(knots[lowered : len(knots) - lowered], degree - lowered)
     return first, weights * binomials(degree - lowered)[:, None]
 
 
-def _permanent(sizes: Array) -> Array:
-    """Permanents of matrices (3, 3, k): (k,)."""
-    (a, b, c), (d, e, f), (g, h, i) = sizes
-    permanents: Array = a * (e * i + f * h) + b * (d * i + f * g) + c * (d * h + e * g)
-    return permanents
-
-
 def _roundings(degrees: tuple[int, int, int]) -> int:
-    """How many rounding errors a Bernstein coefficient of det J passes through, at most.
+    """Return how many rounding errors a Bernstein coefficient of det J passes through, at most.
 
     Write u for the unit roundoff and gamma_n = n u / (1 - n u); a chain of n roundings changes a number by a factor
     within 1 +- gamma_n (Higham, "Accuracy and Stability of Numerical Algorithms", lemma 3.1). Control points and
@@ -181,5 +170,5 @@ def _roundings(degrees: tuple[int, int, int]) -> int:
 
 
 def _gamma(n: int) -> float:
-    """Higham's gamma_n, with one percent for the rounding errors of the bound itself."""
+    """Return Higham's gamma_n, with one percent for the rounding errors of the bound itself."""
     return 1.01 * n * _UNIT_ROUNDOFF / (1.0 - n * _UNIT_ROUNDOFF)

@@ -1,20 +1,16 @@
 """Certificate: a proof that det J of a trivariate spline is positive on the whole cube, or a point where it is not.
 
-On every span det J is a polynomial of degree 3 p - 1 a direction, and its Bernstein coefficients bound it. All of them
-positive: proved. A corner coefficient is a value of det J: negative there, folded. Else the span is cut into eight and
-looked at again. (Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys.
-233, 2013, section 3.) "Positive" and "negative" mean by more than a bound of all rounding errors (determinant.py).
+The Bernstein coefficients of det J bound it on every span, those at its corners are values (docs/method.md, section 4;
+Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys. 233, 2013, section
+3). "Positive" and "negative" mean by more than a bound of all rounding errors (determinant.py).
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Mask
 from ..spline.bernstein import split
 from ..spline.volume import BSplineVolume
 from .determinant import CHUNK, DeterminantForm, corners_of
@@ -80,12 +76,12 @@ class _Pieces:
     values: Array  # (k, d_u, d_v, d_w)
     permanents: Array  # (k,)
 
-    def subset(self, rows: NDArray[np.bool_] | slice) -> _Pieces:
-        """The pieces that a mask or a slice picks."""
+    def subset(self, rows: Mask | slice) -> "_Pieces":
+        """Return the pieces that a mask or a slice picks."""
         return _Pieces(self.depth, self.spans[rows], self.origins[rows], self.values[rows], self.permanents[rows])
 
-    def halved(self) -> _Pieces:
-        """Each piece as eight."""
+    def halved(self) -> "_Pieces":
+        """Return each piece as eight."""
         values = split(self.values)
         origins = 2 * self.origins[:, None] + np.indices((2, 2, 2)).reshape(3, 8).T  # (k, 8, 3)
         return _Pieces(
@@ -129,7 +125,7 @@ class _Search:
 
     @property
     def target(self) -> float:
-        """A bound of det J above this is good enough."""
+        """Return the bound of det J above which a proof is tight enough."""
         return max(0.0, _TIGHT * self.known)
 
     def _settle(self, pieces: _Pieces) -> _Pieces:
@@ -149,7 +145,7 @@ class _Search:
         self.lowest = min(self.lowest, float(bounds[done].min(initial=np.inf)))
         return pieces.subset(~done)
 
-    def _record_folds(self, pieces: _Pieces, corners: Array, folded: NDArray[np.bool_]) -> None:
+    def _record_folds(self, pieces: _Pieces, corners: Array, folded: Mask) -> None:
         self.closed[pieces.spans[folded]] = True
         row, corner = np.unravel_index(int(corners.argmin()), corners.shape)
         if folded[row] and corners[row, corner] < self.deepest:
@@ -158,7 +154,7 @@ class _Search:
             self.worst_piece = (pieces.depth, int(pieces.spans[row]), pieces.origins[row], place)
 
     def witness(self, volume: BSplineVolume) -> tuple[float, float, float] | None:
-        """Parameters of the worst fold found.
+        """Return the parameters of the worst fold found.
 
         Derivatives may jump between spans, and parameters are rounded: where det J as evaluated there is positive, a
         point a little inside the piece, where det J is negative by continuity, is returned.

@@ -9,14 +9,11 @@ A control net bounds its patch, and its differences bound the derivatives, so ea
 with room for their rounding errors.
 """
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Mask
 from ..cube.cube import VARYING_AXES
-from .bezier_patches import Mask, Pieces, as_rows, contact
+from .bezier_patches import Pieces, as_rows, contact
 
 _CHUNK = 4096  # pairs at a time
 _NEWTON_STEPS = 40  # towards a separating plane
@@ -26,7 +23,7 @@ _LIFT = 1e-14  # of the shares' sum, onto a Hessian's diagonal: the vectors may 
 
 
 def settled(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
-    """For each pair (k, 2): is it proved that the two meet only where they are joined."""
+    """Return for each pair (k, 2) whether it is proved that the two meet only where they are joined."""
     done = np.zeros(len(pairs), dtype=bool)
     for start in range(0, len(pairs), _CHUNK):
         chunk = slice(start, start + _CHUNK)
@@ -41,22 +38,19 @@ def settled(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
     return done
 
 
-def _own_proof(pieces: Pieces, piece: NDArray[np.int64], _: NDArray[np.int64], error: float) -> Mask:
+def _own_proof(pieces: Pieces, piece: IntArray, _: IntArray, error: float) -> Mask:
     nets = pieces.nets[piece]
     return _monotone(_differences(nets, 1), _differences(nets, 2), error, error)
 
 
-def _edge_proof(pieces: Pieces, first: NDArray[np.int64], second: NDArray[np.int64], error: float) -> Mask:
+def _edge_proof(pieces: Pieces, first: IntArray, second: IntArray, error: float) -> Mask:
     """Return where two pieces with a common edge, unfolded side by side into one rectangle, are monotone together.
 
     Axis 1 of the nets leads from the first over the edge into the second, axis 2 along the edge.
     """
     edge = np.maximum(pieces.low[first], pieces.low[second])  # its lower end
     along = np.argmax(edge < np.minimum(pieces.high[first], pieces.high[second]), axis=1)
-    nets = [
-        _turned(pieces, first, along, edge, edge_last=True),
-        _turned(pieces, second, along, edge, edge_last=False),
-    ]
+    nets = [_turned(pieces, part, along, edge, last) for part, last in ((first, True), (second, False))]
     by_edge = np.concatenate([_differences(net, 2) for net in nets], axis=1)
     # Each side may have a parameter of its own, the unfolded pair stays a rectangle: with equal widths the mean over
     # both sides points out of the solid where the edge is as sharp as a knife's.
@@ -68,15 +62,13 @@ def _edge_proof(pieces: Pieces, first: NDArray[np.int64], second: NDArray[np.int
 
 
 def _width(vectors: Array, directions: Array) -> Array:
-    """Lengths (n,) of the components of vectors (n, 3) across directions (n, 3)."""
+    """Return the lengths (n,) of the components of vectors (n, 3) across directions (n, 3)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.linalg.norm(np.cross(vectors, directions), axis=1) / np.linalg.norm(directions, axis=1))
 
 
-def _turned(
-    pieces: Pieces, rows: NDArray[np.int64], along: NDArray[np.int64], edge: NDArray[np.int64], *, edge_last: bool
-) -> Array:
-    """Nets whose axis 2 runs `along` the shared edge, and which have it last, or first, on axis 1."""
+def _turned(pieces: Pieces, rows: IntArray, along: IntArray, edge: IntArray, edge_last: bool) -> Array:
+    """Return nets whose axis 2 runs `along` the shared edge, and which have it last, or first, on axis 1."""
     nets, tangents = pieces.nets[rows], VARYING_AXES[pieces.axes[rows]]
     swap = tangents[:, 0] == along
     nets = np.where(swap[:, None, None, None], nets.swapaxes(1, 2), nets)
@@ -85,19 +77,18 @@ def _turned(
     return np.where((at_high == edge_last)[:, None, None, None], nets, nets[:, ::-1])
 
 
-def _corner_proof(pieces: Pieces, first: NDArray[np.int64], second: NDArray[np.int64], error: float) -> Mask:
-    """All vectors from the first to the corner, and from the corner into the second, have a direction in common."""
+def _corner_proof(pieces: Pieces, first: IntArray, second: IntArray, error: float) -> Mask:
+    """Return where all vectors from the first to the corner, and from it into the second, have a common direction."""
     corner = np.maximum(pieces.low[first], pieces.low[second])
-    before = _corner_last(pieces, first, corner)
-    behind = _corner_last(pieces, second, corner)
+    before, behind = (_corner_last(pieces, part, corner) for part in (first, second))
     vectors = np.concatenate([before[:, -1:] - before[:, :-1], behind[:, :-1] - behind[:, -1:]], axis=1)
     normal = _half_space(vectors)
     proved: Mask = _along(vectors, normal).min(axis=1) > 4.0 * error * np.abs(normal).sum(axis=1)
     return proved
 
 
-def _corner_last(pieces: Pieces, rows: NDArray[np.int64], corner: NDArray[np.int64]) -> Array:
-    """Control points (n, (q + 1)^2, 3), the one at the shared corner last."""
+def _corner_last(pieces: Pieces, rows: IntArray, corner: IntArray) -> Array:
+    """Return control points (n, (q + 1)^2, 3), the one at the shared corner last."""
     nets = pieces.nets[rows]
     at_high = np.take_along_axis(pieces.high[rows] == corner, VARYING_AXES[pieces.axes[rows]], axis=1)
     nets = np.where(at_high[:, 0, None, None, None], nets, nets[:, ::-1])
@@ -106,7 +97,7 @@ def _corner_last(pieces: Pieces, rows: NDArray[np.int64], corner: NDArray[np.int
 
 
 def _differences(nets: Array, axis: int) -> Array:
-    """Control vectors (n, k, 3) of the derivative, up to the degree as a factor."""
+    """Return control vectors (n, k, 3) of the derivative, up to the degree as a factor."""
     return as_rows(np.diff(nets, axis=axis))
 
 
@@ -140,7 +131,7 @@ def _entry_bounds(vectors: Array, own: Array, other: Array, error: Array | float
 
 
 def _along(vectors: Array, direction: Array) -> Array:
-    """Products (n, k) of vectors (n, k, 3) with a direction (n, 3) each."""
+    """Return the products (n, k) of vectors (n, k, 3) with a direction (n, 3) each."""
     return np.asarray(np.einsum("nkc,nc->nk", vectors, direction))
 
 
@@ -150,18 +141,13 @@ def _apart(a: Array, b: Array, error: float) -> Mask:
     With a fourth coordinate, and all of a negated, that is a half-space through the origin.
     """
     middle = a.mean(axis=1, keepdims=True)
-    size = np.abs(b - middle).max(axis=(1, 2))
-    sides = [_with_last(middle - a, size), _with_last(b - middle, -size)]
-    normal = _half_space(np.concatenate(sides, axis=1))[:, :3]
+    places = np.concatenate([middle - a, b - middle], axis=1)
+    size = np.abs(b - middle).max(axis=(1, 2))[:, None]
+    last = np.where(np.arange(places.shape[1]) < a.shape[1], size, -size)
+    normal = _half_space(np.concatenate([places, last[..., None]], axis=2))[:, :3]
     gap = _along(b, normal).min(axis=1) - _along(a, normal).max(axis=1)
     proved: Mask = gap > 4.0 * error * np.abs(normal).sum(axis=1)
     return proved
-
-
-def _with_last(vectors: Array, value: Array) -> Array:
-    """Return vectors (n, k, 3) with a value (n,) as their fourth coordinate."""
-    column = np.broadcast_to(value[:, None, None], (*vectors.shape[:2], 1))
-    return np.concatenate([vectors, column], axis=2)
 
 
 def _half_space(vectors: Array) -> Array:

@@ -1,19 +1,19 @@
-"""BoundaryMap: the input's surface laid on the six faces of the parameter cube (boundary.npz)."""
+"""BoundaryMap: the surface laid on the six faces of the cube, one-to-one, cut along its edges (boundary.npz)."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..arrays import Array, IntArray, Mask
+from ..config import LAYOUT, LayoutConfig
 from ..files import load_arrays, save_arrays
 from ..spline.bspline import real_array
-from ..spline.volume import FACE_NAMES
-from .flips import orientation
+from ..spline.volume import FACE_NAMES, BSplineVolume
+from .cube import damped_fit, snap
+from .cutting import CutMesh, cut_along_rays
+from .flips import orientation, untangle
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class BoundaryMap:
 
     vertices: Array
     parameters: Array
-    faces: NDArray[np.int64]
+    faces: IntArray
 
     def __post_init__(self) -> None:
         vertices = _rows_of_three(self.vertices, "vertices")
@@ -55,7 +55,7 @@ class BoundaryMap:
         object.__setattr__(self, "faces", faces.astype(np.int64))
 
     @cached_property
-    def cube_faces(self) -> NDArray[np.int64]:
+    def cube_faces(self) -> IntArray:
         """Return the cube face of each triangle, (m,) indices into FACE_NAMES; the first of two on an edge.
 
         Raises ValueError where the corners of a triangle share no face.
@@ -69,7 +69,7 @@ class BoundaryMap:
             )
         return np.argmax(shared, axis=1).astype(np.int64)
 
-    def flipped(self) -> NDArray[np.int64]:
+    def flipped(self) -> IntArray:
         """Return the indices of the triangles that do not face outwards, seen from the cube's centre.
 
         A triangle without area, within rounding error, counts as flipped.
@@ -82,7 +82,7 @@ class BoundaryMap:
         save_arrays(path, vertices=self.vertices, parameters=self.parameters, faces=self.faces)
 
     @classmethod
-    def load(cls, path: str | Path) -> BoundaryMap:
+    def load(cls, path: str | Path) -> "BoundaryMap":
         """Read boundary.npz. Raises FileNotFoundError, or ValueError naming what is wrong with the file."""
         data = load_arrays(path, ("vertices", "parameters", "faces"))
         try:
@@ -100,6 +100,77 @@ def _rows_of_three(values: Array, name: str) -> Array:
     return rows
 
 
-def _on_faces(parameters: Array) -> NDArray[np.bool_]:
+def _on_faces(parameters: Array) -> Mask:
     """Return which of the six cube faces each parameter lies on, (n, 6) in the order of FACE_NAMES."""
     return np.stack([parameters == 0.0, parameters == 1.0], axis=-1).reshape(-1, len(FACE_NAMES))
+
+
+def boundary_map(
+    volume: BSplineVolume, vertices: Array, faces: IntArray, parameters: Array, layout: LayoutConfig = LAYOUT
+) -> BoundaryMap:
+    """Cut the surface (vertices (n, 3), user's units) where its parameters (n, 3) pass an edge of the cube.
+
+    Parameters come from closest points of the volume's boundary, which may turn a few triangles over where the spline
+    smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
+    """
+    placed = untangle(parameters, faces, layout)
+    for number in range(layout.nudges):
+        cut = cut_along_rays(placed, faces, layout.same)
+        spread = snap(cut.carry(placed))
+        spread[: len(placed)] = placed
+        plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
+        turned = plain.flipped()
+        if not len(turned):
+            break
+        placed = _nudged(placed, cut, turned, number, layout.nudge)
+    closer = (
+        plain  # then each cut vertex moves along its mesh edge, its parameter along the cube's, until F(p) is close
+    )
+    for _ in range(layout.settle_steps):
+        share, moved = _settled_once(volume, cut, closer, len(vertices), layout)
+        cut, closer = _without_flips(vertices, cut, closer, share, moved, layout.undo_rounds)
+    return plain if len(closer.flipped()) > len(plain.flipped()) else closer
+
+
+def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int, nudge: float) -> Array:
+    """Shift the vertices (n, 3) around degenerate pieces a little: a mesh edge ran through a corner of the cube."""
+    corners = np.unique(cut.faces[turned])
+    around = np.unique(np.concatenate([corners[corners < len(placed)], cut.parents[corners].ravel()]))
+    around = around[around < len(placed)]
+    moved = placed.copy()
+    moved[around] += nudge * np.random.default_rng(number).uniform(-1.0, 1.0, (len(around), 3))
+    return snap(moved)
+
+
+def _settled_once(
+    volume: BSplineVolume, cut: CutMesh, best: BoundaryMap, count: int, layout: LayoutConfig
+) -> tuple[Array, Array]:
+    """Return shares (n,) and parameters (n, 3) after a Gauss-Newton step in these two unknowns of each cut vertex.
+
+    The first `count` vertices are those of the input. Corners of the cube and cuts within a face keep their parameter.
+    """
+    where, new = best.parameters[count:], best.vertices[count:]
+    inner = (where > 0.0) & (where < 1.0)  # (k, 3)
+    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; ends of cuts within a face stay
+    start, end = best.vertices[cut.parents[count:].T]
+    along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
+    shift, slide = damped_fit(end - start, -along_cube, volume(where) - new, layout.settle_damping)
+    share, moved = cut.share.copy(), best.parameters.copy()
+    margin = layout.settle_margin
+    share[count:] = np.clip(share[count:] + shift, margin, 1.0 - margin)
+    moved[count:] = np.where(inner, np.clip(where + slide[:, None], margin**2, 1.0 - margin**2), where)
+    return share, moved
+
+
+def _without_flips(
+    vertices: Array, cut: CutMesh, best: BoundaryMap, share: Array, moved: Array, rounds: int
+) -> tuple[CutMesh, BoundaryMap]:
+    """Undo the steps to `share` and `moved` at flipped triangles; return the old cuts and map if some stay flipped."""
+    for _ in range(rounds):
+        trial = replace(cut, share=share)
+        candidate = BoundaryMap(trial.carry(vertices), moved, cut.faces)
+        turned = np.setdiff1d(cut.faces[candidate.flipped()].ravel(), np.arange(len(vertices)))
+        if not turned.size:
+            return trial, candidate
+        share[turned], moved[turned] = cut.share[turned], best.parameters[turned]
+    return cut, best

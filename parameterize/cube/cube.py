@@ -1,10 +1,8 @@
-"""The unit cube: its corners, edges and faces, and how points are laid on its boundary.
+"""The unit cube: its corners, edges and faces, how points are laid on its boundary, and steps on its faces.
 
 A face has the number 2 * axis + side: `axis` is the parameter that is constant on it, and `side` its value there. In
 the order of their numbers the faces are called u0, u1, v0, v1, w0, w1.
 """
-
-from __future__ import annotations
 
 from typing import Any
 
@@ -50,3 +48,20 @@ def snap(parameters: Array) -> Array:
     projected = project_radially(parameters - 0.5)
     at_side = np.abs(projected) >= 0.5 - NEAR_EDGE
     return np.where(at_side, 0.5 + 0.5 * np.sign(projected), 0.5 + projected)
+
+
+def damped_fit(first: Array, second: Array, right: Array, damping: float) -> tuple[Array, Array]:
+    """Return the coefficients a, b (k,) that minimise |a first + b second - right|, for vectors (k, 3).
+
+    That is the linear system in every Gauss-Newton step on a face towards a closest point.
+    The diagonal of the normal equations grows by `damping` times its sum: the two directions may be parallel. The
+    vectors are first scaled by a power of two, exactly, so that nothing overflows whatever their unit.
+    """
+    exponent = -int(np.frexp(max(np.abs(first).max(initial=0.0), np.abs(second).max(initial=0.0)))[1])
+    first, second, right = (np.ldexp(vectors, exponent) for vectors in (first, second, right))
+    aa, bb, ab = (first * first).sum(1), (second * second).sum(1), (first * second).sum(1)
+    ra, rb = (first * right).sum(1), (second * right).sum(1)
+    lift = damping * (aa + bb) + 1e-150  # no more than keeps the determinant of two zero vectors positive
+    aa, bb = aa + lift, bb + lift
+    determinant = aa * bb - ab * ab
+    return (bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant

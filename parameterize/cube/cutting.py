@@ -5,16 +5,20 @@ size and no smaller than the third. Splitting the triangles that such a half pla
 edges on it; seen from the centre the mesh then resolves the 12 edges and 8 corners of the cube.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..surface.edges import edge_table
+from ..surface.geometry import edge_table
 
 _PLANES = [(a, b, sign) for a, b in ((0, 1), (0, 2), (1, 2)) for sign in (1.0, -1.0)]
+_PIECES = (  # of a triangle 0, 1, 2 with so many new vertices: 3 on 0-1, 4 on 1-2, 5 on 2-0; of two, on 0-1 and 2-0
+    [(0, 1, 2)],
+    [(0, 3, 2), (3, 1, 2)],
+    [(0, 3, 5), (3, 1, 2), (3, 2, 5)],
+    [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,32 +105,15 @@ def split_edges(faces: IntArray, edges: IntArray, first_new: int) -> IntArray:
 
     One split edge of a triangle gives two triangles, two give three, three give four.
     """
-    lookup = {(int(i), int(j)): first_new + k for k, (i, j) in enumerate(edges)}
+    lookup = {pair: first_new + k for k, (i, j) in enumerate(edges.tolist()) for pair in ((i, j), (j, i))}
     touched = np.zeros(int(faces.max()) + 1, dtype=bool)
     touched[edges.ravel()] = True
     candidate = touched[faces].sum(axis=1) >= 2
-    result = [faces[~candidate]]
-    pieces: list[tuple[int, int, int]] = []
+    pieces = []
     for face in faces[candidate].tolist():
-        pieces.extend(_split_triangle(face, lookup))
-    result.append(np.array(pieces, dtype=np.int64).reshape(-1, 3))
-    return np.concatenate(result)
-
-
-def _split_triangle(face: list[int], lookup: dict[tuple[int, int], int]) -> list[tuple[int, int, int]]:
-    middle = [lookup.get((min(face[k], face[k - 2]), max(face[k], face[k - 2]))) for k in range(3)]  # edge k -> k + 1
-    count = sum(m is not None for m in middle)
-    if count == 0:
-        return [(face[0], face[1], face[2])]
-    if count == 3:
-        (a, b, c), (ab, bc, ca) = face, middle
-        assert ab is not None and bc is not None and ca is not None
-        return [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    turn = next(k for k in range(3) if middle[k] is not None and (count == 1 or middle[k - 1] is not None))
-    a, b, c = face[turn], face[turn - 2], face[turn - 1]
-    first, last = middle[turn], middle[turn - 1]  # on a-b and, for two cuts, on c-a
-    assert first is not None
-    if count == 1:
-        return [(a, first, c), (first, b, c)]
-    assert last is not None
-    return [(a, first, last), (first, b, c), (first, c, last)]
+        new = [lookup.get((face[k], face[k - 2]), -1) for k in range(3)]  # on the edges k -> k + 1
+        count = sum(vertex >= 0 for vertex in new)
+        turn = next((k for k in range(3) if new[k] >= 0 and (count == 1 or new[k - 1] >= 0)), 0)
+        six = face[turn:] + face[:turn] + new[turn:] + new[:turn]
+        pieces += [[six[place] for place in piece] for piece in _PIECES[count]]
+    return np.concatenate([faces[~candidate], np.array(pieces, dtype=np.int64).reshape(-1, 3)])

@@ -1,8 +1,7 @@
 """Corners of the cube on the surface, 12 edge paths between them, six patches bounded by these (section 4.4.1)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -10,8 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from ..arrays import Array, IntArray
-from ..config import LAYOUT
-from ..surface.edges import connected, directed_edges, edge_table
+from ..config import LAYOUT, LayoutConfig
+from ..surface.geometry import connected, directed_edges, edge_table
 from .cube import CORNERS, EDGES, face_number, project_radially
 from .cutting import CutMesh, cut_along_rays
 
@@ -39,31 +38,30 @@ def choose_corners(mapped: Array) -> IntArray:
     reach = (mapped - 0.5) @ (CORNERS - 0.5).T  # (n, 8)
     candidates = np.unique(np.argsort(-reach, axis=0)[:8])
     rows, columns = linear_sum_assignment(-reach[candidates])
-    result = np.empty(8, dtype=np.int64)
-    result[columns] = candidates[rows]
-    return result
+    return candidates[rows[np.argsort(columns)]]
 
 
-def cut_surface(mapped: Array, faces: IntArray, corners: IntArray) -> CubeSurface:
+def cut_surface(mapped: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig = LAYOUT) -> CubeSurface:
     """Cut the mapped surface (n, 3), close to the cube's boundary, along paths between its eight corners.
 
     Raises PathError where the paths do not bound six discs, which happens only far from a cube, or where the corners
     come in the order of a mirrored cube.
     """
-    cut = cut_along_rays(mapped, faces, LAYOUT.path_snap)
+    cut = cut_along_rays(mapped, faces, layout.path_snap)
     position = cut.carry(mapped)
-    paths = _trace_paths(position, cut.faces, corners)
+    paths = _trace_paths(position, cut.faces, corners, layout)
     labels = _patches(cut.faces, paths, corners)
-    if _mirrored(cut.faces, labels, paths[0]):
+    left = np.flatnonzero((directed_edges(cut.faces) == paths[0][:2]).all(axis=1))[0] // 3
+    if labels[left] != 0:  # u0 lies to the left of the path from (0,0,0) to (0,0,1), seen from outside
         raise PathError("the corners are those of a mirrored cube: swap corners 0-3 with 4-7, or let them be chosen")
     return CubeSurface(cut, corners, paths, labels)
 
 
-def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
+def _trace_paths(position: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig) -> list[IntArray]:
     """Return disjoint paths along mesh edges, one for each cube edge; one that is blocked is traced first next time."""
     order = list(range(len(EDGES)))
-    for _ in range(LAYOUT.orders):
-        paths, blocked = _trace_in_order(position, faces, corners, order)
+    for _ in range(layout.orders):
+        paths, blocked = _trace_in_order(position, faces, corners, order, layout)
         if blocked is None:
             return [paths[k] for k in range(len(EDGES))]
         order.remove(blocked)
@@ -73,7 +71,7 @@ def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[In
 
 
 def _trace_in_order(
-    position: Array, faces: IntArray, corners: IntArray, order: list[int]
+    position: Array, faces: IntArray, corners: IntArray, order: list[int], layout: LayoutConfig
 ) -> tuple[dict[int, IntArray], int | None]:
     """Return the shortest paths, which cost more away from their cube edge, and the first edge that found no way."""
     edges = edge_table(faces)[0]
@@ -88,7 +86,7 @@ def _trace_in_order(
         usable[corners[[i, j]]] = True
         keep = usable[edges].all(axis=1)
         stray = _distance_to_segment(radial, CORNERS[i], CORNERS[j])[edges[keep]].max(axis=1)
-        cost = (length[keep] + 1e-9) * (1.0 + LAYOUT.stray * stray / LAYOUT.stray_cell)
+        cost = (length[keep] + 1e-9) * (1.0 + layout.stray * stray / layout.stray_cell)
         a, b = edges[keep].T
         graph = coo_array((cost, (a, b)), shape=(len(position),) * 2).tocsr()
         _, previous = dijkstra(graph, directed=False, indices=corners[i], return_predecessors=True)
@@ -109,9 +107,7 @@ def _distance_to_segment(points: Array, start: Array, end: Array) -> Array:
 
 def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntArray:
     """Return the cube face (m,) of each triangle: the paths bound six patches, each known by its four corners."""
-    on_path = {
-        tuple(sorted(pair)) for path in paths for pair in zip(path[:-1].tolist(), path[1:].tolist(), strict=True)
-    }
+    on_path = {tuple(sorted(pair)) for path in paths for pair in pairwise(path.tolist())}
     sides = np.sort(directed_edges(faces), axis=1)
     order = np.lexsort(sides.T)
     pairs, owners = sides[order][::2], order.reshape(-1, 2) // 3  # closed mesh: every edge has two triangles
@@ -121,34 +117,23 @@ def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntAr
         raise PathError(f"the edge paths bound {patch.max() + 1} patches, not 6")
     labels = np.full(6, -1)
     for k in range(6):
-        inside = np.isin(corners, faces[patch == k])
-        if inside.sum() != 4:
-            raise PathError(f"a patch between the edge paths has {inside.sum()} corners, not 4")
-        spread = np.ptp(CORNERS[inside], axis=0)
-        axis = int(np.argmin(spread))
-        labels[k] = face_number(axis, int(CORNERS[inside][0, axis]))
+        inside = CORNERS[np.isin(corners, faces[patch == k])]
+        if len(inside) != 4:
+            raise PathError(f"a patch between the edge paths has {len(inside)} corners, not 4")
+        axis = int(np.argmin(np.ptp(inside, axis=0)))
+        labels[k] = face_number(axis, int(inside[0, axis]))
     if len(set(labels.tolist())) != 6:
         raise PathError("two patches belong to the same face of the cube")
     return np.asarray(labels[patch], dtype=np.int64)
 
 
-def _mirrored(faces: IntArray, labels: IntArray, path: IntArray) -> bool:
-    """Return whether the face to the left of the path from corner (0,0,0) to (0,0,1), seen from outside, is not u0."""
-    sides = directed_edges(faces)
-    left = np.flatnonzero((sides == path[:2]).all(axis=1))[0] // 3
-    return bool(labels[left] != 0)
-
-
 def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array, IntArray]:
     """Return path vertices (k,), their targets on the cube's edges by arc length (k, 3), neighbouring pairs (s, 2)."""
-    vertices: list[IntArray] = []
-    targets: list[Array] = []
-    following: list[IntArray] = []
+    targets = []
     for (i, j), path in zip(EDGES, paths, strict=True):
         steps = np.linalg.norm(np.diff(mapped[path], axis=0), axis=1)
         share = np.concatenate([[0.0], np.cumsum(steps)]) / max(steps.sum(), 1e-12)
-        start = sum(len(path) for path in vertices)
-        vertices.append(path)
         targets.append((1.0 - share)[:, None] * CORNERS[i] + share[:, None] * CORNERS[j])
-        following.append(start + np.stack([np.arange(len(path) - 1), np.arange(1, len(path))], axis=1))
-    return np.concatenate(vertices), np.concatenate(targets), np.concatenate(following)
+    ends = np.cumsum([len(path) for path in paths]) - 1  # no vertex follows the last one of a path
+    starts = np.delete(np.arange(ends[-1] + 1), ends)
+    return np.concatenate(paths), np.concatenate(targets), np.stack([starts, starts + 1], axis=1)

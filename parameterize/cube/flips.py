@@ -1,12 +1,9 @@
 """Layout of a closed surface on the boundary of the cube: places (n, 3) of its points, orientation of its triangles."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array, IntArray
-from ..config import LAYOUT
+from ..arrays import Array, IntArray, Mask
+from ..config import LAYOUT, LayoutConfig
 from .cube import snap
 
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
@@ -27,15 +24,15 @@ def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
     return triple, noise
 
 
-def flipped(places: Array, faces: IntArray) -> NDArray[np.bool_]:
+def flipped(places: Array, faces: IntArray) -> Mask:
     """Return which triangles (m, 3) do not face outwards, with a margin for what later steps round: (m,)."""
     return np.asarray(orientation(places, faces)[0] <= _FLAT)
 
 
-def new_flips(before: Array, after: Array, faces: IntArray) -> NDArray[np.bool_]:
+def new_flips(before: Array, after: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) -> Mask:
     """Return which points (n,) must stay so that no further triangle flips when the others go to `after`."""
     stay, allowed = np.zeros(len(before), dtype=bool), flipped(before, faces)
-    for _ in range(LAYOUT.held_rounds):
+    for _ in range(layout.held_rounds):
         bad = flipped(np.where(stay[:, None], before, after), faces) & ~allowed
         if not bad.any():
             return stay
@@ -43,26 +40,59 @@ def new_flips(before: Array, after: Array, faces: IntArray) -> NDArray[np.bool_]
     return np.ones(len(before), dtype=bool)
 
 
-def untangle(parameters: Array, faces: IntArray, sweeps: int = LAYOUT.sweeps) -> Array:
+def unflip(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) -> Array:
+    """Push the corners of flipped triangles by as little as turns each outwards, sweep by sweep; some may be left.
+
+    For a few flips in a layout whose points should stay where they are: `untangle` flattens whole neighbourhoods. Seen
+    from the centre, the volume under a triangle is linear in each corner, so one Newton step a triangle is taken, and
+    the mean of these at every corner.
+    """
+    direction = _directions(parameters)
+    volumes = np.abs(np.linalg.det(direction[faces]))
+    goal = layout.unflipped * float(np.median(volumes))
+    for _ in range(layout.pushes):
+        bad = flipped(0.5 + direction, faces)
+        if not bad.any():
+            break
+        used = faces[bad]
+        corners = direction[used]  # (k, 3, 3)
+        slopes = np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])
+        volume = np.sum(corners[:, 0] * slopes[:, 0], axis=1)
+        slopes -= np.sum(slopes * corners, axis=2, keepdims=True) * corners  # along the sphere
+        size = (goal - volume) / np.maximum(np.sum(slopes**2, axis=(1, 2)), _FLAT)
+        count = np.bincount(used.ravel(), minlength=len(direction))[:, None]
+        pushed = size[:, None, None] * slopes
+        total = [np.bincount(used.ravel(), pushed[:, :, c].ravel(), len(direction)) for c in range(3)]
+        direction = direction + np.stack(total, axis=1) / np.maximum(count, 1)
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    return snap(0.5 + direction)
+
+
+def untangle(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) -> Array:
     """Relax the vertices around flipped triangles until none is left, moving as few and as little as possible.
 
     A relaxed vertex goes half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
     are flipped at the time move; where they stay so, rings of neighbours join, one after every `patience` sweeps. After
-    `sweeps` some may be left.
+    all sweeps some may be left.
     """
     i, j = faces.ravel(), faces[:, [1, 2, 0]].ravel()  # closed surface: both directions appear
-    direction = parameters - 0.5
-    direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    for sweep in range(sweeps):
+    direction = _directions(parameters)
+    for sweep in range(layout.sweeps):
         bad = flipped(0.5 + direction, faces)
         if not bad.any():
             break
         free = np.zeros(len(parameters), dtype=bool)
         free[faces[bad].ravel()] = True
-        for _ in range(sweep // LAYOUT.patience):
+        for _ in range(sweep // layout.patience):
             free[i[free[j]]] = True
         used = free[i]
         total = np.stack([np.bincount(i[used], direction[j[used], c], len(free)) for c in range(3)], axis=1)[free]
         moved = direction[free] + total / np.linalg.norm(total, axis=1, keepdims=True)
         direction[free] = moved / np.linalg.norm(moved, axis=1, keepdims=True)
     return snap(0.5 + direction)
+
+
+def _directions(parameters: Array) -> Array:
+    """Return unit vectors from the cube's centre to its points (n, 3)."""
+    direction = parameters - 0.5
+    return np.asarray(direction / np.linalg.norm(direction, axis=1, keepdims=True))

@@ -5,17 +5,15 @@ with every inner vertex a convex combination of its neighbours the map onto that
 Floater, Math. Comp. 72, 2003). The combinations reproduce the network's places wherever those are one-to-one already.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, eye_array
 from scipy.sparse.linalg import splu
 
-from ..arrays import Array, IntArray
-from ..surface.edges import edge_table
+from ..arrays import Array, IntArray, Mask
+from ..config import LAYOUT, LayoutConfig
+from ..surface.geometry import edge_table
 from .cube import axis_and_side, tangent_axes
 from .cutting import split_edges
 from .edge_paths import cut_surface, edge_targets
@@ -33,12 +31,14 @@ class Layout:
     places: Array
 
 
-def lay_out(mapped: Array, vertices: Array, faces: IntArray, corners: IntArray) -> Layout:
+def lay_out(
+    mapped: Array, vertices: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig = LAYOUT
+) -> Layout:
     """Cut the surface (n, 3) along the paths that the mapped one (n, 3) suggests; lay its patches out on the cube.
 
     corners: (8,) vertices. Raises PathError where the mapped surface is too far from a cube.
     """
-    surface = cut_surface(mapped, faces, corners)
+    surface = cut_surface(mapped, faces, corners, layout)
     vertices, places = surface.cut.carry(vertices), surface.cut.carry(mapped)
     path, target, _ = edge_targets(places, surface.paths)
     places[path] = target
@@ -56,13 +56,13 @@ def lay_out(mapped: Array, vertices: Array, faces: IntArray, corners: IntArray) 
     return Layout(vertices, np.concatenate(pieces), places)
 
 
-def _bridges(patch: IntArray, fixed: NDArray[np.bool_]) -> IntArray:
+def _bridges(patch: IntArray, fixed: Mask) -> IntArray:
     """Return the inner edges (k, 2) between two vertices of the rim: a triangle of such edges could end up flat."""
     edges, count = edge_table(patch)
     return edges[(count == 2) & fixed[edges].all(axis=1)]
 
 
-def _spread(places: Array, vertices: Array, patch: IntArray, fixed: NDArray[np.bool_], face: int) -> None:
+def _spread(places: Array, vertices: Array, patch: IntArray, fixed: Mask, face: int) -> None:
     """Put the inner vertices of a patch (m, 3) on their cube face, in place."""
     axis, end = axis_and_side(face)
     plane = tangent_axes(axis)[:: 1 if end else -1]  # counter-clockwise seen from outside

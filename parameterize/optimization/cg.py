@@ -1,7 +1,5 @@
 """Preconditioned conjugate gradients on torch tensors of any shape, and a preconditioner for tensor-product splines."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from copy import copy
 
@@ -55,18 +53,18 @@ class FastDiagonalization:
         u, v, w = values
         self._inverse = 1.0 / (u[:, None, None] + v[:, None] + w + shift)
 
-    def to(self, dtype: torch.dtype) -> FastDiagonalization:
-        """The same in another precision."""
+    def to(self, dtype: torch.dtype) -> "FastDiagonalization":
+        """Return the same in another precision."""
         other = copy(self)
         other._vectors, other._inverse = tuple(v.to(dtype) for v in self._vectors), self._inverse.to(dtype)
         return other
 
     def __call__(self, residual: Tensor) -> Tensor:
-        """(3, n_u, n_v, n_w) -> the same shape."""
+        """Apply the inverse: (3, n_u, n_v, n_w) -> the same shape."""
         return torch.cat(in_parallel(self._solve, torch.split(residual, 1)))
 
     def _solve(self, residual: Tensor) -> Tensor:
-        """The same for one component (1, n_u, n_v, n_w)."""
+        """Apply it to one component (1, n_u, n_v, n_w)."""
         for axis, vectors in enumerate(self._vectors, start=1):
             residual = along(vectors.T, residual, axis)
         residual = residual * self._inverse

@@ -6,8 +6,6 @@ The nearest sample that faces the opposite way is what it has run into, and the 
 there, as in contact mechanics (node to surface, Wriggers, Computational Contact Mechanics, 2006, chapter 6).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import igl
@@ -35,6 +33,7 @@ class ContactPenalty:
     """Mean over the boundary's samples of (gap - (F(p) - F(q)) . n)_+^2; only the k samples p in contact count.
 
     first, second: rows that yield F(p) and F(q). normals (k, 3): the boundary's at q, outwards. share: of one sample.
+    spans (2 k, 3): where p and q lie.
     """
 
     first: ControlRows
@@ -42,6 +41,7 @@ class ContactPenalty:
     normals: Tensor
     share: float
     gap: float
+    spans: IntArray
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
@@ -88,6 +88,7 @@ def contact_penalty(knots: tuple[Array, Array, Array], degree: int, control: Ten
         torch.as_tensor(normals[facing]),
         1.0 / len(boundary.points),
         gap,
+        np.concatenate([first.spans(), second.spans()]),
     )
 
 

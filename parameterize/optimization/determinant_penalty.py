@@ -8,14 +8,13 @@ Few coefficients fall short of the floor. A coefficient is linear in each of the
 derivative is read from the product of the other two: one row of 3 (p + 1)^3 numbers in the span's Bezier points.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 from torch import Tensor
 
 from ..arrays import Array, IntArray
@@ -29,13 +28,14 @@ _BLOCK = 32  # spans at a time: what they need fits into the cache
 
 @dataclass(frozen=True, eq=False)
 class _Spans:
-    """k spans: their first control points (k, 3) and parametric volumes (k,).
+    """k spans: their first control points (k, 3), parametric volumes (k,), and shares (k,): what a square costs there.
 
     weights (k, 3, p + 1, p + 1): from control points to Bezier points, a direction; back: their transposes.
     """
 
     first: IntArray
     volumes: Array
+    shares: Array
     weights: Array
     back: Array
 
@@ -49,18 +49,20 @@ class _Spans:
 class _Rows:
     """Coefficients below the floor, span by span: by how much (r,), and their derivatives (r, 3, p + 1, ...).
 
-    starts (k + 1,): the first row of each span.
+    shares (r,): what the square of each costs. starts (k + 1,): the first row of each span.
     """
 
     spans: _Spans
     shortfall: Array
+    shares: Array
     rows: Array
     starts: IntArray
 
 
 class SpanBarrier:
-    """Mean over all spans of (floor - coefficient)_+^2, 0 on spans not active; coefficients of det J in Bernstein form.
+    """Mean over all spans of weight * (floor - coefficient)_+^2; coefficients of det J in Bernstein form.
 
+    weights (n_u, n_v, n_w): of the spans, 0 to begin with; a span of positive weight is active.
     knots: the same degree p in the three directions; floor in units of det J.
     """
 
@@ -74,37 +76,52 @@ class SpanBarrier:
         ]
         self._unscale = np.einsum("i,j,k->ijk", *(1.0 / binomials(3 * degree - 1),) * 3)
         self._share = 1.0 / (self._unscale.size * np.prod([len(w) for w in self._widths]))
-        self.active = np.zeros((0, 3), dtype=np.int64)
-        self._pieces: list[_Spans] = []
+        self.weigh(np.zeros([len(w) for w in self._widths]))
 
     def activate(self, spans: NDArray[np.int64]) -> None:
-        """Add spans (k, 3) to the active ones."""
-        self.active = np.unique(np.concatenate([self.active, spans]), axis=0)
-        first = np.stack([e[0][s] for e, s in zip(self._extractions, self.active.T, strict=True)], axis=1)
-        weights = np.stack([e[1][s] for e, s in zip(self._extractions, self.active.T, strict=True)], axis=1)
-        volumes = np.prod([w[s] for w, s in zip(self._widths, self.active.T, strict=True)], axis=0)
+        """Give spans (k, 3) at least the weight 1."""
+        weights = self.weights.copy()
+        weights[tuple(spans.T)] = np.maximum(weights[tuple(spans.T)], 1.0)
+        self.weigh(weights)
+
+    def stiffen(self, spans: NDArray[np.int64], factor: float, most: float) -> None:
+        """Multiply the weights of spans (k, 3) and of their neighbours by a factor, up to `most`, from 1 on.
+
+        With the neighbours: a fold would only move into the next span.
+        """
+        grown = np.minimum(factor * np.maximum(self.weights, 1.0), most)
+        self.weigh(np.where(with_neighbours(spans, self.weights.shape), np.maximum(grown, self.weights), self.weights))
+
+    def weigh(self, weights: Array) -> None:
+        """Take the weights of all spans (n_u, n_v, n_w)."""
+        self.weights = weights
+        active = np.argwhere(weights > 0.0)
+        first = np.stack([e[0][s] for e, s in zip(self._extractions, active.T, strict=True)], axis=1)
+        bezier = np.stack([e[1][s] for e, s in zip(self._extractions, active.T, strict=True)], axis=1)
+        volumes = np.prod([w[s] for w, s in zip(self._widths, active.T, strict=True)], axis=0)
+        shares = self._share * weights[tuple(active.T)]
         blocks = [slice(start, start + _BLOCK) for start in range(0, len(first), _BLOCK)]
-        back = np.ascontiguousarray(np.swapaxes(weights, 2, 3))
-        self._pieces = [_Spans(first[b], volumes[b], weights[b], back[b]) for b in blocks]
+        back = np.ascontiguousarray(np.swapaxes(bezier, 2, 3))
+        self._pieces = [_Spans(first[b], volumes[b], shares[b], bezier[b], back[b]) for b in blocks]
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
-        """The penalty at control points (3, n_u, n_v, n_w), and its gradient."""
+        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
 
         def part(spans: _Spans) -> tuple[float, Array]:
             found = self._short_rows(control, spans)
-            energy = self._share * float(found.shortfall @ found.shortfall)
-            return energy, _combine(found.rows, found.starts, -2.0 * self._share * found.shortfall, spans.back)
+            pull = found.shares * found.shortfall
+            return float(pull @ found.shortfall), _combine(found.rows, found.starts, -2.0 * pull, spans.back)
 
         parts = in_parallel(part, self._pieces)
         return sum(energy for energy, _ in parts), self._collect([pushed for _, pushed in parts], control)
 
     def curvature(self, control: Tensor) -> Operator:
-        """The Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
+        """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
         pieces = in_parallel(lambda spans: self._short_rows(control, spans, np.float32), self._pieces)
 
         def part(piece: _Rows, x: Tensor) -> Array:
             changes = _changes(piece.rows, piece.starts, piece.spans.bezier_points(x))
-            return np.asarray(_combine(piece.rows, piece.starts, 2.0 * self._share * changes, piece.spans.back))
+            return np.asarray(_combine(piece.rows, piece.starts, 2.0 * piece.shares * changes, piece.spans.back))
 
         return lambda x: self._collect(in_parallel(lambda piece: part(piece, x), pieces), x)
 
@@ -116,14 +133,15 @@ class SpanBarrier:
         determinant = np.zeros((*self._unscale.shape, len(spans.first)))
         for component in range(3):
             add_products(nets[0][component], crosses[0][component], 1.0, determinant)
-        shares = self._unscale[..., None] / spans.volumes
-        short = np.moveaxis(self.floor - determinant * shares, -1, 0)
+        unscaled = self._unscale[..., None] / spans.volumes
+        short = np.moveaxis(self.floor - determinant * unscaled, -1, 0)
         place = np.argwhere(short > 0.0)  # (r, 4): span and coefficient, span by span
         rows = np.zeros((len(place), *np.roll(bezier.shape, 1)[1:]), dtype=dtype)
         for direction, (cross, scale) in enumerate(zip(crosses, self._scales, strict=True)):
-            _add_derivatives(place, cross, scale, np.moveaxis(shares, -1, 0), direction, rows)
+            _add_derivatives(place, cross, scale, np.moveaxis(unscaled, -1, 0), direction, rows)
         starts = np.searchsorted(place[:, 0], np.arange(len(spans.first) + 1))
-        return _Rows(spans, short[tuple(place.T)], rows, starts)
+        shares = spans.shares[place[:, 0]].astype(dtype)
+        return _Rows(spans, short[tuple(place.T)], shares, rows, starts)
 
     def _collect(self, parts: list[Array], like: Tensor) -> Tensor:
         """Add what the pieces say of their windows (k, 3, p + 1, p + 1, p + 1), in their order."""
@@ -187,7 +205,7 @@ def _add_derivatives(place: IntArray, cross: Array, scale: Array, shares: Array,
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})  # type: ignore[untyped-decorator]
 def _changes(rows: Array, starts: IntArray, points: Array) -> Array:
-    """Products (r,) of the rows of each span with its Bezier points (k, 3, n, n, n)."""
+    """Multiply the rows of each span with its Bezier points (k, 3, n, n, n)."""
     flat, place = rows.reshape(len(rows), -1), points.reshape(len(points), -1)
     changes = np.empty(len(rows), rows.dtype)
     for s in range(len(points)):
@@ -226,8 +244,16 @@ def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
                         total[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k] += windows[s, c, i, j, k]
 
 
+def with_neighbours(spans: NDArray[np.int64], n_spans: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Mark spans (k, 3) and all that touch them: (n_u, n_v, n_w)."""
+    marked = np.zeros(n_spans, dtype=bool)
+    marked[tuple(spans.T)] = True
+    found: NDArray[np.bool_] = binary_dilation(marked, np.ones((3, 3, 3), dtype=bool))
+    return found
+
+
 def edge_spans(n_spans: tuple[int, int, int]) -> NDArray[np.int64]:
-    """Spans (k, 3) that touch one of the cube's 12 edges."""
+    """Return the spans (k, 3) that touch one of the cube's 12 edges."""
     index = np.indices(n_spans).reshape(3, -1).T
     at_side = (index == 0) | (index == np.array(n_spans) - 1)
     return index[at_side.sum(axis=1) >= 2]

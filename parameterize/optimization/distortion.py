@@ -1,7 +1,5 @@
 """Distortion of a spline map, with a penalty on det J at the quadrature points."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 import torch
@@ -14,6 +12,7 @@ from .cg import Operator
 from .polar import closest_rotation, cofactor_and_determinant, least_eigenvalue
 from .tensor_product import GaussGrid
 
+_LEAST_DET = 0.03  # in the metric of the damping
 _BLOCK = 256  # points at a time: their matrices stay in the cache
 _ENTRY = np.array([[max(a, b) * (max(a, b) + 1) // 2 + min(a, b) for b in range(9)] for a in range(9)])
 
@@ -59,8 +58,10 @@ class DistortionEnergy:
         energies, folded, pulled = zip(*in_parallel(part, self._grid.planes()), strict=True)
         return sum(energies), self._grid.collect(list(pulled), control), sum(folded)
 
-    def curvature(self, control: Tensor, penalty: float) -> Operator:
-        """A positive semidefinite second derivative at `control`, as an operator in single precision.
+    def curvature(self, control: Tensor, penalty: float, damping: float = 0.0) -> Operator:
+        """Return a positive semidefinite second derivative at `control`, as an operator in single precision.
+
+        damping: times the squared change of J relative to J, to be added: det J bends most where it is small.
 
         With S = R^T J, R turns by R [omega] when J changes by d, where (tr(S) I - S) omega = -sum_k R_k x d_k over the
         rows k, so the Hessian of a is 2 (d - R [omega]). It is positive where all sums of two singular values, the
@@ -77,7 +78,8 @@ class DistortionEnergy:
             excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
             pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
             scale = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess)
-            parts = rotation, _turning(rotation, jacobian), pull.flatten(0, 1), push.flatten(0, 1), scale
+            held = 2.0 * damping * weights * _relative(cofactors, det)
+            parts = rotation, _turning(rotation, jacobian), pull.flatten(0, 1), push.flatten(0, 1), scale, held
             return planes, _matrices(*(p.contiguous().numpy() for p in parts))
 
         pieces = in_parallel(matrices, self._grid.planes())
@@ -97,8 +99,14 @@ class DistortionEnergy:
         return torch.from_numpy(self._grid.weights[planes].ravel())
 
 
+def _relative(cofactors: Tensor, det: Tensor) -> Tensor:
+    """Return |J^-1|^2 / 3, 1 for the identity and bounded where det J vanishes: (m,)."""
+    inverse = cofactors.square().sum(dim=(0, 1)) / (3.0 * det.clamp_min(_LEAST_DET).square())
+    return inverse.clamp(1.0, 1.0 / _LEAST_DET**2)
+
+
 def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
-    """(tr(S) I - S)^-1 with S = R^T J, its eigenvalues lifted so that the least is 2: (3, 3, m)."""
+    """Return (tr(S) I - S)^-1 with S = R^T J, its eigenvalues lifted so that the least is 2: (3, 3, m)."""
     stretch = torch.stack([rotation[k][:, None] * jacobian[k] for k in range(3)]).sum(0)  # S, symmetric
     sums = -stretch
     for i in range(3):
@@ -111,10 +119,10 @@ def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale: Array) -> Array:
-    """The symmetric matrices of the second derivative in the nine entries of J: (45, m), see _ENTRY.
+def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale: Array, held: Array) -> Array:
+    """Return the symmetric matrices of the second derivative in the nine entries of J: (45, m), see _ENTRY.
 
-    scale (I - B softness B^T) + pull pull^T + push push^T, where B^T d is the sum of R_k x d_k over the rows k.
+    scale (I - B softness B^T) + pull pull^T + push push^T + held I; B^T d is the sum of R_k x d_k over the rows k.
     """
     m = scale.size
     turn, soft = np.zeros((9, 3, m), scale.dtype), np.zeros((9, 3, m), scale.dtype)
@@ -134,12 +142,13 @@ def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale:
             for i in range(m):
                 turned = soft[a, 0, i] * turn[b, 0, i] + soft[a, 1, i] * turn[b, 1, i] + soft[a, 2, i] * turn[b, 2, i]
                 row[i] = scale[i] * ((a == b) - turned) + pull[a, i] * pull[b, i] + push[a, i] * push[b, i]
+                row[i] += (a == b) * held[i]
     return out
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _times_matrices(matrices: Array, vectors: Array) -> Array:
-    """Symmetric matrices, entries (45,) above m points, times vectors (9, m)."""
+    """Multiply symmetric matrices, entries (45,) above m points, by vectors (9, m)."""
     out = np.zeros_like(vectors)
     for begin in range(0, vectors.shape[1], _BLOCK):
         end = begin + _BLOCK

@@ -7,8 +7,6 @@ user gives are held until the map is certified; in the last rounds they may move
 crosses itself beside them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from torch import Tensor
 
@@ -24,7 +22,7 @@ _A_SPAN = 2
 
 
 def edge_points(knots: tuple[Array, Array, Array]) -> Array:
-    """Parameters (k, 3): the corners of the cube, the ends of the spans along its edges and their middles."""
+    """Return the corners of the cube, and the ends and middles of the spans along its edges: (k, 3)."""
     points = []
     for i, j in EDGES:
         direction = CORNERS[j] - CORNERS[i]
@@ -78,6 +76,6 @@ class EdgeAnchors:
         self.fit.give_way(yielding)
 
     def _nearest(self, control: Tensor) -> tuple[Array, Array, Array]:
-        """F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""
+        """Return F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""
         here = self.fit.residuals(control) + self.fit.points
         return here, *nearest_on_mesh(here, self._surface.points, self._surface.places.triangles)

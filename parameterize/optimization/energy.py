@@ -5,8 +5,6 @@ J: holding them still, as local-global methods do, makes sliding along the surfa
 penalties. The boundary term is quadratic with its parameters held.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import Tensor
@@ -55,9 +53,10 @@ class SplineEnergy:
         """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
         self._facing = facing_penalty(self.surface, control, self.config.min_facing, self.config.facing_margin)
 
-    def watch_contact(self, control: Tensor) -> None:
-        """Push apart, from now on, the sheets of F's boundary that are hardly apart at `control`."""
+    def watch_contact(self, control: Tensor) -> IntArray:
+        """Push apart, from now on, the sheets of F's boundary that hardly are at `control`; return their spans."""
         self._contact = contact_penalty(self._knots, self.config.degree, control, self.config.gap)
+        return self._contact.spans
 
     def slide(self, control: Tensor) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
@@ -73,6 +72,11 @@ class SplineEnergy:
         for fit in (self.surface, self.anchors.fit):
             fit.give_way(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.yielding)
 
+    @property
+    def yields(self) -> bool:
+        """Whether some boundary data has less than its whole weight."""
+        return any(bool((fit.yielding < 1.0).any()) for fit in (self.surface, self.anchors.fit))
+
     def take_back(self, factor: float) -> None:
         """Divide by `factor` what such factors have become, up to 1."""
         for fit in (self.surface, self.anchors.fit):
@@ -87,7 +91,7 @@ class SplineEnergy:
         return energy, gradient + bent + self.penalty * push, folded
 
     def surface_part(self, control: Tensor) -> tuple[float, Tensor]:
-        """The boundary terms at the present parameters: energy and gradient."""
+        """Return the boundary terms at the present parameters: energy and gradient."""
         config = self.config
         off, pull = self.surface.energy_and_gradient(control)
         off_edges, pull_edges = self.anchors.fit.energy_and_gradient(control)
@@ -102,11 +106,11 @@ class SplineEnergy:
         turned, push = self._facing.energy_and_gradient(control)
         return energy + self.penalty * turned, gradient + self.penalty * push
 
-    def newton_direction(self, control: Tensor, right: Tensor) -> Tensor:
-        """Approximate solution of Hessian x = right at `control`, the parameters of the surface held."""
+    def newton_direction(self, control: Tensor, right: Tensor, damping: float = 0.0) -> Tensor:
+        """Solve roughly (Hessian + damping) x = right at `control`, the parameters of the surface held."""
         config = self.config
         surface, anchors = self.surface.hessian(_ROUGH), self.anchors.fit.hessian(_ROUGH)
-        distortion = self._distortion.curvature(control, self.penalty)
+        distortion = self._distortion.curvature(control, self.penalty, damping)
         barrier = self.barrier.curvature(control)
         facing = torch.zeros_like if self._facing is None else self._facing.curvature(control, _ROUGH)
         contact = torch.zeros_like if self._contact is None else self._contact.curvature(control, _ROUGH)

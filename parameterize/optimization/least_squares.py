@@ -1,7 +1,5 @@
 """First spline from the trained network: least squares on pairs (G(x), x), slightly smoothed (section 4.3.2)."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from scipy.sparse import csr_array

@@ -3,8 +3,6 @@
 Truncated Newton steps on the energy of energy.py. Between steps the boundary parameters slide (surface_distance.py).
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import time
@@ -20,8 +18,7 @@ from ..certificate.boundary import check_boundary
 from ..certificate.jacobian import Certificate, certify
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
-from ..history import History
-from ..progress import Progress, ProgressCallback, ignore
+from ..progress import History, Progress, ProgressCallback, ignore
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
 from .determinant_penalty import edge_spans
@@ -45,7 +42,7 @@ class Optimized:
     meets_itself: bool
 
     @classmethod
-    def of(cls, control: Tensor, knots: Knots, config: SplineConfig) -> Optimized:
+    def of(cls, control: Tensor, knots: Knots, config: SplineConfig) -> "Optimized":
         """Certify control points and, where that succeeds, check their boundary."""
         volume = BSplineVolume((config.degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy())
         certificate = certify(volume)
@@ -71,10 +68,11 @@ def optimize(
     """Minimise from `control` (3, n_u, n_v, n_w), volume 1, in rounds: descend, certify, watch the spans not proved.
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
-    unfold what is left. Where spans stay unproved, the surface data near them loses weight. Where the boundary of a
-    certified map meets itself, further rounds push it apart. Once the map is certified, a few more rounds take back
-    what the data has lost as far as they can. Anchors along the cube's edges draw F to the surface in those
-    last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
+    unfold what is left. Where spans stay unproved, the penalty on them and their neighbours grows further, and after
+    `firm_rounds` the surface data near them loses weight. Where the boundary of a certified map meets itself, further
+    rounds push it apart, and the surface data there lose weight. Once the map is certified, a few more rounds take back
+    what the data has lost, step by step, as far as they can. Anchors along the cube's edges draw F to the surface in
+    those last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
     result is the last certified map whose boundary does not meet itself, else the last certified one, else the one with
     the fewest unproved spans.
     A checkpoint is kept after every round.
@@ -125,19 +123,26 @@ class _Rounds:
 
     @property
     def finished(self) -> bool:
-        """Whether no round is left."""
+        """Whether no round is left, or the last polish has left nothing to take back."""
         config = self.energy.config
-        return self.number >= config.rounds or self.polished == config.polish
+        polished = self.polished == config.polish or (self.polished > 0 and self.settled and not self.energy.yields)
+        return self.number >= config.rounds or polished
+
+    @property
+    def settled(self) -> bool:
+        """Whether the last round has ended with the best map, not with one that folds again."""
+        return torch.equal(self.control, self.best.control)
 
     def begin(self) -> None:
         """Weigh penalties, surface data and anchors for the next round."""
         config, energy = self.energy.config, self.energy
         if self.certified and self.best.meets_itself and self.parting < config.parting:
             self.parting += 1
-            energy.watch_contact(self.control)
+            energy.give_way(energy.watch_contact(self.control), config.contact_way)
         elif self.certified:
             self.polished += 1
-            energy.take_back(config.giving_way)
+            if self.settled:
+                energy.take_back(config.giving_way)
         if self.polished or (self.near and self.number < config.patient_rounds):
             energy.anchors.aim(self.control, hold=not self.polished)
         else:
@@ -146,16 +151,18 @@ class _Rounds:
 
     def conclude(self, control: Tensor) -> None:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
-        self.control = control
-        found = Optimized.of(control, self.knots, self.energy.config)
+        self.control, config = control, self.energy.config
+        found = Optimized.of(control, self.knots, config)
         unproved = found.certificate.unproved
         meets = ", the boundary meets itself" if found.meets_itself else ""
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
         if self.number == 0 or found.faults <= self.best.faults:
             self.best = found
         self.energy.barrier.activate(unproved)
-        if self.number >= self.energy.config.patient_rounds and not self.polished and len(unproved):
-            self.energy.give_way(unproved, self.energy.config.giving_way)
+        if self.number >= config.patient_rounds and len(unproved):
+            self.energy.barrier.stiffen(unproved, config.span_growth, config.span_most)
+        if self.number >= config.firm_rounds and not self.polished and len(unproved):
+            self.energy.give_way(unproved, config.giving_way)
         self.number += 1
 
     def save(self, checkpoints: Checkpoints, history: History) -> None:
@@ -169,7 +176,7 @@ class _Rounds:
             "yielding": torch.as_tensor(surface.yielding),
             "anchors": torch.as_tensor(anchors.points),
             "anchors_yielding": torch.as_tensor(anchors.yielding),
-            "active": torch.as_tensor(self.energy.barrier.active),
+            "span_weights": torch.as_tensor(self.energy.barrier.weights),
         }
         counts = {"number": self.number, "parting": self.parting, "polished": self.polished}
         state = counts | {"history": history.rows}
@@ -181,7 +188,7 @@ class _Rounds:
         energy.surface.places.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
         energy.surface.give_way(tensors["yielding"].numpy())
         energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
-        energy.barrier.activate(tensors["active"].numpy())
+        energy.barrier.weigh(tensors["span_weights"].numpy())
         self.control = tensors["control"]
         self.best = Optimized.of(tensors["best"], self.knots, energy.config)
         self.number, self.parting, self.polished = (int(state[name]) for name in ("number", "parting", "polished"))
@@ -213,11 +220,11 @@ def _evaluate(control: Tensor, energy: SplineEnergy) -> _Point:
     return _Point(control, (value, gradient), energy.surface_part(control), folded)
 
 
-def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> _Point | None:
-    """Shorten the step until the energy falls enough (Armijo); None where the direction does not lead down.
+def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> tuple[_Point, float] | None:
+    """Shorten the step until the energy falls enough (Armijo); return where it leads, and its length, at most 1.
 
     The next length is where the parabola through the values and the slope at 0 has its minimum, between a tenth and a
-    half of the last (Nocedal and Wright, section 3.5).
+    half of the last (Nocedal and Wright, section 3.5). None where the direction does not lead down.
     """
     slope = float((direction * point.gradient).sum())
     length = 1.0
@@ -225,10 +232,25 @@ def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> _Poi
         trial = _evaluate(point.control + length * direction, energy)
         rise = trial.total - point.total
         if rise <= 1e-4 * length * slope:
-            return trial
+            return trial, length
         parabola = -slope * length / (2.0 * (rise - slope * length)) if math.isfinite(rise) else 0.1
         length *= min(max(parabola, 0.1), 0.5)
     return None
+
+
+def _next_damping(damping: float, length: float, config: SplineConfig) -> float:
+    """Raise the damping after a step that had to be shortened to less than half, lower it after a full one."""
+    if length < 0.5:
+        return max(config.damping, config.damping_growth * damping)
+    lowered = damping / config.damping_growth if length == 1.0 else damping
+    return lowered if lowered >= config.damping else 0.0
+
+
+def _expected_steps(config: SplineConfig, number: int, step: int) -> int:
+    """Return how many steps are left after one of a round where the run is a usual one; hard shapes take more."""
+    usual = [min(count, config.steps) for count in config.usual_steps]
+    present = usual[number] if number < len(usual) else config.least_steps
+    return max(present - step - 1, 1) + sum(usual[number + 1 :])
 
 
 def _descend(
@@ -240,23 +262,25 @@ def _descend(
 ) -> Tensor:
     """Return the control points after one round of Newton steps with sliding boundary parameters."""
     config, steps = energy.config, energy.config.steps
-    usual = steps * (len(config.penalties) + config.polish)  # hard shapes take more
-    started = time.perf_counter()
     energy.watch_facing(control)
     point = _evaluate(control, energy)
-    lowest, waited = point.total, 0
+    lowest, waited, damping = point.total, 0, 0.0
     for step in range(steps):
-        found = _line_search(point, energy.newton_direction(point.control, -point.gradient), energy)
-        if found is None:
+        begun = time.perf_counter()
+        direction = energy.newton_direction(point.control, -point.gradient, damping)
+        searched = _line_search(point, direction, energy)
+        if searched is None:
             _log.info("round %d: no descent after step %d", number, step)
             break
+        found, length = searched
+        damping = _next_damping(damping, length, config)
         gain = point.total - found.total
         energy.slide(found.control)
         point = replace(found, outer=energy.surface_part(found.control))
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
-        total = max(usual, (number + 1) * steps)
-        left = (time.perf_counter() - started) / (step + 1) * (total - done)
+        total = max(number + 1, len(config.usual_steps)) * steps
+        left = _expected_steps(config, number, step) * (time.perf_counter() - begun)
         progress(Progress("spline", done, total, point.total, point.folded, left))
         enough = config.gain if number else config.first_gain
         waited = 0 if point.total < (1.0 - enough) * lowest else waited + 1

@@ -5,8 +5,6 @@ points of the mesh cannot be one-to-one on it. What is asked for is (t_a x t_b) 
 and t_b the tangents of F along the cube's face and n the mesh's normal (one-sided, unlike L_norm, section 4.4.1).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +52,7 @@ class FacingPenalty:
         return product
 
     def _slopes(self, control: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(t_a x t_b) . n, last, after its derivatives in t_a and t_b: (3, k) each."""
+        """Return (t_a x t_b) . n, last, after its derivatives in t_a and t_b: (3, k) each."""
         a, b = (rows(control).T for rows in self.tangents)
         by_a, by_b = cross(b[None], self.normals[None])[0], cross(self.normals[None], a[None])[0]
         return by_a, by_b, (a * by_a).sum(0)
@@ -63,7 +61,7 @@ class FacingPenalty:
         along_a, along_b = self.tangents
         return along_a.adjoint((factor * by_a).T, like) + along_b.adjoint((factor * by_b).T, like)
 
-    def _to(self, dtype: torch.dtype) -> FacingPenalty:
+    def _to(self, dtype: torch.dtype) -> "FacingPenalty":
         along_a, along_b = (rows.to(dtype) for rows in self.tangents)
         return FacingPenalty((along_a, along_b), self.normals.to(dtype), self.weights.to(dtype), self.floor)
 

@@ -6,8 +6,6 @@ ARAP = sum (sigma - 1)^2 = |J|^2 - 2 <R, J> + 3, and since R is stationary the g
 Matrices come as (3, 3, m): row, column, sample. Batched this way every operation runs along contiguous memory.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 import torch
@@ -20,12 +18,12 @@ _STEPS = 8
 
 
 def determinant(j: Tensor) -> Tensor:
-    """Determinants of (3, 3, m): (m,)."""
+    """Return the determinants of (3, 3, m): (m,)."""
     return (j[:1] * cross(j[1:2], j[2:])).sum(dim=(0, 1))
 
 
 def cofactor(j: Tensor) -> Tensor:
-    """Matrices of cofactors (3, 3, m): the inverse of J is their transpose over det J."""
+    """Return the cofactors (3, 3, m): the inverse of J is their transpose over det J."""
     cyclic = torch.cat([j, j[:2]])
     return cross(cyclic[1:4], cyclic[2:5])
 
@@ -37,13 +35,13 @@ def cofactor_and_determinant(j: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def cross(a: Tensor, b: Tensor) -> Tensor:
-    """Cross products of rows (k, 3, m), row by row; slices along the samples are fast."""
+    """Return the cross products of rows (k, 3, m), row by row; slices along the samples are fast."""
     a, b = torch.cat([a, a[:, :2]], dim=1), torch.cat([b, b[:, :2]], dim=1)  # (k, 5, m)
     return torch.addcmul(a[:, 1:4] * b[:, 2:5], a[:, 2:5], b[:, 1:4], value=-1.0)
 
 
 def least_eigenvalue(s: Tensor) -> Tensor:
-    """Of symmetric matrices (3, 3, m), by the trigonometric formula: (m,)."""
+    """Return the least eigenvalue of symmetric matrices (3, 3, m), by the trigonometric formula: (m,)."""
     mean = (s[0, 0] + s[1, 1] + s[2, 2]) / 3.0
     shifted = s - mean * torch.eye(3, dtype=s.dtype, device=s.device)[:, :, None]
     spread = (shifted.square().sum(dim=(0, 1)) / 6.0).sqrt()
@@ -54,7 +52,7 @@ def least_eigenvalue(s: Tensor) -> Tensor:
 
 @torch.no_grad()
 def closest_rotation(j: Tensor) -> Tensor:
-    """The rotation closest to each matrix of (3, 3, m), detached.
+    """Return the rotation closest to each matrix of (3, 3, m), detached.
 
     Scaled Newton steps (Higham 1986) where det J is safely positive. Elsewhere these would end at a reflection or
     divide by zero; those few are done by SVD with the smallest direction flipped. A matrix that is not finite gets some
@@ -73,7 +71,7 @@ def closest_rotation(j: Tensor) -> Tensor:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def _polar_factors(matrices: Array) -> Array:
-    """Rotations (9, m) closest to matrices (9, m): R <- (g R + R^-T / g) / 2 with g = (|R^-1| / |R|)^(1/2)."""
+    """Find rotations (9, m) closest to matrices (9, m): R <- (g R + R^-T / g) / 2 with g = (|R^-1| / |R|)^(1/2)."""
     out = matrices.copy()
     for begin in range(0, out.shape[1], _BLOCK):
         r = out[:, begin : begin + _BLOCK]
@@ -97,7 +95,7 @@ def _polar_factors(matrices: Array) -> Array:
 
 
 def _rotation_by_svd(j: Tensor) -> Tensor:
-    """U diag(1, 1, det U V) V^T."""
+    """Return U diag(1, 1, det U V) V^T."""
     u, _, vh = torch.linalg.svd(j.permute(2, 0, 1))
     sign = torch.linalg.det(u @ vh).sign()
     u = torch.cat([u[:, :, :2], u[:, :, 2:] * sign[:, None, None]], dim=2)

@@ -5,23 +5,21 @@ must: the paper keeps them fixed (section 4.3.2), which freezes the network's co
 boundary error and distortion together.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 from torch import Tensor
 
 from ..arrays import Array, IntArray
-from ..cube.closest_point import damped_fit
-from ..cube.cube import axis_and_side, face_number, nearest_faces, tangent_axes
-from ..cube.flips import new_flips, untangle
+from ..config import LAYOUT, LayoutConfig
+from ..cube.cube import axis_and_side, damped_fit, face_number, nearest_faces, tangent_axes
+from ..cube.flips import new_flips, unflip, untangle
 from ..spline.bspline import breakpoints, fill_basis, sparse_rows
 from ..threads import in_parallel
+from .determinant_penalty import with_neighbours
 from .tensor_product import ControlRows
 
 _DAMPING = 1e-6  # against parallel tangents
@@ -41,9 +39,10 @@ class SlidingParameters:
         degree: int,
         parameters: Array,
         triangles: IntArray,
+        layout: LayoutConfig = LAYOUT,
     ) -> None:
         self.knots, self.degree = knots, degree
-        self.triangles = triangles
+        self.triangles, self.layout = triangles, layout
         self.place(parameters, nearest_faces(parameters))
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
@@ -56,18 +55,16 @@ class SlidingParameters:
         """Return F at the parameters: (N, 3)."""
         return self.window.derivatives(control)[0]
 
+    def spans(self) -> IntArray:
+        """Return in which span each parameter lies: (N, 3)."""
+        breaks = [breakpoints(k) for k in self.knots]
+        found = [np.searchsorted(b[1:-1], x, "right") for b, x in zip(breaks, self.parameters.T, strict=True)]
+        return np.stack(found, axis=1)
+
     def near_spans(self, spans: IntArray) -> NDArray[np.bool_]:
         """Return which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
-        breaks = [breakpoints(k) for k in self.knots]
-        shape = [len(b) - 1 for b in breaks]
-        marked = np.zeros(shape, dtype=bool)
-        marked[tuple(spans.T)] = True
-        marked = binary_dilation(marked, np.ones((3, 3, 3), dtype=bool))
-        where = [
-            np.clip(np.searchsorted(b, x, "right") - 1, 0, n - 1)
-            for b, x, n in zip(breaks, self.parameters.T, shape, strict=True)
-        ]
-        return marked[tuple(where)]
+        shape = tuple(len(breakpoints(k)) - 1 for k in self.knots)
+        return with_neighbours(spans, shape)[tuple(self.spans().T)]
 
     def slide(self, control: Tensor, points: Array, max_step: float, *, keep_layout: bool = False) -> None:
         """Take one Gauss-Newton step of every parameter towards where F's boundary is closest to its point (N, 3).
@@ -96,16 +93,22 @@ class SlidingParameters:
         """Shorten steps from `parameters` towards `goal` until no further triangle flips."""
         share = np.where((self.parameters == parameters).all(axis=1), 0.0, 1.0)
         for _ in range(_HALVINGS):
-            blocked = new_flips(parameters, self.parameters, self.triangles)
+            blocked = new_flips(parameters, self.parameters, self.triangles, self.layout)
             if not blocked.any():
                 break
             share[blocked] *= 0.5
             self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
-        self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
+        self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles, self.layout))
 
     def relax(self, sweeps: int) -> None:
         """Untangle flipped triangles in a few sweeps, so that what sliding tangles does not pile up."""
-        places = untangle(self.parameters, self.triangles, sweeps)
+        self._move(untangle(self.parameters, self.triangles, replace(self.layout, sweeps=sweeps)))
+
+    def unflip(self) -> None:
+        """Turn flipped triangles outwards by moving their own points alone, and those by little."""
+        self._move(unflip(self.parameters, self.triangles, self.layout))
+
+    def _move(self, places: Array) -> None:
         moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
         self._keep(places, nearest_faces(places), moved)
 
@@ -116,7 +119,7 @@ class SlidingParameters:
         )
 
     @cached_property
-    def window(self) -> FaceWindow:
+    def window(self) -> "FaceWindow":
         """The basis functions that are not zero at the points."""
         knots, parameters, faces = tuple(self.knots), self.parameters, self.cube_faces
         pieces = [slice(begin, begin + _POINTS) for begin in range(0, max(len(faces), 1), _POINTS)]
@@ -152,7 +155,7 @@ class FaceWindow:
 def _face_windows(
     knots: tuple[Array, Array, Array], degree: int, parameters: Array, cube_faces: IntArray
 ) -> tuple[IntArray, Array, Array]:
-    """What a FaceWindow holds, for points (N, 3) on cube faces (N,)."""
+    """Return what a FaceWindow holds, for points (N, 3) on cube faces (N,)."""
     count, width = len(parameters), degree + 1
     sizes, stride = np.empty(3, np.int64), np.ones(3, np.int64)
     for d in range(3):
@@ -183,7 +186,7 @@ def _face_windows(
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _tangents(indices: IntArray, in_a: Array, in_b: Array, control: Array) -> Array:
-    """F, t_a and t_b of control points (3, n) at the points of a FaceWindow: (3, N, 3)."""
+    """Return F, t_a and t_b of control points (3, n) at the points of a FaceWindow: (3, N, 3)."""
     width = in_a.shape[2]
     out = np.zeros((3, len(indices), 3))
     for n in range(len(indices)):

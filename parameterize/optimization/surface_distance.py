@@ -5,8 +5,6 @@ r = F(p) - v and Q the mean of n n^T over the triangles around v: on smooth part
 on sharp edges across both sides, at corners in all directions.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 from torch import Tensor

@@ -4,8 +4,6 @@ Control points are held as (3, n_u, n_v, n_w), component first. Pieces of work r
 added in their order, so that the number of threads changes no bit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,11 +42,11 @@ class ControlRows:
     values: Array
 
     @classmethod
-    def of(cls, rows: csr_array) -> ControlRows:
+    def of(cls, rows: csr_array) -> "ControlRows":
         """Take the rows of a scipy matrix."""
         return cls(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data)
 
-    def to(self, dtype: torch.dtype) -> ControlRows:
+    def to(self, dtype: torch.dtype) -> "ControlRows":
         """Return the same rows in another precision."""
         return ControlRows(self.starts, self.columns, torch.from_numpy(self.values).to(dtype).numpy())
 
@@ -71,14 +69,14 @@ class ControlRows:
         return torch.from_numpy(sum(found[1:], start=found[0])).view(field.shape)
 
     def _pieces(self) -> list[tuple[int, IntArray]]:
-        """Where the rows of each piece of work lie: the number of the first, and its entries' places (m + 1,)."""
+        """Return where the rows of each piece lie: the number of the first, and its entries' places (m + 1,)."""
         count = max(len(self.starts) - 1, 1)
         return [(begin, self.starts[begin : begin + _ROWS + 1]) for begin in range(0, count, _ROWS)]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _times(piece: tuple[int, IntArray], columns: IntArray, values: Array, field: Array) -> Array:
-    """Rows of a sparse matrix times a field (3, n): (m, 3)."""
+    """Multiply rows of a sparse matrix by a field (3, n): (m, 3)."""
     _, starts = piece
     out = np.zeros((len(starts) - 1, 3), field.dtype)
     for row in range(len(out)):
@@ -91,7 +89,7 @@ def _times(piece: tuple[int, IntArray], columns: IntArray, values: Array, field:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _spread(piece: tuple[int, IntArray], columns: IntArray, values: Array, dual: Array, count: int) -> Array:
-    """The transpose of some rows times what all rows have (N, 3): (3, count)."""
+    """Multiply the transpose of some rows by what all rows have (N, 3): (3, count)."""
     begin, starts = piece
     out = np.zeros((3, count), dual.dtype)
     for row in range(len(starts) - 1):
@@ -104,7 +102,7 @@ def _spread(piece: tuple[int, IntArray], columns: IntArray, values: Array, dual:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _squared(piece: tuple[int, IntArray], columns: IntArray, values: Array, metric: Array, field: Array) -> Array:
-    """The transpose of some rows times metrics (N, 3, 3) times the rows times a field (3, n): (3, n)."""
+    """Multiply the transpose of some rows by metrics (N, 3, 3) times the rows times a field (3, n): (3, n)."""
     begin, starts = piece
     out, at = np.zeros_like(field), np.empty(3, field.dtype)
     for row in range(len(starts) - 1):
@@ -209,7 +207,7 @@ def _transposed(field: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
-    """Derivatives (3, 3, points) of control points (3, n_u, n_v, n_w) at all points of the bands, in planes."""
+    """Return derivatives (3, 3, points) of control points (3, n_u, n_v, n_w) at all points of the bands, in planes."""
     (first_u, values_u, slopes_u), (first_v, values_v, slopes_v), (first_w, values_w, slopes_w) = bands
     _, n_u, n_v, n_w = control.shape
     planes, m_v, m_w = len(first_u), len(first_v), len(first_w)
@@ -233,7 +231,7 @@ def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
-    """The transpose; the bands of v and w are transposed already. All layers (3, layers, n_v, n_w)."""
+    """Apply the transpose; the bands of v and w are transposed already. All layers (3, layers, n_v, n_w)."""
     (first_u, values_u, slopes_u), (first_v, values_v, slopes_v), (first_w, values_w, slopes_w) = bands
     planes, n_v, n_w, width = len(first_u), len(first_v), len(first_w), values_u.shape[1]
     m_w = first_w[-1] + values_w.shape[1]
@@ -258,7 +256,7 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
 
 
 def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
-    """Gauss points and weights (m,): `outer` on the first and last span, `inner` on the others."""
+    """Return Gauss points and weights (m,): `outer` on the first and last span, `inner` on the others."""
     fine, coarse = gauss_points(knots, outer), gauss_points(knots, inner)
     split = min(_END_SPANS, len(fine[0]) // 2)
     middle = slice(split, len(fine[0]) - split)
@@ -270,7 +268,7 @@ def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
 
 
 def gram(knots: Array, degree: int, derivative: int) -> Tensor:
-    """1-D matrix of integrals of products of `derivative`-th derivatives (n, n): mass, stiffness, bending."""
+    """Return the matrix of integrals of products of `derivative`-th derivatives (n, n): mass, stiffness, bending."""
     points, weights = gauss_points(knots, degree + 1)
     table = collocation(knots, degree, points.ravel(), derivative).toarray()
     return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
@@ -290,17 +288,17 @@ class BendingOperator:
     curve: tuple[Tensor, ...]
     weight: float
 
-    def to(self, dtype: torch.dtype) -> BendingOperator:
-        """The same in another precision."""
+    def to(self, dtype: torch.dtype) -> "BendingOperator":
+        """Return the same in another precision."""
         mass, slope, curve = (tuple(m.to(dtype) for m in part) for part in (self.mass, self.slope, self.curve))
         return BendingOperator(mass, slope, curve, self.weight)
 
     def __call__(self, x: Tensor) -> Tensor:
-        """(3, n_u, n_v, n_w) -> the same shape."""
+        """Apply the operator: (3, n_u, n_v, n_w) -> the same shape."""
         return torch.cat(in_parallel(self._bend, torch.split(x, 1)))
 
     def _bend(self, x: Tensor) -> Tensor:
-        """The same for one component (1, n_u, n_v, n_w)."""
+        """Apply it to one component (1, n_u, n_v, n_w)."""
         (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = self.mass, self.slope, self.curve
         xm, xk, xh = along(m2, x, 3), along(k2, x, 3), along(h2, x, 3)
         mm = along(m1, xm, 2)

@@ -1,16 +1,12 @@
 """Distances between a mesh and the boundary of a trivariate spline."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array
-from ..cube.closest_point import damped_fit
-from ..cube.cube import axis_and_side, tangent_axes
+from ..arrays import Array, IntArray
+from ..cube.cube import axis_and_side, damped_fit, tangent_axes
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import doubled_areas
 
@@ -30,13 +26,13 @@ class Distances:
     max: float
 
     @classmethod
-    def of(cls, values: Array) -> Distances:
+    def of(cls, values: Array) -> "Distances":
         """Summarise distances (m,), each with the same weight; raise ValueError when there are none."""
         if values.size == 0:
             raise ValueError("there are no distances to summarise: the list of points is empty")
         return cls(float(np.sqrt(np.mean(values**2))), float(np.mean(values)), float(np.max(values)))
 
-    def scaled(self, scale: float) -> Distances:
+    def scaled(self, scale: float) -> "Distances":
         """Return the same distances in another unit of length."""
         return Distances(scale * self.rms, scale * self.mean, scale * self.max)
 
@@ -47,10 +43,10 @@ class SampledBoundary:
 
     parameters: Array  # (6 * samples**2, 3), face after face in the order of FACE_NAMES
     points: Array  # (6 * samples**2, 3)
-    triangles: NDArray[np.int64]  # (12 * (samples - 1)**2, 3), wound outwards where F keeps orientation
+    triangles: IntArray  # (12 * (samples - 1)**2, 3), wound outwards where F keeps orientation
 
     @classmethod
-    def of(cls, volume: BSplineVolume, samples: int = SAMPLES) -> SampledBoundary:
+    def of(cls, volume: BSplineVolume, samples: int = SAMPLES) -> "SampledBoundary":
         """Sample all six faces, edges included."""
         if samples < 2:
             raise ValueError(f"samples must be at least 2, got {samples}")
@@ -69,12 +65,12 @@ class SampledBoundary:
         return cls(np.concatenate(parameters), np.concatenate(points), np.concatenate(triangles))
 
 
-def to_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
+def to_mesh(points: Array, vertices: Array, faces: IntArray) -> Array:
     """Return the distance of each point (m, 3) to the nearest point of a triangle mesh: (m,)."""
     return _closest(points, vertices, faces)[0]
 
 
-def nearest_on_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, Array]:
+def nearest_on_mesh(points: Array, vertices: Array, faces: IntArray) -> tuple[Array, Array]:
     """Return the nearest point of a triangle mesh to each point (m, 3), and the unit normal of its triangle."""
     _, triangle, weights = _closest(points, vertices, faces)
     corners = vertices[faces[triangle]]  # (m, 3, 3)
@@ -84,14 +80,7 @@ def nearest_on_mesh(points: Array, vertices: Array, faces: NDArray[np.int64]) ->
 
 
 def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> Array:
-    """Return the distance of each point (m, 3) to the boundary of the spline: (m,)."""
-    return foot_points(points, volume, boundary)[2]
-
-
-def foot_points(
-    points: Array, volume: BSplineVolume, boundary: SampledBoundary
-) -> tuple[Array, NDArray[np.int64], Array]:
-    """Return parameters (m, 3), cube faces (m,) and distances (m,) of the boundary's closest points to points (m, 3).
+    """Return the distance of each point (m, 3) to the boundary of the spline: (m,).
 
     The nearest point of the sampled triangles gives a cube face and parameters on it; Gauss-Newton steps in that face
     then lower the distance to the spline itself. The distances are to points of the spline's boundary, so never less
@@ -100,14 +89,18 @@ def foot_points(
     _, triangle, weights = _closest(points, boundary.points, boundary.triangles)
     corners = boundary.triangles[triangle]  # (m, 3)
     where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
-    cube_face = 6 * triangle // len(boundary.triangles)
-    axis, _ = axis_and_side(cube_face)
-    where[np.arange(len(where)), axis] = boundary.parameters[corners[:, 0]][np.arange(len(where)), axis]
-    best: Array = np.linalg.norm(volume(where) - points, axis=1)
+    axis, _ = axis_and_side(6 * triangle // len(boundary.triangles))
     active = np.arange(len(points))
+    where[active, axis] = boundary.parameters[corners[:, 0], axis]
+    best: Array = np.linalg.norm(volume(where) - points, axis=1)
     for _ in range(_NEWTON_STEPS):
-        step = _foot_step(volume, where[active], points[active], axis[active])
-        trial = np.clip(where[active] + step, 0.0, 1.0)
+        trial, (a, b), rows = where[active], tangent_axes(axis[active]), np.arange(len(active))
+        jacobian = volume.jacobian(trial)  # (k, 3, 3)
+        right = points[active] - volume(trial)
+        step_a, step_b = damped_fit(jacobian[rows, :, a], jacobian[rows, :, b], right, _DAMPING)
+        trial[rows, a] += step_a
+        trial[rows, b] += step_b
+        np.clip(trial, 0.0, 1.0, out=trial)
         distance = np.linalg.norm(volume(trial) - points[active], axis=1)
         gain = best[active] - distance
         closer = gain > 0.0
@@ -115,21 +108,10 @@ def foot_points(
         active = active[gain > _CONVERGED * best[active]]
         if not active.size:
             break
-    return where, cube_face, best
+    return best
 
 
-def _foot_step(volume: BSplineVolume, where: Array, points: Array, axis: NDArray[np.int64]) -> Array:
-    """Return the Gauss-Newton step towards the nearest point on each point's cube face: (m, 3), zero along `axis`."""
-    rows, (a, b) = np.arange(len(where)), tangent_axes(axis)
-    jacobian = volume.jacobian(where)  # (m, 3, 3)
-    step = np.zeros_like(where)
-    step[rows, a], step[rows, b] = damped_fit(
-        jacobian[rows, :, a], jacobian[rows, :, b], points - volume(where), _DAMPING
-    )
-    return step
-
-
-def _closest(points: Array, vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64], Array]:
+def _closest(points: Array, vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Array]:
     """Return for points (m, 3) the distance (m,) to the mesh, the nearest triangle (m,), barycentric weights (m, 3)."""
     target = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int64)

@@ -1,7 +1,5 @@
 """QualityReport: how much a trivariate spline distorts, and how well it fits the mesh it came from."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any, Generic, TypeVar
@@ -50,7 +48,7 @@ class QualityReport:
     arap: sum of (sigma_i - 1)^2, the smallest sigma signed with det J, over `arap_points` Gauss points.
     boundary: ||F(v_p) - v|| over the mesh's own `mesh_vertices` vertices; cuts and subdivisions do not count.
     mesh_to_spline: from each of `mesh_vertices` vertices to the spline's boundary (foot point refined on the spline).
-    spline_to_mesh: from samples_per_face x samples_per_face points a cube face to the mesh's triangles.
+    spline_to_mesh: from SAMPLES x SAMPLES points a cube face to the mesh's triangles.
     """
 
     control_points: tuple[int, int, int]
@@ -63,7 +61,6 @@ class QualityReport:
     mesh_vertices: int
     spline_to_mesh: BothScales[Distances]
     boundary_check: BoundaryCheck
-    samples_per_face: int = SAMPLES
 
     def as_dict(self) -> dict[str, Any]:
         """Return the section in plain Python types, ready for JSON; a bound that is not finite is None."""
@@ -85,7 +82,7 @@ class QualityReport:
                 "arap": self.arap_points,
                 "boundary": self.mesh_vertices,
                 "mesh_to_spline": self.mesh_vertices,
-                "spline_to_mesh": 6 * self.samples_per_face**2,
+                "spline_to_mesh": 6 * SAMPLES**2,
             },
         }
 
@@ -96,7 +93,7 @@ class QualityReport:
             verdict = f"folded at {in_brackets(certificate.witness)}"
         if self.boundary_check.meeting is not None:
             verdict += f"; the boundary {self.boundary_check.meeting}"
-        size = " x ".join(str(n) for n in self.control_points)
+        size = " x ".join(map(str, self.control_points))
         lines = [
             f"{size} control points of degree {', '.join(str(p) for p in self.degrees)}: {verdict}",
             f"{'':16}  {'at volume 1':<32}  as given",

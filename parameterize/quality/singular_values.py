@@ -1,7 +1,5 @@
 """Singular values of 3 x 3 matrices, the smallest with the sign of the determinant."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import ArrayLike

@@ -5,18 +5,15 @@ Its values lie between the least and the largest c_i, and c_0 and c_q are its va
 Farouki, "The Bernstein polynomial basis: a centennial retrospective", CAGD 29 (2012).
 """
 
-from __future__ import annotations
-
 from math import comb
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 
 
-def extraction(knots: Array, degree: int) -> tuple[NDArray[np.int64], Array]:
+def extraction(knots: Array, degree: int) -> tuple[IntArray, Array]:
     """Return what turns the spline's coefficients into the Bernstein coefficients of every span.
 
     Returns `first` (n_spans,), the first B-spline coefficient that a span needs, and `weights`
@@ -67,7 +64,7 @@ def add_products(a: Array, b: Array, sign: float, out: Array) -> None:
 
 
 def cross_products(a: Array, b: Array) -> Array:
-    """Cross products of vectors (3, n_0, n_1, n_2, k) and (3, m_0, m_1, m_2, k) in scaled Bernstein form."""
+    """Return the cross products of vectors (3, n_0, n_1, n_2, k) and (3, m_0, m_1, m_2, k) in scaled Bernstein form."""
     sizes = (n + m - 1 for n, m in zip(a.shape[1:4], b.shape[1:4], strict=True))
     products = np.zeros((3, *sizes, a.shape[4]))
     for c in range(3):

@@ -5,14 +5,12 @@ functions. Recurrences are those of Piegl and Tiller, *The NURBS Book* (2nd ed.)
 scipy.interpolate is slow to load: it is imported where it is used.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 
 import numba
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from ..arrays import Array, IntArray
@@ -70,7 +68,7 @@ def greville(knots: Array, degree: int) -> Array:
     return np.array([knots[i + 1 : i + degree + 1].mean() for i in range(n)])
 
 
-def find_spans(knots: Array, degree: int, x: ArrayLike) -> NDArray[np.int64]:
+def find_spans(knots: Array, degree: int, x: ArrayLike) -> IntArray:
     """Return the index i with knots[i] <= x < knots[i + 1] for each x, same shape as `x`; the last span is closed."""
     n = len(knots) - degree - 1
     spans = np.searchsorted(knots, np.asarray(x, dtype=np.float64), side="right") - 1
@@ -78,7 +76,7 @@ def find_spans(knots: Array, degree: int, x: ArrayLike) -> NDArray[np.int64]:
     return np.clip(spans, degree, last)
 
 
-def basis_derivatives(knots: Array, degree: int, x: ArrayLike, derivatives: int = 0) -> tuple[NDArray[np.int64], Array]:
+def basis_derivatives(knots: Array, degree: int, x: ArrayLike, derivatives: int = 0) -> tuple[IntArray, Array]:
     """Return values and derivatives of the `degree + 1` basis functions that are nonzero at each point.
 
     That is `first` (m,), the index of the first such function, and `values` (derivatives + 1, m, degree + 1).
@@ -94,7 +92,7 @@ def basis_derivatives(knots: Array, degree: int, x: ArrayLike, derivatives: int 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def fill_basis(knots: Array, degree: int, x: Array, spans: IntArray, out: Array) -> None:
-    """Values and derivatives of the functions that are not zero at points (m,) of these spans: into out (d, m, p + 1).
+    """Write values and derivatives of the functions that are not zero at points (m,) of spans into out (d, m, p + 1).
 
     Row q of `table` has the q + 1 values of degree q (Cox-de Boor).
     """

@@ -1,7 +1,5 @@
 """BSplineVolume: a trivariate tensor-product B-spline F from the unit cube to space (paper, eq. 1)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,7 +90,7 @@ class BSplineVolume:
         object.__setattr__(self, "control_points", points)
 
     @classmethod
-    def uniform(cls, control_points: ArrayLike, degree: int = 3) -> BSplineVolume:
+    def uniform(cls, control_points: ArrayLike, degree: int = 3) -> "BSplineVolume":
         """Make a volume with the same degree and equal spans in the three directions."""
         points = real_array(control_points, "control_points")
         knots = tuple(open_uniform_knots(n, degree) for n in points.shape[:3])
@@ -129,7 +127,7 @@ class BSplineVolume:
         """Return the Jacobian on a tensor grid: (len(u), len(v), len(w), 3, 3), last index the parametric direction."""
         return np.stack([self.grid(u, v, w, d) for d in ((1, 0, 0), (0, 1, 0), (0, 0, 1))], axis=-1)
 
-    def refined(self, levels: int = 1) -> BSplineVolume:
+    def refined(self, levels: int = 1) -> "BSplineVolume":
         """Return the same map with every span halved `levels` times, exactly (knot insertion)."""
         if levels < 0:
             raise ValueError(f"levels must be non-negative, got {levels}")
@@ -147,7 +145,7 @@ class BSplineVolume:
         """Return the control points of a boundary face, e.g. (n_v, n_w, 3) for axis 0; side 0 or 1."""
         return np.take(self.control_points, 0 if side == 0 else -1, axis=axis)
 
-    def transformed(self, scale: float, offset: ArrayLike) -> BSplineVolume:
+    def transformed(self, scale: float, offset: ArrayLike) -> "BSplineVolume":
         """Return the map scale * F + offset."""
         return BSplineVolume(self.degrees, self.knots, scale * self.control_points + np.asarray(offset))
 
@@ -156,7 +154,7 @@ class BSplineVolume:
         save_spline(path, self.degrees, self.knots, control_points=self.control_points)
 
     @classmethod
-    def load(cls, path: str | Path) -> BSplineVolume:
+    def load(cls, path: str | Path) -> "BSplineVolume":
         """Read volume.npz. Raises FileNotFoundError, or ValueError naming what is wrong with the file."""
         degrees, knots, points = load_spline(path, "control_points")
         try:

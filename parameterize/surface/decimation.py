@@ -1,7 +1,5 @@
 """Reduces the number of triangles of a surface, only where the user asks for it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import igl

@@ -1,7 +1,5 @@
 """The error that refuses a surface, and the checks that files and arrays share."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..arrays import Array, IntArray

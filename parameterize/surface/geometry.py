@@ -1,10 +1,35 @@
-"""Normals, areas, quadrics and weights at the triangles and vertices of a mesh."""
-
-from __future__ import annotations
+"""Edges, components, volume, normals, quadrics and weights of a triangle mesh."""
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, IntArray
+
+
+def edge_table(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the undirected edges (e, 2), sorted, and the number of faces at each (e,)."""
+    pairs = np.sort(directed_edges(faces), axis=1)
+    base = int(faces.max()) + 1 if len(faces) else 1
+    keys, counts = np.unique(pairs[:, 0] * base + pairs[:, 1], return_counts=True)
+    return np.stack([keys // base, keys % base], axis=1), counts
+
+
+def directed_edges(faces: IntArray) -> IntArray:
+    """Return the edges (3 m, 2) in the direction of each face; edge k of face i is row 3 i + k."""
+    return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
+def connected(links: IntArray, count: int) -> IntArray:
+    """Return the number of the component that each of `count` things belongs to (count,), joined by links (k, 2)."""
+    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def signed_volume(vertices: Array, faces: IntArray) -> float:
+    """Return the volume enclosed by faces wound outward; it is negative when they are wound inward."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return float(np.sum(np.cross(a, b) * c) / 6.0)
 
 
 def doubled_areas(vertices: Array, faces: IntArray) -> Array:
@@ -28,14 +53,24 @@ def vertex_normals(vertices: Array, faces: IntArray) -> Array:
     return sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
 
 
-def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float) -> Array:
-    """Return the area-weighted mean of n n^T over the triangles at each vertex, plus `tangential` times I (n, 3, 3)."""
+def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float, sharp: float = 0.0) -> Array:
+    """Return the area-weighted mean of n n^T over the triangles at each vertex, plus `tangential` times I (n, 3, 3).
+
+    Eigenvalues below sin^2(sharp / 2) are left out, `sharp` in degrees: the triangles of a smooth surface, too, face in
+    slightly different directions, and what they would hold is how F slides along it. At an edge between two faces whose
+    normals differ by an angle a, the second eigenvalue is sin^2(a / 2).
+    """
     cross = doubled_areas(vertices, faces)
     area = np.linalg.norm(cross, axis=1)
     normal = cross / np.maximum(area, 1e-300)[:, None]
     share = area[:, None, None] * normal[:, :, None] * normal[:, None, :]
     sums, total = (_summed(values, faces, len(vertices)) for values in (share, area))
-    return sums / np.maximum(total, 1e-300)[:, None, None] + tangential * np.eye(3)
+    mean = sums / np.maximum(total, 1e-300)[:, None, None]
+    if sharp > 0.0:
+        values, vectors = np.linalg.eigh(mean)
+        held = np.where(values < np.sin(0.5 * np.radians(sharp)) ** 2, 0.0, values)
+        mean = (vectors * held[:, None]) @ np.swapaxes(vectors, 1, 2)
+    return mean + tangential * np.eye(3)
 
 
 def vertex_weights(vertices: Array, faces: IntArray, own: int) -> Array:

@@ -1,7 +1,5 @@
 """The deepest interior point of a closed surface."""
 
-from __future__ import annotations
-
 import igl
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Finds the faces of a surface that pass through each other, and where."""
 
-from __future__ import annotations
-
 import numpy as np
 from igl.predicates import find_self_intersections
 

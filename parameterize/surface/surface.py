@@ -1,7 +1,5 @@
 """Surface: a closed surface of genus 0, checked and repaired, or a MeshError that says why it is refused."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 from dataclasses import dataclass
@@ -13,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, in_brackets
 from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
+from .geometry import signed_volume
 from .inside import deepest_point
 from .readers.file import RawMesh, read_mesh
 from .self_intersection import SHOWN, crossing_faces, crossing_places, describe_crossings
-from .topology import check_genus, check_manifold, check_volume, choose_component, slivers
-from .welding import orient, signed_volume, weld_and_drop
+from .topology import check_genus, check_manifold, choose_component, slivers
+from .welding import weld_and_drop, wind_outward
 
 __all__ = ["MAX_FACES", "MeshError", "Surface", "load_surface", "surface_from_arrays"]
 
@@ -150,19 +149,19 @@ def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces
     if len(faces) < 4:
         raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
     middle, size, remarks = _box(vertices, faces)
-    kept, triangles, mended = weld_and_drop((vertices - middle) / size, faces)
+    unit = (vertices - middle) / size
+    triangles, mended = weld_and_drop(unit, faces)
     if len(triangles) < 4:
         raise MeshError(f"{len(triangles)} faces that are not degenerate, at least 4 are needed: export it again")
+    triangles, chosen = choose_component(unit, triangles, component)
+    kept, compact = np.unique(triangles, return_inverse=True)
+    points, triangles = unit[kept], compact.reshape(-1, 3).astype(np.int64)
 
     def where(vertex: int) -> str:
         return in_brackets(vertices[kept[vertex]])
 
-    triangles, chosen = choose_component((vertices[kept] - middle) / size, triangles, component)
-    used, compact = np.unique(triangles, return_inverse=True)
-    kept, triangles = kept[used], compact.reshape(-1, 3).astype(np.int64)
-    points = (vertices[kept] - middle) / size
     check_manifold(triangles, where)
-    triangles, turned = _wind_outward(points, triangles)
+    triangles, turned = wind_outward(points, triangles)
     check_genus(triangles)
     doubts = slivers(points, triangles, where)
     crossings = crossing_faces(points, triangles)
@@ -199,14 +198,3 @@ def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:
     if abs(middle).max() > 1e6 * size:
         remarks.append(f"far from the origin ({abs(middle).max() / size:.1e} times its size): digits are lost")
     return middle, size, remarks
-
-
-def _wind_outward(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
-    wound = orient(faces)
-    if wound is None:
-        raise MeshError("one-sided surface (no consistent orientation): it bounds no solid")
-    faces, notices = wound
-    check_volume(vertices, faces)
-    if signed_volume(vertices, faces) < 0:
-        return faces[:, ::-1].copy(), [*notices, "inverted orientation flipped: faces now point outward"]
-    return faces, notices

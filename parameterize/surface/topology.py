@@ -3,20 +3,16 @@
 Positions in messages are the user's: the caller passes `where`, which turns a vertex number into text.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import igl
 import numpy as np
 
 from ..arrays import Array, IntArray
-from .edges import connected, edge_table
 from .errors import MeshError
-from .welding import components, signed_volume
+from .geometry import connected, directed_edges, edge_table
 
 Where = Callable[[int], str]
-LEAST_VOLUME = 1e-12  # of the cube over the box's longest side
 SLIVER_DEGREES = 0.5
 LISTED = 8
 
@@ -26,7 +22,7 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
 
     Raises MeshError listing the components, and saying which lies inside the largest.
     """
-    groups = components(faces)
+    groups = _components(faces)
     if component is None and len(groups) == 1:
         return faces, []
     sizes = ", ".join(f"{i}: {len(group)} faces" for i, group in enumerate(groups[:LISTED]))
@@ -43,6 +39,14 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
             f"no cavity; remove the inner shell, or fill it by choosing --component {outer}"
         )
     raise MeshError(f"{len(groups)} components ({sizes}): choose one with --component N, or join them")
+
+
+def _components(faces: IntArray) -> list[IntArray]:
+    """Return the face numbers of each component (faces sharing a vertex), the largest first."""
+    label = connected(directed_edges(faces), int(faces.max()) + 1)[faces[:, 0]]
+    order = np.argsort(label, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    return sorted(groups, key=lambda group: (-len(group), int(group[0])))
 
 
 def _inside(vertices: Array, faces: IntArray, groups: list[IntArray]) -> tuple[int, list[int]]:
@@ -90,12 +94,6 @@ def check_genus(faces: IntArray) -> None:
             f"genus {genus} ({genus} {'handle' if genus == 1 else 'handles'}), expected 0: a cube has no handle, so "
             "one cube cannot be mapped one-to-one onto it; fill the tunnels or cut the model into pieces"
         )
-
-
-def check_volume(vertices: Array, faces: IntArray) -> None:
-    """Raise MeshError for a surface (box of side 1) that encloses nothing."""
-    if abs(signed_volume(vertices, faces)) < LEAST_VOLUME:
-        raise MeshError("encloses no volume (a flat or doubled sheet): give it thickness")
 
 
 def slivers(vertices: Array, faces: IntArray, where: Where) -> list[str]:

@@ -6,8 +6,6 @@ triangles, so no hole ever opens. The minimum follows from those of shorter chai
 "Filling gaps in the boundary of a polyhedron", CAGD 12, 1995).
 """
 
-from __future__ import annotations
-
 from itertools import chain
 
 import numba

@@ -1,16 +1,15 @@
 """Repairs a mesh and says so: duplicate vertices, degenerate faces, inconsistent winding."""
 
-from __future__ import annotations
-
 import igl
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..arrays import Array, IntArray
-from .edges import connected, directed_edges, edge_table
+from ..arrays import Array, IntArray, Mask
+from .errors import MeshError
+from .geometry import connected, directed_edges, doubled_areas, edge_table, signed_volume
 
 WELD_TOLERANCE = 1e-7  # of the box's longest side: what single precision cannot tell apart
+LEAST_VOLUME = 1e-12  # of the cube over the box's longest side
 FLAT = 1e-14  # twice a face's area over its longest edge squared, below which it counts as degenerate
 
 
@@ -19,17 +18,19 @@ def is_closed(faces: IntArray) -> bool:
     return len(faces) > 0 and bool(np.all(edge_table(faces)[1] == 2))
 
 
-def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray, list[str]]:
+def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
     """Weld duplicates, drop degenerate faces and unused vertices of a mesh whose box has side 1.
 
     A mesh that is closed as numbered keeps vertices that merely touch; only edges of no length are collapsed there.
-    Returns the vertices to keep (n,), as numbers, faces (m, 3) that count in those, and notices.
+    Returns the faces (m, 3) that are left, in the same vertex numbers, and notices.
     """
     notices = []
     solid = faces[_distinct(faces)]
     closed = is_closed(solid)
-    merged = _merge(vertices, _short_edges(vertices, solid) if closed else _close_pairs(vertices, solid))
-    welded = merged[solid]
+    edges = edge_table(solid)[0]
+    short = edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
+    label = connected(short if closed else _close_pairs(vertices, solid), len(vertices))
+    welded = np.unique(label, return_index=True)[1][label][solid]  # the lowest vertex of those that are joined
     welded = welded[_distinct(welded)]
     if closed and not is_closed(welded):
         welded = solid  # collapsing would tear the surface: keep its edges of no length
@@ -43,33 +44,27 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     unused = len(vertices) - len(np.unique(faces))
     if unused:
         notices.append(f"dropped {unused} vertices that no face uses")
-    kept, compact = np.unique(welded, return_inverse=True)
-    return kept, compact.reshape(-1, 3).astype(np.int64), notices
+    return welded, notices
 
 
-def orient(faces: IntArray) -> tuple[IntArray, list[str]] | None:
-    """Return the faces (m, 3) of a closed component wound alike, and notices, or None where that is impossible."""
-    if _is_oriented(faces):
-        return faces, []
-    turned, _ = igl.bfs_orient(faces)
-    if not _is_oriented(turned):
-        return None
-    count = int(np.count_nonzero(np.any(turned != faces, axis=1)))
-    return turned, [f"repaired inconsistent winding: {min(count, len(faces) - count)} faces flipped"]
+def wind_outward(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
+    """Return the faces (m, 3) of a closed component, wound outward, and notices; its box has side 1.
 
-
-def signed_volume(vertices: Array, faces: IntArray) -> float:
-    """Return the volume enclosed by faces wound outward; it is negative when they are wound inward."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return float(np.sum(np.cross(a, b) * c) / 6.0)
-
-
-def components(faces: IntArray) -> list[IntArray]:
-    """Return the face numbers of each component (faces sharing a vertex), the largest first."""
-    label = connected(directed_edges(faces), int(faces.max()) + 1)[faces[:, 0]]
-    order = np.argsort(label, kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    return sorted(groups, key=lambda group: (-len(group), int(group[0])))
+    Raises MeshError for a surface that has one side only or encloses nothing.
+    """
+    wound, notices = faces, []
+    if not _is_oriented(faces):
+        wound, _ = igl.bfs_orient(faces)
+        if not _is_oriented(wound):
+            raise MeshError("one-sided surface (no consistent orientation): it bounds no solid")
+        count = int(np.count_nonzero(np.any(wound != faces, axis=1)))
+        notices.append(f"repaired inconsistent winding: {min(count, len(faces) - count)} faces flipped")
+    volume = signed_volume(vertices, wound)
+    if abs(volume) < LEAST_VOLUME:
+        raise MeshError("encloses no volume (a flat or doubled sheet): give it thickness")
+    if volume < 0:
+        return wound[:, ::-1].copy(), [*notices, "inverted orientation flipped: faces now point outward"]
+    return wound, notices
 
 
 def _is_oriented(faces: IntArray) -> bool:
@@ -78,20 +73,16 @@ def _is_oriented(faces: IntArray) -> bool:
     return len(np.unique(keys)) == len(keys)
 
 
-def _distinct(faces: IntArray) -> NDArray[np.bool_]:
+def _distinct(faces: IntArray) -> Mask:
     a, b, c = faces.T
     return (a != b) & (b != c) & (c != a)
 
 
 def _areas(vertices: Array, faces: IntArray) -> Array:
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    longest = np.max([np.sum((p - q) ** 2, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / np.maximum(longest, 1e-300)
-
-
-def _short_edges(vertices: Array, faces: IntArray) -> IntArray:
-    edges = edge_table(faces)[0]
-    return edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
+    """Return twice the area of each face over the square of its longest edge, (m,)."""
+    corners = vertices[faces]  # (m, 3, 3)
+    longest = np.sum((corners - np.roll(corners, 1, axis=1)) ** 2, axis=2).max(axis=1)
+    return np.linalg.norm(doubled_areas(vertices, faces), axis=1) / np.maximum(longest, 1e-300)
 
 
 def _close_pairs(vertices: Array, faces: IntArray) -> IntArray:
@@ -105,9 +96,3 @@ def _close_pairs(vertices: Array, faces: IntArray) -> IntArray:
     within = np.stack([used[first[member]], used], axis=1)
     across = KDTree(vertices[used[first]]).query_pairs(WELD_TOLERANCE, output_type="ndarray")
     return np.concatenate([within, used[first[across]]]).astype(np.int64)
-
-
-def _merge(vertices: Array, pairs: IntArray) -> IntArray:
-    """Return for every vertex the lowest vertex that the pairs (k, 2) join it with, (n,)."""
-    label = connected(pairs, len(vertices))
-    return np.unique(label, return_index=True)[1][label]

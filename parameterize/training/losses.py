@@ -3,8 +3,6 @@
 The paper gives the terms' own formulas without numbers: those of L_bound in section 4.4.1, those of L_inner in 4.4.2.
 """
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

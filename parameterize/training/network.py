@@ -1,7 +1,5 @@
 """The network G: an affine map plus a residual MLP on a positional encoding (section 4.2)."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

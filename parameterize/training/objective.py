@@ -1,7 +1,5 @@
 """The training loss of a step: the terms of `losses` on interior stencils, surface triangles, corners and paths."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

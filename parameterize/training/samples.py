@@ -1,7 +1,5 @@
 """Samples that the losses are evaluated on: interior stencils (section 4.4.2) and surface triangles, both seeded."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import igl

@@ -1,7 +1,5 @@
 """Nearest points on the shapes the domain is mapped to: smooth cuboids S(d) and the unit cube (Definition 1)."""
 
-from __future__ import annotations
-
 from math import pi
 
 import torch

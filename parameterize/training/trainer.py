@@ -1,7 +1,5 @@
 """The training stages as one loop: smooth cuboids S(2), S(1), cube, fixed corners, fixed edges (section 4.3.1)."""
 
-from __future__ import annotations
-
 import logging
 import math
 import time
@@ -17,8 +15,7 @@ from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
-from ..history import History
-from ..progress import Progress, ProgressCallback
+from ..progress import History, Progress, ProgressCallback
 from .network import InverseMap
 from .objective import BoundarySamples, EdgePaths, Objective
 from .samples import TriangleSampler, interior_points, stencils
@@ -115,7 +112,7 @@ class Trainer:
         labels = paths = None
         if stage.weights.edge > 0.0:
             assert corners is not None
-            surface = cut_surface(self.mapped(), faces, corners)
+            surface = cut_surface(self.mapped(), faces, corners, self.config.layout)
             vertices, faces, corners = surface.cut.carry(vertices), surface.cut.faces, surface.corners
             path, target, following = edge_targets(self.map(vertices), surface.paths)
             paths = EdgePaths(self._index(path), self._tensor(target), self._index(following))

@@ -1,27 +1,30 @@
-"""The operator of a scalar symmetric law, matrix-free: -div(kappa grad u) + c u.
+"""The operators of laws, matrix-free by sum factorization, and the one pass that assembles them and their load.
 
-In parametric coordinates the form is the integral of grad v . G grad u with G = det J J^-1 kappa J^-T; six numbers a
-quadrature point hold it, and sum factorization applies it (Antolin, Buffa, Calabro, Martinelli, Sangalli, CMAME 2015).
+Of a scalar symmetric law G = det J J^-1 kappa J^-T is kept, six numbers a quadrature point. Any other law is called on
+planes of points: gradients are pulled back, the law turns them into fluxes, and these are pushed forward.
 """
 
-from __future__ import annotations
-
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.volume import FACE_NAMES
+from parameterize.spline.bspline import collocation
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.threads import in_parallel
 
 from ..forms.data import check_faces
-from ..threads import colours, in_parallel
-from . import kernels, product
-from .quadrature import GaussRule, GroupTable, Table
+from ..forms.form import Form, reaction
+from ..forms.jets import PAIRS
+from ..threads import colours
+from . import kernels
+from .planes import geometry_planes
+from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace
 
-PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six factors
 Window = tuple[slice, slice, slice]
 
 
@@ -37,112 +40,211 @@ def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> W
 
 
 @dataclass(frozen=True, eq=False)
-class Operator:
-    """Symmetric positive semidefinite matrix of the form, never assembled.
+class MatrixFree:
+    """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    tables: the trial basis at the points of the rule. window: the free coefficients. threads: of a product.
-    factors: (q_u, v blocks, q_w, 6 or 7, LANES), the six of G and c w det J where there is a reaction; weights
-    included, points of v in blocks, the last one filled up with zeros.
-    Coefficients are (n_u, n_v, n_w), or with a leading axis of one.
+    window: the free coefficients of each component. threads: of a product.
     """
 
     space: TrialSpace
     rule: GaussRule
-    tables: tuple[Table, Table, Table]
-    factors: Array
     window: Window
-    threads: int = 1
-
-    @classmethod
-    def empty(
-        cls, space: TrialSpace, rule: GaussRule, has_reaction: bool, window: Window, threads: int = 1
-    ) -> Operator:
-        """Return an operator whose factors are still to be written."""
-        blocks, terms = -(-rule.shape[1] // kernels.LANES), 6 + has_reaction
-        factors = np.empty((rule.shape[0], blocks, rule.shape[2], terms, kernels.LANES))
-        return cls(space, rule, rule.tabulate(space.degrees, space.knots), factors, window, threads)
+    threads: int
 
     @cached_property
-    def _groups(self) -> tuple[GroupTable, GroupTable]:
-        """Of directions v and w."""
-        return self.tables[1].grouped(), self.tables[2].grouped()
+    def tables(self) -> kernels.Tables:
+        """The trial basis at the points of the rule."""
+        return self.rule.tabulate(self.space.degrees, self.space.knots)
 
-    @cached_property
-    def _pieces(self) -> tuple[list[IntArray], list[IntArray]]:
-        return colours(self.tables[0].first, self.space.degrees[0], self.threads)
+    def on_planes(self, task: Callable[[IntArray], None]) -> None:
+        """Run a task on all points of u, in pieces: it may add to coefficients that belong to those it is given."""
+        for pieces in colours(self.tables[0][0], self.space.degrees[0], self.threads):
+            in_parallel(task, pieces, self.threads)
 
     def apply(self, coefficients: Array) -> Array:
-        """Return the product with coefficients of shape `space.shape`, those that are not free included."""
-        return self._multiply(coefficients, (0, 0, 0))
+        """Return the product with coefficients, those that are not free included."""
+        source = np.ascontiguousarray(coefficients).reshape(-1, *self.space.shape)
+        result = np.zeros_like(source)
+        self.on_planes(lambda points: self._multiply(points, source, result))
+        return result.reshape(coefficients.shape)
 
     def apply_free(self, free: Array) -> Array:
-        """Return the product restricted to the free coefficients, an array of the window's shape."""
-        u, v, w = self.window
-        return self._multiply(free, (u.start, v.start, w.start))
+        """Return the product restricted to the free coefficients, (c, ...) or (...) of the window's shape."""
+        full = np.zeros((*free.shape[:-3], *self.space.shape))
+        full[..., *self.window] = free
+        return np.ascontiguousarray(self.apply(full)[..., *self.window])
 
-    def _multiply(self, values: Array, start: tuple[int, int, int]) -> Array:
-        """Return the block of the matrix that belongs to values (m_u, m_v, m_w) from `start` on, times them."""
-        n_u, n_v, n_w = self.space.shape
-        packed = np.zeros((n_u, -(-n_w // product.ROWS), n_v, product.ROWS))
-        total, box = np.zeros_like(packed), values.shape[-3:]
-        product.pack(values.reshape(box), *start, packed)
-        for pieces in self._pieces:
-            in_parallel(lambda points: self.multiply_planes(points, packed, total), pieces, self.threads)
-        result = np.empty(box)
-        product.unpack(total, *start, result)
-        return result.reshape(values.shape)
+    def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
+        """Add the part of some points of u to the product with coefficients (c, n_u, n_v, n_w)."""
+        raise NotImplementedError
 
-    def multiply_planes(self, points: IntArray, packed: Array, total: Array) -> None:
-        """Add the part of some points of u to a packed total."""
-        q_u, v_blocks, q_w, terms, lanes = self.factors.shape
-        factors = self.factors.reshape(q_u, v_blocks, q_w * terms * lanes)
-        tables = (self.tables[0], *self._groups)
-        product.multiply_planes(packed, points, *tables, factors, (0,) * terms, self.space.shape[2], total)
+
+@dataclass(frozen=True, eq=False)
+class Operator(MatrixFree):
+    """The positive semidefinite matrix of a scalar symmetric law.
+
+    factors: (q_u, 6 or 7, q_w, q_v), the six of G and c |det J| where there is a reaction; weights included.
+    """
+
+    factors: Array
+
+    def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
+        kernels.multiply_planes(coefficients[0], points, self.tables, self.factors, result[0])
 
     def diagonal(self) -> Array:
         """Return the diagonal of the matrix, shape `space.shape`: squared basis functions in place of the basis."""
         result = np.zeros(self.space.shape)
-        u, v, w = self.tables
-        products = [  # per direction, (q, degree + 1): values of B B, B B' and B' B' at index sum of derivatives
-            (t.values[0] ** 2, t.values[0] * t.values[1], t.values[1] ** 2) for t in self.tables
+        products = [  # per direction, (3, q, degree + 1): values of B B, B B' and B' B' at index sum of derivatives
+            (first, np.stack([b[0] ** 2, b[0] * b[1], b[1] ** 2]), functions) for first, b, functions in self.tables
         ]
-        pairs = (*PAIRS, ())[: self.factors.shape[3]]
 
         def add(points: IntArray) -> None:
-            plane = np.empty(self.space.shape[1:])
             for q in points:
-                window = slice(u.first[q], u.first[q] + u.values.shape[2])
-                for index, pair in enumerate(pairs):
-                    in_u, in_v, in_w = (products[a][pair.count(a)] for a in range(3))
-                    kernels.integrate_plane(self.factors[q], index, v.first, in_v, w.first, in_w, plane)
+                for field, pair in zip(self.factors[q], (*PAIRS, ()), strict=False):
                     twice = 2.0 if len(set(pair)) == 2 else 1.0
-                    result[window] += twice * np.multiply.outer(in_u[q], plane)
+                    add_integrals(products, q, twice * field, result, tuple(pair.count(a) for a in range(3)))
 
-        for pieces in self._pieces:
-            in_parallel(add, pieces, self.threads)
+        self.on_planes(add)
         return result
 
+    def dense(self, axis: int, derivative: int) -> Array:
+        """Return the matrix (q, n) of a direction's functions, or of their derivatives, at its points."""
+        knots, degree = self.space.knots[axis], self.space.degrees[axis]
+        matrix: Array = collocation(knots, degree, self.rule.points[axis], derivative).toarray()
+        return matrix
+
     def mean_mass(self) -> float:
-        """Return the average over the cube of c det J."""
-        if self.factors.shape[3] < 7:
-            return 0.0
-        return float(sum(plane[:, :, 6].sum() for plane in self.factors))
+        """Return the average over the cube of c |det J|."""
+        return float(sum(plane[6:].sum() for plane in self.factors))
 
 
-def prepare(space: TrialSpace, rule: GaussRule, reaction: bool = False) -> None:
-    """Compile the product for a space's degrees and a rule, or load it from the cache: no timing contains it."""
-    # A large block freed teaches glibc (mallopt(3), M_MMAP_THRESHOLD) to keep freed memory. Else every temporary of a
-    # plane goes back to the system and is faulted in again: formulas take five times as long.
-    np.empty(2**21)
-    tables = rule.tabulate(space.degrees, space.knots)
-    factors = np.zeros((0, 0, 0, 6 + reaction, kernels.LANES))
-    packed = np.zeros((1, 1, 1, product.ROWS))
-    Operator(space, rule, tables, factors, free_window(space)).multiply_planes(np.arange(0), packed, packed)
+@dataclass(frozen=True, eq=False)
+class FormOperator(MatrixFree):
+    """The matrix of any law's form.
+
+    rows: (q_u, 3, 3, q_w, q_v), R of `geometry_planes`, kept for a constant law; else it follows from the map in every
+    product.
+    """
+
+    volume: BSplineVolume
+    form: Form
+    rows: Array | None
+
+    def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
+        form, planes = self.form, self.rule.plane_shape
+        fields, gradient = np.empty((len(coefficients), 4, *planes)), np.empty((len(coefficients), 3, *planes))
+        for q, rows, measure, x in self._geometry(points):
+            for component, field in zip(coefficients, fields, strict=True):
+                kernels.evaluate_plane(component, q, self.tables, field)
+            kernels.turn(rows, fields[:, 1:], gradient, False)
+            values = fields[:, 0]
+            if measure is not None:
+                scale = np.sqrt(np.abs(measure))
+                values = values * scale
+                fields[:, 0] = reaction(form, values, gradient, x) * scale
+            flux = np.ascontiguousarray(form.flux(values, gradient, x), dtype=np.float64)
+            kernels.turn(rows, flux, fields[:, 1:], True)
+            for field, total in zip(fields, result, strict=True):
+                kernels.spread_plane(field, q, self.tables, form.has_reaction, total)
+
+    def _geometry(self, points: IntArray) -> Iterable[tuple[int, Array, Array | None, Any]]:
+        """Return what `geometry_planes` yields, of a constant law q and R alone."""
+        if self.rows is not None:
+            return ((q, self.rows[q], None, None) for q in points)
+        return geometry_planes(self.volume, self.rule, points)
+
+    def block(self, component: int) -> Operator:
+        """Return the symmetric part of a component's diagonal block: the law of its own gradient and value."""
+        law, rule = (self.volume, self.space, self.form), self.rule
+        block = assemble(*law, rule=rule, window=self.window, component=component, threads=self.threads).operator
+        assert isinstance(block, Operator)
+        return block
 
 
-def to_blocks(plane: Array) -> Array:
-    """A plane (q_w, q_v) in blocks of points of v: (v blocks, q_w, LANES), filled up with zeros."""
-    q_w, q_v = plane.shape
-    padded = np.zeros((q_w, -(-q_v // kernels.LANES) * kernels.LANES))
-    padded[:, :q_v] = plane
-    return padded.reshape(q_w, -1, kernels.LANES).transpose(1, 0, 2)
+@dataclass(frozen=True, eq=False)
+class Assembled:
+    """Operator, load (c, n_u, n_v, n_w), and how many of the quadrature points have det J < 0."""
+
+    operator: Operator | FormOperator
+    load: Array
+    folded: int
+    points: int
+
+
+def assemble(
+    volume: BSplineVolume,
+    space: TrialSpace,
+    form: Form,
+    source: Callable[[Array], Array] | None = None,
+    rule: GaussRule | None = None,
+    *,
+    window: Window | None = None,
+    component: int | None = 0,
+    threads: int = 1,
+) -> Assembled:
+    """Return operator and load of a law on a volume.
+
+    source: takes the points (3, q_w, q_v) of a plane and returns (c, q_w, q_v); None for zero.
+    window: the free coefficients, as `free_window` gives them (default: all but those of the six faces).
+    component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
+    threads: of this pass and of the operator; the functions must then be safe to call from several at a time.
+
+    Where the map is folded, |det J| takes the place of det J: the form stays positive, an answer to show if not to
+    trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
+    Raises ValueError where det J is zero at a point, naming it.
+    """
+    rule, window = rule or operator_rule(space), window or free_window(space)
+    parts = space, rule, window, threads
+    basis, part = MatrixFree(*parts), component or 0
+    factors = kept = None
+    if component is not None:
+        factors = np.empty((rule.shape[0], 6 + form.has_reaction, *rule.plane_shape))
+    elif form.constant:
+        kept = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
+    load = np.zeros((form.components, *space.shape))
+    folded = []
+
+    def fill(points: IntArray) -> None:
+        for q, rows, measure, x in geometry_planes(volume, rule, points):
+            folded.append(_count_folded(measure, rule, q))
+            size = np.abs(measure)
+            if kept is not None:
+                kept[q] = rows
+            if factors is not None:
+                kernels.tensor_factors(rows, np.ascontiguousarray(form.tensor(x, part)), factors[q])
+                if form.has_reaction:
+                    np.multiply(form.mass(x, part), size, out=factors[q, 6])
+            if source is not None:
+                for density, total in zip(source(x), load, strict=True):
+                    add_integrals(basis.tables, q, density * size, total)
+
+    basis.on_planes(fill)
+    operator = FormOperator(*parts, volume, form, kept) if factors is None else Operator(*parts, factors)
+    return Assembled(operator, load, sum(folded), int(np.prod(rule.shape)))
+
+
+def add_integrals(
+    tables: Collection[kernels.Table], q: int, field: Array, result: Array, kinds: tuple[int, ...] = (0, 0, 0)
+) -> None:
+    """Add the integrals of a field (q_w, q_v) of a plane, weights included, times each function to (n_u, n_v, n_w).
+
+    kinds: which of the tables' values, a direction each.
+    """
+    (first, u, _), (first_v, v, functions_v), (first_w, w, functions_w) = tables
+    _, n_v, n_w = result.shape
+    lines, plane = np.zeros((n_w, field.shape[1])), np.zeros((n_v, n_w))
+    kernels.spread(first_w, w[kinds[2]], functions_w, field, lines)
+    kernels.spread(first_v, v[kinds[1]], functions_v, np.ascontiguousarray(lines.T), plane)
+    result[first[q] : first[q] + u.shape[2]] += np.multiply.outer(u[kinds[0], q], plane)
+
+
+def _count_folded(measure: Array, rule: GaussRule, q: int) -> int:
+    """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J."""
+    if measure.min() > 0.0:
+        return 0
+    flat = np.argwhere(measure == 0.0)
+    if flat.size:
+        w, v = flat[0]
+        where = tuple(float(rule.points[a][i]) for a, i in enumerate((q, v, w)))
+        raise ValueError(f"volume: det J is zero at the parameters {where}; such a map has no inverse there")
+    return int(np.count_nonzero(measure < 0.0))

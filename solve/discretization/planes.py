@@ -1,34 +1,21 @@
-"""Splines on planes of quadrature points: the slab by slab evaluation under assembly and error norms."""
+"""A volume's geometry on planes of quadrature points, which assembly, products and error norms go through."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.spline.bspline import midpoints
 from parameterize.spline.volume import BSplineVolume
 
 from ..field import Points
 from . import kernels
-from .quadrature import GaussRule, Table
+from .quadrature import GaussRule
+from .space import TrialSpace
 
-
-class PlaneField:
-    """A scalar spline with its basis tabulated at a rule.
-
-    coefficients: (n_u, n_v, n_w); tables: as `GaussRule.tabulate` returns them.
-    """
-
-    def __init__(self, coefficients: Array, tables: tuple[Table, Table, Table]) -> None:
-        self._coefficients = np.ascontiguousarray(coefficients)
-        self._tables = tables
-
-    def evaluate(self, q: int, out: Array) -> None:
-        """Write value and parametric gradient on the plane through point `q` of direction u: out (4, q_w, q_v)."""
-        u, v, w = self._tables
-        weights = np.ascontiguousarray(u.values[:, q])
-        kernels.evaluate_plane(self._coefficients, u.first[q], weights, *v, *w, out)
+SAMPLES = 6  # places a direction, each three neighbouring spans
+LIMIT = 0.03  # trained maps reach 0.06 and more after two refinements, the twisted cube 0.02 with 14 elements
+TIMES = (1.0, 2.0, 2.0, 1.0, 2.0, 1.0)  # how often each of the six entries stands in a symmetric matrix
 
 
 def map_planes(
@@ -40,25 +27,57 @@ def map_planes(
     reused from one step to the next.
     """
     tables = rule.tabulate(volume.degrees, volume.knots)
-    components = [PlaneField(volume.control_points[..., c], tables) for c in range(3)]
+    components = np.ascontiguousarray(np.moveaxis(volume.control_points, -1, 0))
     fields = np.empty((3, 4, *rule.plane_shape))
     u, v, w = rule.points
     for q in range(rule.shape[0]) if points is None else points:
         for component, out in zip(components, fields, strict=True):
-            component.evaluate(q, out)
+            kernels.evaluate_plane(component, q, tables, out)
         yield q, fields, Points.of(fields[:, 0], (u[q : q + 1], v, w), (2, 1))
 
 
-def count_folded(measure: Array, rule: GaussRule, q: int) -> int:
-    """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J.
+def geometry_planes(
+    volume: BSplineVolume, rule: GaussRule, points: Iterable[int] | None = None
+) -> Iterator[tuple[int, Array, Array, Points]]:
+    """Yield as `map_planes` does: q, rows R (3, 3, q_w, q_v), w det J (q_w, q_v), and the points in space.
 
-    Raises ValueError where det J is zero, naming the place.
+    R is J^-1 times the root of w |det J|: docs/solver.md says how gradients and fluxes go through it.
     """
-    if measure.min() > 0.0:
-        return 0
-    flat = np.argwhere(measure == 0.0)
-    if flat.size:
-        w, v = flat[0]
-        where = tuple(float(rule.points[a][i]) for a, i in enumerate((q, v, w)))
-        raise ValueError(f"volume: det J is zero at the parameters {where}; such a map has no inverse there")
-    return int(np.count_nonzero(measure < 0.0))
+    rows, measure = np.empty((3, 3, *rule.plane_shape)), np.empty(rule.plane_shape)
+    for q, fields, x in map_planes(volume, rule, points):
+        kernels.plane_rows(fields, rule.plane_weights(q), rows, measure)
+        yield q, rows, measure, x
+
+
+def is_rough(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array]) -> bool:
+    """Return whether G = det J J^-1 kappa J^-T varies much from span to span of a trial space.
+
+    Measured are second differences of G between the middles of three neighbouring spans, relative to G, at SAMPLES^3
+    places. G is rough where their root mean square exceeds LIMIT in a direction, and on fewer than three spans.
+    tensor: takes points (3, ...) and returns the six entries of kappa (6, ...).
+    """
+    u, v, w = (_stencils(knots) for knots in space.knots)
+    rule = GaussRule((u, v, w), (np.ones_like(u), np.ones_like(v), np.ones_like(w)))
+    factors = np.empty((len(u), 6, *rule.plane_shape))
+    with np.errstate(all="ignore"):  # of a map without an inverse the assembly speaks
+        for q, rows, _, x in geometry_planes(volume, rule):
+            kernels.tensor_factors(rows, np.ascontiguousarray(tensor(x)), factors[q])
+        return not all(_bend(factors, axis) <= LIMIT for axis in (0, 2, 3))
+
+
+def _stencils(knots: Array) -> Array:
+    """Return the middles of SAMPLES times three neighbouring spans, of all spans where there are fewer than three."""
+    middles = midpoints(knots)
+    if len(middles) < 3:
+        return middles
+    centers = np.linspace(1, len(middles) - 2, SAMPLES).round().astype(int)
+    return middles[(centers[:, None] + [-1, 0, 1]).ravel()]
+
+
+def _bend(factors: Array, axis: int) -> float:
+    """Return the root mean square of relative second differences along an axis of triples; infinite without triples."""
+    if factors.shape[axis] < 3:
+        return np.inf
+    low, middle, high = (np.moveaxis(factors, (1, axis), (-1, 0))[i::3] for i in range(3))  # (triples, .., .., 6)
+    squares = ((low - 2.0 * middle + high) ** 2 @ TIMES) / (middle**2 @ TIMES)
+    return float(np.sqrt(squares.mean()))

@@ -1,63 +1,31 @@
-"""Tensor-product Gauss rules, on spans or of the spline space, and basis functions tabulated at their points."""
+"""Quadrature: tensor-product rules, Gauss' on every span or those of a spline space.
 
-from __future__ import annotations
+The Gauss rules of a spline space integrate its functions exactly with half as many points as it has dimensions.
+(Bressan, Calo, Hughes; Hiemstra, Calabro, Schillinger, Hughes, CMAME 316 (2017); Johannessen, CMAME 316 (2017).)
+"""
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import lru_cache
 
 import numpy as np
+from scipy.sparse import csr_array, hstack
+from scipy.sparse.linalg import splu
 
-from parameterize.arrays import Array, IntArray
-from parameterize.spline.bspline import basis_derivatives
+from parameterize.arrays import Array
+from parameterize.spline.bspline import basis_derivatives, gauss_points, greville, sparse_rows
 
-from .space import TrialSpace
-from .spline_quadrature import gauss_on_spans, spline_rule
+from .kernels import Tables
+from .space import TrialSpace, same_smoothness
 
+TOLERANCE = 1e-14  # of an integral, the interval's length being 1
+MAX_STEPS = 60  # of Newton's method: uniform knots take 6 to 10, irregular ones up to 25
+SPARE_POINTS = (0, 1, 2)  # the numbers of further points with which it is tried, one after another
+LARGEST_STEP = 0.4  # of a weight over itself, and of a point over the distance to its neighbour
 QUADRATURES = ("spline", "gauss", "gauss+1")
 
-
-class Table(NamedTuple):
-    """The basis functions of one direction at its quadrature points.
-
-    first: (q,) index of the first function that is nonzero there.
-    values: (2, q, degree + 1) values and first derivatives of the nonzero ones.
-    """
-
-    first: IntArray
-    values: Array
-
-    def grouped(self) -> GroupTable:
-        """The same for groups of points, as many in each as there are between two breakpoints on average."""
-        firsts, begins, counts = np.unique(self.first, return_index=True, return_counts=True)
-        size = int(counts.mean() + 0.5)
-        pieces = [
-            (start, min(size, begin + count - start))
-            for begin, count in zip(begins, counts, strict=True)
-            for start in range(begin, begin + count, size)
-        ]
-        start, length = np.array(pieces).T
-        values = np.zeros((len(pieces), size, *self.values.shape[::2]))
-        for group, (at, held) in enumerate(pieces):
-            values[group, :held] = self.values[:, at : at + held].transpose(1, 0, 2)
-        return GroupTable(self.first[start], start, length, values, (0,) * size, (0,) * values.shape[3])
-
-
-class GroupTable(NamedTuple):
-    """The basis functions of one direction at groups of neighbouring points where the same functions are nonzero.
-
-    first: (groups,) index of the first function that is nonzero there.
-    start, length: (groups,) index of a group's first point, and how many points it holds.
-    values: (groups, size, 2, degree + 1) values and first derivatives of the nonzero ones; zero beyond `length`.
-    points, functions: zeros, `size` and `degree` + 1 of them. The kernels are compiled for the lengths of these tuples.
-    """
-
-    first: IntArray
-    start: IntArray
-    length: IntArray
-    values: Array
-    points: tuple[int, ...]
-    functions: tuple[int, ...]
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +36,9 @@ class GaussRule:
     weights: tuple[Array, Array, Array]
 
     @property
-    def shape(self) -> tuple[int, int, int]:
+    def shape(self) -> tuple[int, ...]:
         """Number of points per direction."""
-        q_u, q_v, q_w = (len(p) for p in self.points)
-        return q_u, q_v, q_w
+        return tuple(len(points) for points in self.points)
 
     @property
     def plane_shape(self) -> tuple[int, int]:
@@ -82,19 +49,25 @@ class GaussRule:
         return self.shape[2], self.shape[1]
 
     def plane_weights(self, q: int) -> Array:
-        """Weights (q_w, q_v) of the plane through point `q` of the first direction."""
+        """Return the weights (q_w, q_v) of the plane through point `q` of the first direction."""
         w_u, w_v, w_w = self.weights
-        plane: Array = w_u[q] * np.multiply.outer(w_w, w_v)
-        return plane
+        return w_u[q] * (w_w[:, None] * w_v)
 
-    def tabulate(self, degrees: tuple[int, int, int], knots: tuple[Array, Array, Array]) -> tuple[Table, Table, Table]:
-        """Tables of any spline basis (the trial space's or the map's) at the points of this rule."""
-        u, v, w = (Table(*basis_derivatives(knots[a], degrees[a], self.points[a], derivatives=1)) for a in range(3))
+    def tabulate(self, degrees: tuple[int, int, int], knots: tuple[Array, Array, Array]) -> Tables:
+        """Return tables of any spline basis (the trial space's or the map's) at the points of this rule.
+
+        A direction's table is the index (q,) of the first function that is nonzero at each point, the values and first
+        derivatives (2, q, degree + 1) of the nonzero ones, and a tuple of degree + 1 zeros.
+        """
+        u, v, w = (
+            (*basis_derivatives(row, degree, points, derivatives=1), (0,) * (degree + 1))
+            for row, degree, points in zip(knots, degrees, self.points, strict=True)
+        )
         return u, v, w
 
 
-def gauss_rule(space: TrialSpace, counts: tuple[int, int, int] | None = None) -> GaussRule:
-    """Gauss rule on the spans of `space` with `counts` points per span (default: `space.gauss_points`)."""
+def gauss_rule(space: TrialSpace, counts: Sequence[int] | None = None) -> GaussRule:
+    """Return the Gauss rule on the spans of `space` with `counts` points per span (default: `space.gauss_points`)."""
     each = zip(space.knots, counts or space.gauss_points, strict=True)
     return _tensor_rule([gauss_on_spans(knots, count) for knots, count in each])
 
@@ -102,8 +75,8 @@ def gauss_rule(space: TrialSpace, counts: tuple[int, int, int] | None = None) ->
 def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = True) -> GaussRule:
     """Return the rule of the operator.
 
-    quadrature: "spline", Gauss rules of the spline space itself; "gauss", `degree` Gauss points a span; "gauss+1", one
-    more. rough: whether the factors vary much from span to span (`roughness.is_rough`), which takes more points.
+    quadrature: as in `SpaceOptions`. rough: whether the factors vary much from span to span (`planes.is_rough`), which
+        takes more points.
     Raises ValueError for any other quadrature.
     """
     if quadrature not in QUADRATURES:
@@ -111,8 +84,7 @@ def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = T
     if quadrature == "gauss":
         return gauss_rule(space)
     if quadrature == "gauss+1":
-        p_u, p_v, p_w = space.degrees
-        return gauss_rule(space, (p_u + 1, p_v + 1, p_w + 1))
+        return gauss_rule(space, [degree + 1 for degree in space.degrees])
     each = zip(space.knots, space.degrees, space.gauss_points, strict=True)
     return _tensor_rule([_fewest_points(*direction, rough) for direction in each])
 
@@ -128,6 +100,76 @@ def _fewest_points(knots: Array, degree: int, gauss: int, rough: bool) -> tuple[
     return gauss_on_spans(knots, gauss) if degree == 2 else spline_rule(knots, degree, 2 * degree - 1)
 
 
-def _tensor_rule(rows: Sequence[tuple[Array, Array]]) -> GaussRule:
+def _tensor_rule(rows: Iterable[tuple[Array, Array]]) -> GaussRule:
     (u, v, w), (weights_u, weights_v, weights_w) = zip(*rows, strict=True)
     return GaussRule((u, v, w), (weights_u, weights_v, weights_w))
+
+
+def gauss_on_spans(knots: Array, count: int) -> tuple[Array, Array]:
+    """Return points and weights, each (m,), of Gauss' rule with `count` points on every span, in order."""
+    points, weights = gauss_points(knots, count)
+    return points.ravel(), weights.ravel()
+
+
+def spline_rule(knots: Array, degree: int, exact: int) -> tuple[Array, Array]:
+    """Return points and positive weights, each (m,), of the Gauss rule that belongs to a trial space of one direction.
+
+    knots: open knot vector of splines of degree `degree`. The rule is exact for splines of degree `exact` that are at
+    every inner knot one derivative less smooth; 2 m is their number, or a few more. Points lie in order.
+    Where splines on `knots` are only continuous somewhere, it is Gauss' rule on every span, `degree` + 1 points: fewer
+    would miss some of their derivatives. Where Newton's method does not find the rule, a line of the log says so, and
+    Gauss' rule on every span, exact for the same degree, takes its place.
+    """
+    return _cached_rule(tuple(knots.tolist()), degree, exact)
+
+
+@lru_cache(maxsize=64)
+def _cached_rule(knots: tuple[float, ...], degree: int, exact: int) -> tuple[Array, Array]:
+    row = np.array(knots)
+    integrated = same_smoothness(row, degree - 1, exact)
+    if np.unique(integrated[exact + 1 : -exact - 1], return_counts=True)[1].max(initial=0) > exact:
+        return gauss_on_spans(row, degree + 1)
+    for spare in SPARE_POINTS:
+        if (found := _newton(integrated, exact, spare)) is not None:
+            return found
+    log.warning("no spline quadrature found for a knot vector of %d knots: Gauss on every span instead", len(row))
+    return gauss_on_spans(row, exact // 2 + 1)
+
+
+def _newton(knots: Array, degree: int, spare: int) -> tuple[Array, Array] | None:
+    """Return points and weights that integrate every B-spline of a knot vector, None where the iteration fails.
+
+    Where the dimension is odd, or points are to spare, there are more unknowns than equations, and every step is the
+    least that serves. Of an odd dimension the number of points is even: none lies at a breakpoint in the middle, where
+    slopes may jump.
+    """
+    integrals = (knots[degree + 1 :] - knots[: -degree - 1]) / (degree + 1)
+    points, weights = _first_guess(knots, degree, integrals, spare)
+    length = knots[-1] - knots[0]
+    for _ in range(MAX_STEPS):
+        first, basis = basis_derivatives(knots, degree, points, derivatives=1)
+        columns = first[:, None] + np.arange(degree + 1)
+        values, slopes = (csr_array(sparse_rows(table, columns, len(integrals)).T) for table in basis)
+        missing = integrals - values @ weights
+        if np.abs(missing).max() <= TOLERANCE * length:
+            return points, weights
+        gaps = np.diff(points, prepend=knots[0], append=knots[-1])
+        room = np.minimum(gaps[:-1], gaps[1:])
+        jacobian = csr_array(hstack([values * weights, slopes * (weights * room)]))  # unknowns are relative changes
+        try:
+            step = jacobian.T @ splu((jacobian @ jacobian.T).tocsc(), permc_spec="NATURAL").solve(missing)
+        except RuntimeError:  # a singular matrix
+            break
+        step *= min(1.0, LARGEST_STEP / np.abs(step).max())
+        weights = weights * (1.0 + step[: len(weights)])
+        points = points + room * step[len(weights) :]
+    return None
+
+
+def _first_guess(knots: Array, degree: int, integrals: Array, spare: int) -> tuple[Array, Array]:
+    """Return averaged Greville points, and as weights the integrals of the B-splines next to them."""
+    n = len(integrals)
+    m = (n // 2 if n % 2 == 0 else 2 * -(-n // 4)) + spare
+    points = np.interp((np.arange(m) + 0.5) * n / m - 0.5, np.arange(n), greville(knots, degree))
+    sums = np.concatenate([[0.0], np.cumsum(integrals)])
+    return points, np.diff(np.interp(np.arange(m + 1) * n / m, np.arange(n + 1), sums))

@@ -1,7 +1,5 @@
 """The trial space: tensor-product splines on a volume's own knots, refined and raised in degree."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,20 +11,15 @@ from parameterize.spline.volume import BSplineVolume
 
 @dataclass(frozen=True, eq=False)
 class TrialSpace:
-    """Scalar trivariate splines on the unit cube.
-
-    degrees: one per parametric direction.
-    knots: three open knot vectors on [0, 1].
-    """
+    """Scalar trivariate splines on the unit cube, of three degrees on three open knot vectors on [0, 1]."""
 
     degrees: tuple[int, int, int]
     knots: tuple[Array, Array, Array]
 
     @property
-    def shape(self) -> tuple[int, int, int]:
+    def shape(self) -> tuple[int, ...]:
         """Number of basis functions per direction."""
-        n_u, n_v, n_w = (len(k) - p - 1 for k, p in zip(self.knots, self.degrees, strict=True))
-        return n_u, n_v, n_w
+        return tuple(len(k) - p - 1 for k, p in zip(self.knots, self.degrees, strict=True))
 
     @property
     def dofs(self) -> int:
@@ -39,57 +32,51 @@ class TrialSpace:
         return int(np.prod([len(breakpoints(k)) - 1 for k in self.knots]))
 
     @property
-    def gauss_points(self) -> tuple[int, int, int]:
+    def gauss_points(self) -> tuple[int, ...]:
         """Gauss points per span and direction that the operator needs with Gauss' rule on every span.
 
         `degree` points keep the full order of convergence (they are exact for degree 2 p - 1) and cost 2.2 times less
-        than degree + 1 in three dimensions. Where the space is only continuous somewhere, as for degree 1, they
-        would let hourglass modes through: one point more.
+        than degree + 1 in three dimensions. Where the space is only continuous somewhere, as for degree 1, they would
+        let hourglass modes through, and on a single span they are fewer than the functions, whose mass matrix would be
+        singular: one point more.
         """
-        only_continuous = self._only_continuous
-        g_u, g_v, g_w = (degree + int(rough) for degree, rough in zip(self.degrees, only_continuous, strict=True))
-        return g_u, g_v, g_w
+        return tuple(
+            degree + int(_is_only_continuous(knots, degree) or len(breakpoints(knots)) == 2)
+            for knots, degree in zip(self.knots, self.degrees, strict=True)
+        )
 
     @property
     def is_only_continuous(self) -> bool:
         """Whether the functions' derivatives jump somewhere inside."""
-        return any(self._only_continuous)
+        return any(map(_is_only_continuous, self.knots, self.degrees))
 
-    @property
-    def _only_continuous(self) -> list[bool]:
-        found = []
-        for degree, knots in zip(self.degrees, self.knots, strict=True):
-            inner = np.unique(knots, return_counts=True)[1][1:-1]
-            found.append(degree == 1 or bool(np.any(inner == degree)))
-        return found
+
+def _is_only_continuous(knots: Array, degree: int) -> bool:
+    inner = np.unique(knots, return_counts=True)[1][1:-1]
+    return degree == 1 or bool(np.any(inner == degree))
 
 
 def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = None) -> TrialSpace:
-    """The trial space of a volume: every span halved `refine` times, in the given degree (default: the map's own).
+    """Return the trial space of a volume: every span halved `refine` times, in a degree, by default the map's own.
 
-    At the map's own knots the space is as smooth as the map (smoother would spoil the order of convergence) and never
-    smoother than degree - 1; at the knots that halving adds it is as smooth as its degree allows.
+    It is as smooth as the map at the map's own knots, and as its degree allows at the knots that halving adds.
     Raises ValueError for a negative `refine` or a degree below 1.
     """
     if refine < 0:
         raise ValueError(f"refine must be 0 or more (each level halves every span), got {refine}")
     if degree is not None and degree < 1:
         raise ValueError(f"degree must be at least 1, got {degree}; leave it out for the map's own degree")
-    degrees, rows = [], []
-    for own, knots in zip(volume.degrees, volume.knots, strict=True):
-        new_degree = own if degree is None else degree
-        row = _same_smoothness(knots, own, new_degree)
-        for _ in range(refine):
-            row, _ = insert_knots(row, new_degree, midpoints(row))
-        degrees.append(new_degree)
-        rows.append(row)
-    return TrialSpace((degrees[0], degrees[1], degrees[2]), (rows[0], rows[1], rows[2]))
+    degrees = volume.degrees if degree is None else (degree,) * 3
+    rows = list(map(same_smoothness, volume.knots, volume.degrees, degrees))
+    for _ in range(refine):
+        rows = [insert_knots(row, p, midpoints(row))[0] for row, p in zip(rows, degrees, strict=True)]
+    return TrialSpace(degrees, (rows[0], rows[1], rows[2]))
 
 
 def embedded(
     coefficients: Array, degrees: tuple[int, int, int], knots: tuple[Array, Array, Array], space: TrialSpace
 ) -> Array:
-    """Coefficients in `space` of a spline given in a smaller space of the same degrees; exact.
+    """Return the coefficients in `space` of a spline given in a smaller space of the same degrees; exact.
 
     Raises ValueError where the smaller space is not contained in the larger.
     """
@@ -105,8 +92,8 @@ def embedded(
     return coefficients
 
 
-def _same_smoothness(knots: Array, old: int, new: int) -> Array:
-    """Knot vector of degree `new` on the same breakpoints, as smooth at each inner one as degree `old` was."""
+def same_smoothness(knots: Array, old: int, new: int) -> Array:
+    """Return a knot vector of degree `new` on the same breakpoints, as smooth at each as degree `old` was."""
     values, repeats = np.unique(knots, return_counts=True)
     repeats = np.maximum(1, repeats + new - old)  # smoothness = degree - multiplicity
     repeats[[0, -1]] = new + 1

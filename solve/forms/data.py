@@ -1,9 +1,8 @@
 """Data of a problem: formulas in x, y, z and X, Y, Z, functions or fields, checked at every point."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,17 +23,6 @@ USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 Scalar = str | float | SplineField | Callable[..., ArrayLike]
 Data = Scalar | Sequence[Scalar]  # a sequence has one entry a component
 Entry = Expression | SplineField | Callable[[Array], ArrayLike]
-
-
-@dataclass(frozen=True)
-class OfCoordinates:
-    """A function of three arrays x, y, z as one of points (3, ...)."""
-
-    function: Callable[[Array, Array, Array], ArrayLike]
-
-    def __call__(self, x: Array) -> ArrayLike:
-        """Return the function's values."""
-        return self.function(*np.asarray(x))
 
 
 @dataclass(frozen=True)
@@ -60,7 +48,7 @@ class Datum:
         """Whether all its derivatives are known."""
         return len(self.formulas) == len(self.entries)
 
-    def placed(self, frame: UnitFrame) -> Datum:
+    def placed(self, frame: UnitFrame) -> "Datum":
         """Return the same datum with X, Y, Z measured in a frame."""
         return replace(self, entries=tuple(e.placed(frame) if isinstance(e, Expression) else e for e in self.entries))
 
@@ -72,28 +60,23 @@ class Datum:
         each = x.shape[1:] if len(self.entries) == self.components else (self.components, *x.shape[1:])
         parts = []
         for entry in self.entries:
-            found = np.asarray(_evaluate(entry, x), dtype=np.float64)
+            if isinstance(entry, Expression):
+                found = entry(*np.asarray(x))
+            else:
+                found = np.asarray(entry.at(x) if isinstance(entry, SplineField) else entry(x), dtype=np.float64)
             found = found[0] if found.shape == (1, *each) else found  # one component, written as (c, ...)
             try:
-                full = np.broadcast_to(found, each)
+                found = np.broadcast_to(found, each)
             except ValueError:
-                raise ValueError(
-                    f"{self.name} must return shape {each} at points {x.shape}, got {found.shape}"
-                ) from None
-            parts.append(finite(self.name, full, x, entry))
+                message = f"{self.name} must return shape {each} at points {x.shape}, got {found.shape}"
+                raise ValueError(message) from None
+            parts.append(finite(self.name, found, x, entry))
         return np.stack(parts).reshape(self.components, *x.shape[1:])
 
     def jets(self, x: Sequence[Jet]) -> list[Jet]:
-        """Return the jets of its formulas from those of x, y, z. Raises TypeError for a function or a field."""
-        if not self.is_formula:
-            raise TypeError(f"{self.name} is a function or a field, whose derivatives are unknown")
+        """Return the jets of its entries, which are formulas, from those of x, y, z."""
+        assert self.is_formula
         return [entry.jet(x) for entry in self.formulas]
-
-
-def _evaluate(entry: Entry, x: Array) -> ArrayLike:
-    if isinstance(entry, Expression):
-        return entry(*np.asarray(x))
-    return entry.at(x) if isinstance(entry, SplineField) else entry(x)
 
 
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:
@@ -118,11 +101,13 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
         parsed = [Expression(entry) if isinstance(entry, str) else entry for entry in entries]
     except ExpressionError as error:
         raise ExpressionError(f"{name}: {error}") from None
-    is_opaque = [callable(e) and not isinstance(e, Expression | SplineField) for e in parsed]
-    wrapped = [
-        OfCoordinates(e) if of_coordinates and opaque else e for e, opaque in zip(parsed, is_opaque, strict=True)
-    ]
-    return Datum(name, tuple(wrapped), components, face)
+    if of_coordinates:
+        parsed = [e if isinstance(e, Expression | SplineField) else partial(_of_coordinates, e) for e in parsed]
+    return Datum(name, tuple(parsed), components, face)
+
+
+def _of_coordinates(function: Callable[[Array, Array, Array], ArrayLike], x: Array) -> ArrayLike:
+    return function(*np.asarray(x))
 
 
 def finite(name: str, found: Array, x: Array, entry: Entry | None = None) -> Array:

@@ -1,24 +1,18 @@
 """Elasticity: the law and the data of -div sigma(u) = f, isotropic, with displacement or traction on each face."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from parameterize.arrays import Array
 
-from ..compiled import compiled
 from .data import Data
-from .form import Form, Fused
-from .problem import BoundaryValueProblem
+from .problem import LawWithData, Natural
 
 
 @dataclass(frozen=True)
-class Elasticity(BoundaryValueProblem, Form):
+class Elasticity(LawWithData):
     """Linear elasticity of an isotropic body: -div sigma = f, sigma = lambda div(u) I + mu (grad u + grad u^T).
 
     Each vector is given as three entries: formulas in x, y, z and X, Y, Z (as in `Poisson`), functions of three arrays
@@ -36,12 +30,12 @@ class Elasticity(BoundaryValueProblem, Form):
     exact: Data | None = None
     force: Data | None = None
     displacement: Data | None = None
-    traction: Mapping[str, Data | None] = field(default_factory=dict)
+    traction: Natural = field(default_factory=dict)
     young: float = 1.0
     poisson_ratio: float = 0.3
 
     components = 3
-    of_coordinates = True
+    constant = True
     labels = {"source": "force", "boundary": "displacement", "neumann": "traction"}  # noqa: RUF012
 
     def __post_init__(self) -> None:
@@ -67,48 +61,17 @@ class Elasticity(BoundaryValueProblem, Form):
         nu = self.poisson_ratio
         return self.young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.young / (2.0 * (1.0 + nu))
 
-    @property
-    def form(self) -> Form:  # type: ignore[override]
-        """The problem is its own law."""
-        return self
-
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the stress sigma (3, 3, ...)."""
         lam, mu = self.constants
-        stress = mu * (grad + np.swapaxes(grad, 0, 1))
+        stress = grad + np.swapaxes(grad, 0, 1)
+        stress *= mu
         pressure = lam * (grad[0, 0] + grad[1, 1] + grad[2, 2])
         for i in range(3):
-            stress[i, i] = stress[i, i] + pressure
+            stress[i, i] += pressure
         return stress
-
-    @property
-    def fused(self) -> Fused:  # type: ignore[override]
-        """The compiled law."""
-        lam, mu = self.constants
-        return partial(_plane_stress, lam, mu)
 
     def symbol(self, wave: Array, x: Array) -> Array:
         """Return the factor mu |k|^2 of shear waves, the least, for wave vectors k (3, ...)."""
         found: Array = self.constants[1] * (wave * wave).sum(axis=0)
         return found
-
-
-@compiled
-def _plane_stress(lam: float, mu: float, fields: Array, rows: Array) -> None:
-    """Turn gradients into fluxes as `Form.fused` does: fields (3, 4, q_w, q_v), rows (3, 3, q_w, q_v)."""
-    gradient, stress = np.empty((3, 3)), np.empty((3, 3))
-    for q in range(fields.shape[2]):
-        for m in range(fields.shape[3]):
-            for c in range(3):
-                a, b, d = fields[c, 1, q, m], fields[c, 2, q, m], fields[c, 3, q, m]
-                for i in range(3):
-                    gradient[c, i] = rows[0, i, q, m] * a + rows[1, i, q, m] * b + rows[2, i, q, m] * d
-            pressure = lam * (gradient[0, 0] + gradient[1, 1] + gradient[2, 2])
-            for c in range(3):
-                for i in range(3):
-                    stress[c, i] = mu * (gradient[c, i] + gradient[i, c])
-                stress[c, c] += pressure
-            for c in range(3):
-                for a in range(3):
-                    flux = rows[a, 0, q, m] * stress[c, 0] + rows[a, 1, q, m] * stress[c, 1]
-                    fields[c, a + 1, q, m] = flux + rows[a, 2, q, m] * stress[c, 2]

@@ -1,8 +1,6 @@
 """Form: the law of a linear second-order PDE, from which all else follows."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,9 +13,6 @@ from .jets import PAIRS, SYMMETRIC, Jet, Number, coordinates, stacked
 ROUNDING = 1e-8  # share of a law's size by which it may differ from a linear or symmetric one
 
 
-Fused = Callable[[Array, Array], None]  # turns fields (c, 4, q_w, q_v) in place, by rows (3, 3, q_w, q_v)
-
-
 class Form:
     """The law of -div flux(u) + react(u) = f, in weak form
 
@@ -28,11 +23,13 @@ class Form:
     follow. Use arithmetic, indices, `np.stack` and sin, cos, tan, exp, log, sqrt, tanh and abs.
 
     components: c, of u. symmetric: whether conjugate gradients solve it; else GMRES does.
+    constant: whether the flux has neither u nor x in it, and there is no reaction: products are then faster, and `flux`
+        may get None for x.
     """
 
     components: int = 1
     symmetric: bool = True
-    fused: Fused | None = None  # the law on a plane in compiled form, where it has one
+    constant: bool = False
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the flux (c, 3, ...), linear in u (c, ...) and its gradient (c, 3, ...), at points x (3, ...)."""
@@ -47,10 +44,9 @@ class Form:
         """Whether the law has a term `react`."""
         return type(self).react is not Form.react
 
-    def tensor(self, x: Array, component: int = 0) -> Array | None:
+    def tensor(self, x: Array, component: int = 0) -> Array:
         """Return the symmetric tensor (6, ...) from a component's gradient to its flux: xx, xy, xz, yy, yz, zz.
 
-        A law may return a scalar (...), or None for the identity, instead.
         Raises ExpressionError where it is not positive definite: there the law is not coercive.
         """
         unit = np.zeros((3, self.components, 3, *x.shape[1:]))
@@ -149,6 +145,13 @@ def check_law(form: Form, x: Array) -> bool:
     energies = [(a[0] * grad).sum((0, 1)) + (a[1] * w).sum(0) for a, grad, w in ((one, q, v), (two, p, u))]
     if form.symmetric and np.abs(energies[0] - energies[1]).max() > ROUNDING * np.abs(energies).max():
         raise ValueError(f"{name} is not symmetric: set `symmetric = False`, and GMRES solves it")
+    if form.constant:
+        try:
+            is_constant = np.array_equal(form.flux(v, p, None), one[0]) and not form.has_reaction
+        except TypeError:  # None has no entries
+            is_constant = False
+        if not is_constant:
+            raise ValueError(f"{name} is not constant: leave u, x and react out, or set `constant = False`")
     wave = v[:, None] * q[0]
     if not np.all((law(0.0 * u, wave)[0] * wave).sum((0, 1)) > 0.0):
         raise ValueError(f"{name}.flux must be coercive: flux : grad must be positive for a gradient that is not zero")

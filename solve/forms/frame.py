@@ -1,9 +1,7 @@
 """UnitFrame: the scaled coordinates X, Y, Z in which formulas mean the same in millimetres and in metres."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -13,6 +11,9 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import divided_spans, gauss_points
 from parameterize.spline.volume import BSplineVolume
 
+from ..field import Points
+
+FACES = tuple(product(range(3), (0, 1)))  # axis and side
 BOX_SAMPLES = 8  # intervals a span and direction in which the boundary is sampled for its bounding box
 
 
@@ -27,18 +28,18 @@ class UnitFrame:
     length: float
 
     @classmethod
-    def of(cls, volume: BSplineVolume) -> UnitFrame:
+    def of(cls, volume: BSplineVolume) -> "UnitFrame":
         """The frame of a spline volume.
 
         The volume follows exactly from the six faces (divergence theorem); the bounding box is that of points on them,
         BOX_SAMPLES a span and direction. A folded map counts its folded parts with the opposite sign.
         Raises ValueError where the volume encloses nothing.
         """
-        faces = [_Face(volume, axis, side) for axis, side in product(range(3), (0, 1))]
-        low = np.min([face.samples.min(axis=0) for face in faces], axis=0)
-        high = np.max([face.samples.max(axis=0) for face in faces], axis=0)
-        middle = (low + high) / 2.0
-        enclosed = abs(sum(face.flux(middle) for face in faces))
+        rows = [divided_spans(knots, BOX_SAMPLES) for knots in volume.knots]
+        samples = (np.asarray(face_geometry(volume, rows, *face)[0]) for face in FACES)
+        ends = np.array([(points.min(axis=(1, 2)), points.max(axis=(1, 2))) for points in samples])  # (6, 2, 3)
+        middle = (ends[:, 0].min(axis=0) + ends[:, 1].max(axis=0)) / 2.0
+        enclosed = abs(sum(_flux(volume, middle, *face) for face in FACES))
         if enclosed == 0.0:
             raise ValueError("X, Y, Z have no scale here: the volume encloses nothing; check it with `iga-nn check`")
         x, y, z = middle.tolist()
@@ -53,34 +54,25 @@ class UnitFrame:
         return {"center": list(self.center), "length": self.length}
 
 
-@dataclass(frozen=True, eq=False)
-class _Face:
-    """The image of one face of the cube."""
+def _flux(volume: BSplineVolume, middle: Array, axis: int, side: int) -> float:
+    """Return the integral of (x - middle) . n / 3 over a face: its share of the enclosed volume."""
+    rules = [
+        gauss_points(knots, (3 * degree + 1) // 2)  # exact for a product of three splines, two differentiated
+        for knots, degree in zip(volume.knots, volume.degrees, strict=True)
+    ]
+    x, area = face_geometry(volume, [points.ravel() for points, _ in rules], axis, side)
+    b, c = (rules[a][1].ravel() for a in range(3) if a != axis)
+    return float(b @ ((np.moveaxis(x, 0, -1) - middle) * np.moveaxis(area, 0, -1)).sum(axis=-1) @ c / 3.0)
 
-    volume: BSplineVolume
-    axis: int
-    side: int
 
-    @cached_property
-    def samples(self) -> Array:
-        """Points (k, 3) spread over the face."""
-        rows = [divided_spans(knots, BOX_SAMPLES) for knots in self.volume.knots]
-        return self.volume.grid(*self._on_face(rows)).reshape(-1, 3)
+def face_geometry(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Points, Array]:
+    """Return points on a face and the outward normals, as long as the surface element: (3, q_b, q_c) each.
 
-    def flux(self, middle: Array) -> float:
-        """The integral of (x - middle) . n / 3 over the face: its share of the enclosed volume."""
-        rules = [
-            gauss_points(knots, (3 * degree + 1) // 2)  # exact for a product of three splines, two differentiated
-            for knots, degree in zip(self.volume.knots, self.volume.degrees, strict=True)
-        ]
-        u, v, w = self._on_face([points.ravel() for points, _ in rules])
-        jacobian = np.squeeze(self.volume.grid_jacobian(u, v, w), self.axis)  # (q_b, q_c, 3, 3)
-        area = np.cross(jacobian[..., (self.axis + 1) % 3], jacobian[..., (self.axis + 2) % 3])
-        height = ((np.squeeze(self.volume.grid(u, v, w), self.axis) - middle) * area).sum(axis=-1)  # (q_b, q_c)
-        b, c = (rules[a][1].ravel() for a in range(3) if a != self.axis)
-        return float((1.0 if self.side else -1.0) * (b @ height @ c) / 3.0)
-
-    def _on_face(self, rows: list[Array]) -> tuple[Array, Array, Array]:
-        """Parameters of a tensor grid on the face, from those of one in the cube."""
-        u, v, w = (np.array([float(self.side)]) if a == self.axis else row for a, row in enumerate(rows))
-        return u, v, w
+    rows: parameters of a tensor grid in the cube. Where the map is folded normals point inward.
+    """
+    u, v, w = (np.array([float(side)]) if a == axis else row for a, row in enumerate(rows))
+    b, c = (a for a in range(3) if a != axis)
+    points = np.moveaxis(np.squeeze(volume.grid(u, v, w), axis), -1, 0)
+    jacobian = np.squeeze(volume.grid_jacobian(u, v, w), axis)  # (q_b, q_c, 3, 3)
+    area = np.moveaxis(np.cross(jacobian[..., (axis + 1) % 3], jacobian[..., (axis + 2) % 3]), -1, 0)
+    return Points.of(points, (u, v, w), (b, c)), area if side else -area

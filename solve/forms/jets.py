@@ -5,8 +5,6 @@ Derivatives*, 2nd ed., chapter 13), so a source -div flux(u) is exact. An array 
 NumPy's arithmetic and its functions sin, cos, tan, exp, log, sqrt, tanh and abs then act on each jet.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +21,23 @@ SYMMETRIC = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # place of a symmetric tensor's e
 UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
+def _function(rule: Callable[[Any], tuple[Number, Number, Number]]) -> Callable[["Jet"], "Jet"]:
+    """Return a method of `Jet`: a function h, from the rule for h, h' and h'' at a value."""
+    return lambda jet: jet._chain(*rule(jet.value))
+
+
+def _operation(rule: Callable[["Jet", "Jet"], "Jet"]) -> Callable[["Jet", Any], Any]:
+    """Return a method of `Jet`: an operator, from the rule for two jets; the other operand may be a number."""
+
+    def method(jet: "Jet", other: Any) -> Any:
+        if isinstance(other, Jet):
+            return rule(jet, other)
+        # unlike a Python float, NumPy's overflows to inf and never turns complex
+        return rule(jet, Jet(np.float64(other))) if isinstance(other, int | float | np.integer) else NotImplemented
+
+    return method
+
+
 @dataclass(frozen=True, eq=False)
 class Jet:
     """A function's value, gradient and Hessian (xx, xy, xz, yy, yz, zz) at the points of an array.
@@ -34,17 +49,21 @@ class Jet:
     gradient: Numbers = (0.0, 0.0, 0.0)
     hessian: Numbers = (0.0,) * 6
 
-    def __add__(self, other: Any) -> Any:
-        if (b := _jet(other)) is None:
-            return NotImplemented
-        return Jet(
-            _plus(self.value, b.value), _each(_plus, self.gradient, b.gradient), _each(_plus, self.hessian, b.hessian)
-        )
+    def __neg__(self) -> "Jet":
+        return self.times(Jet(np.float64(-1.0)))
 
-    def __mul__(self, other: Any) -> Any:
-        """Product rule: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
-        if (b := _jet(other)) is None:
-            return NotImplemented
+    def __pow__(self, other: Any) -> Any:
+        if isinstance(other, int | float | np.integer):
+            return self.power(float(other))
+        return (other * self.log()).exp() if isinstance(other, Jet) else NotImplemented  # valid for a positive base
+
+    def plus(self, b: "Jet") -> "Jet":
+        """Add another jet."""
+        gradient, hessian = _each(_plus, self.gradient, b.gradient), _each(_plus, self.hessian, b.hessian)
+        return Jet(_plus(self.value, b.value), gradient, hessian)
+
+    def times(self, b: "Jet") -> "Jet":
+        """Multiply by another jet: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
 
         def product(da: Number, db: Number) -> Number:
             return _plus(_times(self.value, db), _times(b.value, da))
@@ -57,79 +76,34 @@ class Jet:
         hessian = tuple(mixed(*entries) for entries in zip(self.hessian, b.hessian, PAIRS, strict=False))
         return Jet(self.value * b.value, _each(product, self.gradient, b.gradient), hessian)
 
-    __radd__, __rmul__ = __add__, __mul__
-
-    def __neg__(self) -> Any:
-        return self * _MINUS
-
-    def __sub__(self, other: Any) -> Any:
-        return NotImplemented if (b := _jet(other)) is None else self + -b
-
-    def __rsub__(self, other: Any) -> Any:
-        return -self + other
-
-    def __truediv__(self, other: Any) -> Any:
-        return NotImplemented if (b := _jet(other)) is None else self * b.power(-1.0)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self.power(-1.0) * other
-
-    def __pow__(self, other: Any) -> Any:
-        if isinstance(other, int | float):
-            return self.power(float(other))
-        return NotImplemented if (b := _jet(other)) is None else (b * self.log()).exp()  # valid for a positive base
-
-    def __rpow__(self, other: Any) -> Any:
-        return NotImplemented if (base := _jet(other)) is None else (self * base.log()).exp()
-
-    def power(self, n: float) -> Jet:
+    def power(self, n: float) -> "Jet":
         """Raise to a constant power; the factors n and n (n - 1) that vanish keep 0 ** negative out."""
         v = self.value
         first = n * v ** (n - 1.0) if n != 0.0 else 0.0
         second = n * (n - 1.0) * v ** (n - 2.0) if n not in (0.0, 1.0) else 0.0
         return self._chain(v**n, first, second)
 
-    def __abs__(self) -> Jet:
+    def __abs__(self) -> "Jet":
         """Derivatives hold away from the zeros of the argument; the source of a kink is not a function."""
         return self._chain(np.abs(self.value), np.sign(self.value), 0.0)
 
-    def sin(self) -> Jet:
-        """Return the sine."""
-        sine = np.sin(self.value)
-        return self._chain(sine, np.cos(self.value), -sine)
+    sin = _function(lambda v: ((sine := np.sin(v)), np.cos(v), -sine))
+    cos = _function(lambda v: ((cosine := np.cos(v)), -np.sin(v), -cosine))
+    tan = _function(lambda v: ((t := np.tan(v)), (slope := 1.0 + t * t), 2.0 * t * slope))
+    tanh = _function(lambda v: ((t := np.tanh(v)), (slope := 1.0 - t * t), -2.0 * t * slope))
+    exp = _function(lambda v: ((value := np.exp(v)), value, value))
+    log = _function(lambda v: (np.log(v), 1.0 / v, -1.0 / (v * v)))
+    sqrt = _function(lambda v: ((root := np.sqrt(v)), 0.5 / root, -0.25 / (root * v)))
 
-    def cos(self) -> Jet:
-        """Return the cosine."""
-        cosine = np.cos(self.value)
-        return self._chain(cosine, -np.sin(self.value), -cosine)
+    __add__ = __radd__ = _operation(lambda a, b: a.plus(b))
+    __mul__ = __rmul__ = _operation(lambda a, b: a.times(b))
+    __sub__ = _operation(lambda a, b: a + -b)
+    __rsub__ = _operation(lambda a, b: -a + b)
+    __truediv__ = _operation(lambda a, b: a * b.power(-1.0))
+    __rtruediv__ = _operation(lambda a, b: a.power(-1.0) * b)
+    __rpow__ = _operation(lambda a, b: (a * b.log()).exp())
 
-    def tan(self) -> Jet:
-        """Return the tangent."""
-        t = np.tan(self.value)
-        slope = 1.0 + t * t
-        return self._chain(t, slope, 2.0 * t * slope)
-
-    def tanh(self) -> Jet:
-        """Return the hyperbolic tangent."""
-        t = np.tanh(self.value)
-        slope = 1.0 - t * t
-        return self._chain(t, slope, -2.0 * t * slope)
-
-    def exp(self) -> Jet:
-        """Return the exponential."""
-        value = np.exp(self.value)
-        return self._chain(value, value, value)
-
-    def log(self) -> Jet:
-        """Return the natural logarithm."""
-        return self._chain(np.log(self.value), 1.0 / self.value, -1.0 / (self.value * self.value))
-
-    def sqrt(self) -> Jet:
-        """Return the square root."""
-        root = np.sqrt(self.value)
-        return self._chain(root, 0.5 / root, -0.25 / (root * self.value))
-
-    def _chain(self, value: Number, first: Number, second: Number) -> Jet:
+    def _chain(self, value: Number, first: Number, second: Number) -> "Jet":
         """Chain rule for h(a) from h, h' and h'' at a: h(a)_ij = h' a_ij + h'' a_i a_j."""
 
         def entry(second_a: Number, pair: tuple[int, int]) -> Number:
@@ -138,17 +112,6 @@ class Jet:
 
         gradient = tuple(_times(first, da) for da in self.gradient)
         return Jet(value, gradient, tuple(entry(*entries) for entries in zip(self.hessian, PAIRS, strict=False)))
-
-
-_MINUS = np.float64(-1.0)
-
-
-def _jet(other: Any) -> Jet | None:
-    """Return a number as a jet, a jet as it is, None for anything else."""
-    if isinstance(other, Jet):
-        return other
-    # unlike a Python float, NumPy's overflows to inf and never turns complex
-    return Jet(np.float64(other)) if isinstance(other, int | float | np.integer) else None
 
 
 def _plus(a: Number, b: Number) -> Number:
@@ -169,12 +132,6 @@ def _each(operation: Callable[[Number, Number], Number], a: Numbers, b: Numbers)
     return tuple(operation(*entries) for entries in zip(a, b, strict=False))
 
 
-def jets_of(values: Array, gradients: Array, hessians: Array) -> list[Jet]:
-    """Return the jets of c functions from arrays (c, ...), (c, 3, ...) and (c, 6, ...)."""
-    rows = zip(values, gradients, hessians, strict=True)
-    return [Jet(value, tuple(gradient), tuple(hessian)) for value, gradient, hessian in rows]
-
-
 def coordinates(x: Sequence[Array] | Array, hessian: Numbers = ()) -> list[Jet]:
     """Return the jets of x, y, z at points (3, ...); with second derivatives where `hessian` is six zeros."""
     return [Jet(row, unit, hessian) for row, unit in zip(x, UNITS, strict=True)]
@@ -190,8 +147,5 @@ def stacked(rows: Sequence[Number], shape: tuple[int, ...]) -> Array:
 
 def known(jets: Sequence[Jet], shape: tuple[int, ...]) -> tuple[Array, Array]:
     """Return values (c, *shape) and gradients (c, 3, *shape) of c jets as arrays."""
-    gradients = np.empty((len(jets), 3, *shape))
-    for rows, jet in zip(gradients, jets, strict=True):
-        for row, slope in zip(rows, jet.gradient, strict=True):
-            row[...] = slope
-    return stacked([jet.value for jet in jets], shape), gradients
+    gradients = stacked([slope for jet in jets for slope in jet.gradient], shape)
+    return stacked([jet.value for jet in jets], shape), gradients.reshape(-1, 3, *shape)

@@ -5,10 +5,9 @@ Nothing is ever passed to eval or exec. Python's own parser makes the tree; ever
 kinds allowed and translated.
 """
 
-from __future__ import annotations
-
 import ast
 import math
+import operator
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -29,15 +28,15 @@ COORDINATES = ("x", "y", "z")
 SCALED = ("X", "Y", "Z")
 VARIABLES = (*COORDINATES, *SCALED)
 CONSTANTS = {"pi": math.pi, "e": math.e}
-OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+OPERATORS: dict[type[ast.operator], Callable[[Jet, Jet], Jet]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
 FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
-    "sin": Jet.sin,
-    "cos": Jet.cos,
-    "tan": Jet.tan,
-    "exp": Jet.exp,
-    "log": Jet.log,
-    "sqrt": Jet.sqrt,
-    "tanh": Jet.tanh,
+    **{name: getattr(Jet, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh")},
     "abs": abs,
 }
 
@@ -83,13 +82,13 @@ class Expression:
             return None
         return re.sub(r"\b[xyz]\b", lambda match: match.group().upper(), self.text)
 
-    def placed(self, frame: UnitFrame) -> Expression:
+    def placed(self, frame: UnitFrame) -> "Expression":
         """Return the same formula with X, Y, Z measured in this frame."""
         return replace(self, frame=frame)
 
     def __call__(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
         """Return values at points given by arrays of equal shape."""
-        points = _arrays(x, y, z)
+        points = np.broadcast_arrays(*(np.asarray(c, dtype=np.float64) for c in (x, y, z)))
         return np.broadcast_to(np.asarray(self.jet([Jet(point, (), ()) for point in points]).value), points[0].shape)
 
     def jet(self, x: Sequence[Jet]) -> Jet:
@@ -110,10 +109,6 @@ class Expression:
             return self._evaluate(variables)
 
 
-def _arrays(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> list[Array]:
-    return list(np.broadcast_arrays(*(np.asarray(c, dtype=np.float64) for c in (x, y, z))))
-
-
 def _shorten(text: str, length: int = 40) -> str:
     return text if len(text) <= length else text[: length - 3] + "..."
 
@@ -130,24 +125,20 @@ class _Translator:
             raise ExpressionError("the expression is empty; write a formula such as exp(X+Z)*sin(Y)")
         if len(self.text) > MAX_LENGTH:
             raise ExpressionError(f"the expression has {len(self.text)} characters; at most {MAX_LENGTH} are allowed")
-        self._check_brackets()
-        try:
-            tree = ast.parse(self.text, mode="eval")
-        except SyntaxError as error:
-            column = f", column {error.offset}" if error.offset else ""
-            hint = "; a product is written with *, as in 2*x" if "decimal literal" in error.msg else ""
-            raise ExpressionError(f"expression{column}, {_shorten(self.text)!r}: {error.msg}{hint}") from None
-        except (ValueError, MemoryError, RecursionError) as error:
-            raise ExpressionError(f"expression, {_shorten(self.text)!r}: cannot be parsed ({error})") from None
-        self.result = self._node(tree.body, 1)
-
-    def _check_brackets(self) -> None:
-        """Bound the nesting before Python's parser sees the text."""
         depth = 0
-        for column, character in enumerate(self.text, 1):
+        for column, character in enumerate(self.text, 1):  # before Python's parser sees the text
             depth += (character == "(") - (character == ")")
             if depth > MAX_DEPTH:
                 raise ExpressionError(f"expression, column {column}: more than {MAX_DEPTH} nested parentheses")
+        try:
+            tree = ast.parse(self.text, mode="eval")
+        except SyntaxError as error:
+            place = f", column {error.offset}" if error.offset else ""
+            hint = "; a product is written with *, as in 2*x" if "decimal literal" in error.msg else ""
+            raise ExpressionError(f"expression{place}, {_shorten(self.text)!r}: {error.msg}{hint}") from None
+        except (ValueError, MemoryError, RecursionError) as error:
+            raise ExpressionError(f"expression, {_shorten(self.text)!r}: cannot be parsed ({error})") from None
+        self.result = self._node(tree.body, 1)
 
     def _refuse(self, node: ast.expr, why: str) -> ExpressionError:
         place = _shorten(ast.get_source_segment(self.text, node) or "")
@@ -180,48 +171,40 @@ class _Translator:
             number = math.inf
         if not math.isfinite(number):
             raise self._refuse(node, "the number is too large")
-        constant = Jet(np.float64(number))  # unlike a Python float it overflows to inf and never turns complex
-        return lambda p: constant
+        return _constant(number)
 
     def _name(self, node: ast.Name) -> Evaluator:
-        if node.id in VARIABLES:
-            index = VARIABLES.index(node.id)
-            self.variables.add(node.id)
-            return lambda p: p[index]
         if node.id in CONSTANTS:
-            constant = Jet(np.float64(CONSTANTS[node.id]))
-            return lambda p: constant
-        raise self._refuse(node, f"unknown name; the names are {', '.join((*VARIABLES, *CONSTANTS, *FUNCTIONS))}")
+            return _constant(CONSTANTS[node.id])
+        if node.id not in VARIABLES:
+            raise self._refuse(node, f"unknown name; the names are {', '.join((*VARIABLES, *CONSTANTS, *FUNCTIONS))}")
+        self.variables.add(node.id)
+        return operator.itemgetter(VARIABLES.index(node.id))
 
     def _call(self, node: ast.Call, depth: int) -> Evaluator:
-        if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
-            meant = node.func.id.lower() if isinstance(node.func, ast.Name) else ""
+        name = node.func.id if isinstance(node.func, ast.Name) else ""
+        if name not in FUNCTIONS:
+            meant = name.lower()
             remedy = f"write {meant}" if meant in FUNCTIONS else f"the functions are {', '.join(FUNCTIONS)}"
             raise self._refuse(node.func, f"not a known function; {remedy}")
         if len(node.args) != 1 or node.keywords:
-            raise self._refuse(node, f"{node.func.id} takes exactly one argument")
-        function, inner = FUNCTIONS[node.func.id], self._node(node.args[0], depth + 1)
+            raise self._refuse(node, f"{name} takes exactly one argument")
+        function, inner = FUNCTIONS[name], self._node(node.args[0], depth + 1)
         return lambda p: function(inner(p))
 
     def _binary(self, node: ast.BinOp, depth: int) -> Evaluator:
         left, right = self._node(node.left, depth + 1), self._node(node.right, depth + 1)
-        match OPERATORS[type(node.op)]:
-            case "+":
-                return lambda p: left(p) + right(p)
-            case "-":
-                return lambda p: left(p) - right(p)
-            case "*":
-                return lambda p: left(p) * right(p)
-            case "/":
-                return lambda p: left(p) / right(p)
-            case _:
-                return self._power(node, left, right)
+        names = {part.id for part in ast.walk(node.right) if isinstance(part, ast.Name)}
+        if isinstance(node.op, ast.Pow) and names.isdisjoint(VARIABLES):
+            with np.errstate(all="ignore"):
+                exponent = float(right([]).value)
+            if not abs(exponent) <= MAX_EXPONENT:
+                raise self._refuse(node.right, f"the exponent must lie between -{MAX_EXPONENT} and {MAX_EXPONENT}")
+            return lambda p: left(p).power(exponent)
+        combine = OPERATORS[type(node.op)]
+        return lambda p: combine(left(p), right(p))
 
-    def _power(self, node: ast.BinOp, left: Evaluator, right: Evaluator) -> Evaluator:
-        if any(isinstance(part, ast.Name) and part.id in VARIABLES for part in ast.walk(node.right)):
-            return lambda p: left(p) ** right(p)
-        with np.errstate(all="ignore"):
-            exponent = float(right([]).value)  # no variable in it
-        if not abs(exponent) <= MAX_EXPONENT:
-            raise self._refuse(node.right, f"the exponent must lie between -{MAX_EXPONENT} and {MAX_EXPONENT}")
-        return lambda p: left(p).power(exponent)
+
+def _constant(number: float) -> Evaluator:
+    jet = Jet(np.float64(number))  # unlike a Python float it overflows to inf and never turns complex
+    return lambda p: jet

@@ -1,8 +1,6 @@
 """Poisson: the law and the data of -div(kappa grad u) + c u = f."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,20 +10,19 @@ from parameterize.arrays import Array
 
 from ..field import SplineField
 from .data import Data, Datum, Scalar, demand, demand_definite
-from .form import Form
 from .jets import PAIRS, SYMMETRIC, Jet
-from .problem import BoundaryValueProblem
+from .problem import LawWithData, Natural, Robin
 
+IDENTITY = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)  # the six entries
 DEFAULT_EXACT = "exp(X+Z)*sin(Y)"  # the paper's solution (section 5.5), at volume 1: it means the same in any unit
 
 
 @dataclass(frozen=True)
-class Poisson(BoundaryValueProblem, Form):
+class Poisson(LawWithData):
     """-div(kappa grad u) + c u = f in the volume's own coordinates, with data on the images of the cube's six faces.
 
-    Each entry is a formula, a function of three arrays x, y, z of equal shape, or a field on the same volume
-    (`solution.field`). A formula knows x, y, z, in the volume's units, and X, Y, Z, the same scaled to volume 1 about
-    the middle of the volume's bounding box (`frame.UnitFrame`): X = (x - c_x) / V^(1/3).
+    Each entry is a formula in x, y, z and in X, Y, Z, the same scaled to volume 1 (`frame.UnitFrame`), a function of
+    three arrays x, y, z of equal shape, or a field on the same volume (`solution.field`).
     exact: the solution, where it is known; DEFAULT_EXACT where neither it nor source nor boundary is given. As a
         formula it gives source and boundary data, and the report's errors; a function needs them beside it, and leaves
         the H1 seminorm out, for its derivatives are unknown.
@@ -47,25 +44,16 @@ class Poisson(BoundaryValueProblem, Form):
     boundary: Data | None = None
     kappa: Data | None = None
     reaction: Scalar | None = None
-    neumann: Mapping[str, Data | None] = field(default_factory=dict)
-    robin: Mapping[str, tuple[Data, Data | None]] = field(default_factory=dict)
-
-    of_coordinates = True
+    neumann: Natural = field(default_factory=dict)
+    robin: Robin = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.exact is None and self.source is None and self.boundary is None:
             object.__setattr__(self, "exact", DEFAULT_EXACT)
         given = {role: getattr(self, role) for role in ("exact", "source", "boundary", "reaction")}
-        self._set({**given, "kappa": _six(self.kappa)}, self.neumann, self.robin)
-
-    @property
-    def form(self) -> Form:  # type: ignore[override]
-        """The problem is its own law."""
-        return self
-
-    def _components(self, role: str) -> int:
         kappa = _six(self.kappa)
-        return 6 if role == "kappa" and isinstance(kappa, list) and len(kappa) == 6 else 1
+        count = len(kappa) if isinstance(kappa, list) else 1
+        self._set({**given, "kappa": kappa}, self.neumann, self.robin, kappa=count)
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return kappa grad u."""
@@ -93,14 +81,12 @@ class Poisson(BoundaryValueProblem, Form):
             return "kappa is a function or a field, whose derivatives are unknown"
         return "reaction is a field" if isinstance(self.reaction, SplineField) else ""
 
-    def tensor(self, x: Array, component: int = 0) -> Array | None:
-        """Return kappa: None for the identity, (...) or (6, ...). Raises ExpressionError where it is not positive."""
-        if "kappa" not in self._data:
-            return None
-        found = self._data["kappa"](x)
+    def tensor(self, x: Array, component: int = 0) -> Array:
+        """Return kappa (6, ...). Raises ExpressionError where it is not positive definite."""
+        found = self._data["kappa"](x) if "kappa" in self._data else np.ones((1, *x.shape[1:]))
         if len(found) == 1:
             demand(found[0] > 0.0, "kappa", "positive", x)
-            return found[0]
+            return found * np.reshape(IDENTITY, (6, *(1,) * (x.ndim - 1)))
         demand_definite(found, "kappa", x)
         return found
 

@@ -1,7 +1,5 @@
 """Problem: a law and its data in the volume and on the images of the cube's six faces."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import KW_ONLY, dataclass, field
@@ -12,10 +10,11 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
+from ..field import SplineField
 from .data import Data, Datum, check_faces, demand, finite, parse
 from .form import Form, strong_form, strong_terms
 from .frame import UnitFrame
-from .jets import Jet, coordinates, known
+from .jets import Jet, Numbers, coordinates, known
 from .parser import Expression
 
 Natural = Mapping[str, Data | None]
@@ -33,35 +32,34 @@ class BoundaryValueProblem:
     exact: Data | None
     of_coordinates: ClassVar[bool] = False  # whether functions as data take three arrays x, y, z
     labels: ClassVar[Mapping[str, str]] = {}  # role -> name in messages, where that is another
+    natural: tuple[str, ...]  # faces on which the flux through them is given
+    dirichlet: tuple[str, ...]  # faces on which u itself is given
     _data: dict[str, Datum]
-    _natural: tuple[str, ...]  # faces with Neumann's data
-    _robin: tuple[str, ...]
 
-    def _set(self, given: Mapping[str, Data | None], neumann: Natural, robin: Robin) -> None:
-        """Parse the data. Raises ValueError where they do not fit together or cannot be known."""
+    def _set(self, given: Mapping[str, Data | None], neumann: Natural, robin: Robin, **counts: int) -> None:
+        """Parse the data. Raises ValueError where they do not fit together or cannot be known.
+
+        counts: role -> how many entries its datum has, where these are not the law's components.
+        """
         check_faces(self.label("neumann"), neumann)
         check_faces("robin", robin)
-        for face in FACE_NAMES:
-            if face in neumann and face in robin:
-                raise ValueError(f"face {face} has both Neumann and Robin data; give one of them")
-        all_given = dict(given)
-        all_given |= {f"neumann {face}": entry for face, entry in neumann.items()}
-        all_given |= {f"robin {face}: alpha": alpha for face, (alpha, _) in robin.items()}
-        all_given |= {f"robin {face}": entry for face, (_, entry) in robin.items()}
-        data = {role: self._parse(role, entry) for role, entry in all_given.items() if entry is not None}
-        for name, value in (("_data", data), ("_natural", tuple(neumann)), ("_robin", tuple(robin))):
+        if both := neumann.keys() & robin.keys():
+            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give one of them")
+        on_faces = {f"neumann {face}": entry for face, entry in neumann.items()}
+        for face, (alpha, entry) in robin.items():
+            on_faces |= {f"robin {face}: alpha": alpha, f"robin {face}": entry}
+        data = {}
+        for role, entry in {**given, **on_faces}.items():
+            if entry is not None:
+                count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
+                face = role.split(":")[0].partition(" ")[2]
+                data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
+        dirichlet = tuple(face for face in FACE_NAMES if face not in neumann and face not in robin)
+        for name, value in (("_data", data), ("natural", tuple(neumann)), ("dirichlet", dirichlet)):
             object.__setattr__(self, name, value)
-        for role in ("source", *(role for role in all_given if role.startswith(("neumann", "robin")))):
+        for role in ("source", *on_faces):
             if role not in data:
                 self._check_derived(role)
-
-    def _parse(self, role: str, entry: Data) -> Datum:
-        face = role.split(":")[0].partition(" ")[2]
-        return parse(self.label(role), entry, self._components(role), face, of_coordinates=self.of_coordinates)
-
-    def _components(self, role: str) -> int:
-        """Return how many entries the datum of a role has."""
-        return 1 if role.endswith(": alpha") else self.form.components
 
     def _check_derived(self, role: str) -> None:
         """Raise ValueError where data that are not given do not follow from `exact`."""
@@ -70,8 +68,7 @@ class BoundaryValueProblem:
             zero = '"0"' if self.form.components == 1 else '("0", ...)'
             raise ValueError(f"{name} has no data: give {name}={zero} for none, or the solution as formulas in exact")
         why = "" if exact.is_formula else "exact is a function or a field, whose derivatives are unknown"
-        if role == "source":
-            why = why or self.not_differentiable
+        why = why or (self.not_differentiable if role == "source" else "")
         if why:
             raise ValueError(f"{name} has no data: {why}; give {name}=... too, or formulas")
 
@@ -85,30 +82,28 @@ class BoundaryValueProblem:
         """The data that are formulas: role, datum, and each of its formulas."""
         return [(role, datum, entry) for role, datum in self._data.items() for entry in datum.formulas]
 
+    def on(self, volume: BSplineVolume) -> Self:
+        """Return the same problem with X, Y, Z measured in a volume: its size is 1 in them, the middle of its box 0.
+
+        Raises ValueError for a field that was found on another volume.
+        """
+        for datum in self._data.values():
+            if not all(entry.fits(volume) for entry in datum.entries if isinstance(entry, SplineField)):
+                raise ValueError(
+                    f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
+                )
+        return self.placed(UnitFrame.of(volume)) if self.is_scaled else self
+
     @property
     def is_scaled(self) -> bool:
         """Whether X, Y or Z occurs in a formula."""
         return any(formula.is_scaled for _, _, formula in self.formulas)
-
-    def on(self, volume: BSplineVolume) -> Self:
-        """Return the same problem with X, Y, Z measured in a volume: its size is 1 in them, the middle of its box 0."""
-        return self.placed(UnitFrame.of(volume)) if self.is_scaled else self
 
     def placed(self, frame: UnitFrame) -> Self:
         """Return the same problem with X, Y, Z measured in a frame."""
         other = copy(self)
         object.__setattr__(other, "_data", {role: datum.placed(frame) for role, datum in self._data.items()})
         return other
-
-    @property
-    def dirichlet(self) -> tuple[str, ...]:
-        """The faces on which u itself is given."""
-        return tuple(face for face in FACE_NAMES if face not in self._natural and face not in self._robin)
-
-    @property
-    def natural(self) -> tuple[str, ...]:
-        """The faces on which the flux through them is given."""
-        return self._natural
 
     @property
     def not_differentiable(self) -> str:
@@ -142,8 +137,8 @@ class BoundaryValueProblem:
         """Return the size of the largest term in -div flux + react of the formulas `exact`, where these may cancel."""
         return max(float(np.abs(t).max()) for row in strong_terms(self.form, self._exact_jets(x), x) for t in row)
 
-    def _exact_jets(self, x: Array) -> list[Jet]:
-        return self._data["exact"].jets(coordinates(np.asarray(x), (0.0,) * 6))
+    def _exact_jets(self, x: Array, hessian: Numbers = (0.0,) * 6) -> list[Jet]:
+        return self._data["exact"].jets(coordinates(np.asarray(x), hessian))
 
     def residual_at(self, u: list[Jet], x: Array) -> Array:
         """Return f + div flux - react (c, ...) of functions given by their jets with second derivatives."""
@@ -171,7 +166,7 @@ class BoundaryValueProblem:
         return alpha, self._flux_of_exact(role, x, normal) + alpha * self._data["exact"](x)
 
     def _flux_of_exact(self, role: str, x: Array, normal: Array) -> Array:
-        u, grad = known(self._data["exact"].jets(coordinates(np.asarray(x))), x.shape[1:])
+        u, grad = known(self._exact_jets(x, ()), x.shape[1:])
         flux = np.asarray(self.form.flux(u, grad, x), dtype=np.float64)
         return finite(f"{self.label(role)} (from exact)", (flux * normal).sum(axis=1), x, self._first_formula)
 
@@ -180,13 +175,24 @@ class BoundaryValueProblem:
         exact = self._data["exact"]
         if not exact.is_formula:
             return exact(x), None
-        value, gradient = known(exact.jets(coordinates(np.asarray(x))), x.shape[1:])
+        value, gradient = known(self._exact_jets(x, ()), x.shape[1:])
         finite("exact", value, x, self._first_formula)
         return value, finite("gradient of exact", gradient, x, self._first_formula)
 
     @property
     def _first_formula(self) -> Expression | None:
         return self.exact_formulas[0] if len(self.exact_formulas) == 1 else None
+
+
+class LawWithData(BoundaryValueProblem, Form):
+    """A problem that is its own law; functions as data take three arrays x, y, z."""
+
+    of_coordinates = True
+
+    @property
+    def form(self) -> Form:  # type: ignore[override]
+        """The problem itself."""
+        return self
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""Solves the linear system by preconditioned conjugate gradients."""
+"""Solves the linear system by preconditioned Krylov methods."""

@@ -5,9 +5,8 @@ bases of directions v and w are dense matrices here, direction u goes layer by l
 Geometry factors and load come from `operator.assemble` on the CPU.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -16,8 +15,7 @@ from torch import Tensor
 from parameterize.arrays import Array
 
 from ..discretization.operator import Operator
-from ..discretization.quadrature import Table
-from .cg import LinearResult, conjugate_gradients
+from .krylov import LinearResult, conjugate_gradients
 from .preconditioner import FastDiagonalization
 
 LAYER_BYTES = 2**28  # of one field on a layer of points of u
@@ -38,39 +36,28 @@ def solve_on_device(
     device: str,
     start: Array | None = None,
 ) -> LinearResult:
-    """As `conjugate_gradients` for an operator's free coefficients, on a torch device.
-
-    Raises ValueError where torch has no such device.
-    """
-    check_available(device)
-    apply = DeviceOperator(operator, device).apply_free
-    right_there, start_there = (
-        None if x is None else torch.as_tensor(np.ascontiguousarray(x), device=device) for x in (right, start)
+    """As `conjugate_gradients` for an operator's free coefficients, on a torch device."""
+    b, first = (None if x is None else torch.as_tensor(np.ascontiguousarray(x), device=device) for x in (right, start))
+    inverse = device_preconditioner(preconditioner, device)
+    found = conjugate_gradients(
+        DeviceOperator(operator, device).apply_free, b, inverse, tolerance, max_iterations, first
     )
-    result = conjugate_gradients(
-        apply, right_there, device_preconditioner(preconditioner, device), tolerance, max_iterations, start_there
-    )
-    return LinearResult(result.x.cpu().numpy(), result.residuals, result.converged)
+    return replace(found, x=found.x.cpu().numpy())
 
 
 class DeviceOperator:
     """The operator with its factors as a tensor on a device."""
 
     def __init__(self, operator: Operator, device: str) -> None:
-        self._window = operator.window
-        self._shape = operator.space.shape
-        q_u, v_blocks, q_w, terms, lanes = operator.factors.shape
-        self._factors = torch.empty((q_u, terms, v_blocks * lanes, q_w), dtype=torch.float64, device=device)
-        for q, factors in enumerate(operator.factors):  # (v blocks, q_w, terms, lanes)
-            plane = torch.as_tensor(factors, device=device).permute(2, 0, 3, 1)
-            self._factors[q] = plane.reshape(terms, v_blocks * lanes, q_w)
-        rows = (q_u, v_blocks * lanes, q_w)  # points of v that only fill a block up have no function
+        self._window, self._shape = operator.window, operator.space.shape
+        self._factors = torch.as_tensor(operator.factors, device=device)
         self._u, self._v, self._w = (
-            [torch.as_tensor(_dense(table, n, count, d), device=device) for d in (0, 1)]
-            for table, n, count in zip(operator.tables, self._shape, rows, strict=True)
+            [torch.as_tensor(operator.dense(axis, d), device=device) for d in (0, 1)] for axis in range(3)
         )
-        first, last = operator.tables[0].first, operator.tables[0].first + operator.tables[0].values.shape[2]
-        step = max(1, LAYER_BYTES // (8 * rows[1] * rows[2]))
+        q_u, _, q_w, q_v = operator.factors.shape
+        first, values, _ = operator.tables[0]
+        last = first + values.shape[2]
+        step = max(1, LAYER_BYTES // (8 * q_v * q_w))
         self._layers = [
             (slice(q, min(q + step, q_u)), slice(int(first[q]), int(last[min(q + step, q_u) - 1])))
             for q in range(0, q_u, step)
@@ -90,39 +77,26 @@ class DeviceOperator:
         (b_v, d_v), (b_w, d_w) = self._v, self._w
         b_u, d_u = (matrix[points, functions] for matrix in self._u)
         planes, planes_u = (torch.tensordot(matrix, x[functions], 1) for matrix in (b_u, d_u))  # (q, n_v, n_w)
-        lines = b_v @ planes  # (q, q_v, n_w)
-        along = ((b_v @ planes_u) @ b_w.T, (d_v @ planes) @ b_w.T, lines @ d_w.T)  # (q, q_v, q_w) each
+        lines = b_w @ (b_v @ planes).mT  # (q, q_w, q_v), as all that follow
+        along = (b_w @ (b_v @ planes_u).mT, b_w @ (d_v @ planes).mT, d_w @ (b_v @ planes).mT)
         uu, uv, uw, vv, vw, ww = self._factors[points, :6].unbind(1)
         flux_u = uu * along[0] + uv * along[1] + uw * along[2]
         flux_v = uv * along[0] + vv * along[1] + vw * along[2]
-        back = (uw * along[0] + vw * along[1] + ww * along[2]) @ d_w
+        back = d_w.T @ (uw * along[0] + vw * along[1] + ww * along[2])  # (q, n_w, q_v)
         if self._factors.shape[1] == 7:
-            back += (self._factors[points, 6] * (lines @ b_w.T)) @ b_w
-        planes = b_v.T @ back + d_v.T @ (flux_v @ b_w)
-        planes_u = b_v.T @ (flux_u @ b_w)
+            back += b_w.T @ (self._factors[points, 6] * lines)
+        planes = (back @ b_v + b_w.T @ flux_v @ d_v).mT
+        planes_u = (b_w.T @ flux_u @ b_v).mT
         result[functions] += torch.tensordot(b_u.T, planes, 1) + torch.tensordot(d_u.T, planes_u, 1)
 
 
-def device_preconditioner(preconditioner: FastDiagonalization, device: str) -> Callable[[Tensor], Tensor]:
-    """Fast diagonalization on a device."""
-    u, v, w = (torch.as_tensor(vectors, device=device) for vectors in preconditioner.vectors)
-    inverse, scaling = (torch.as_tensor(d, device=device) for d in (preconditioner.inverse, preconditioner.scaling))
+def device_preconditioner(preconditioner: FastDiagonalization, device: str) -> FastDiagonalization:
+    """Return fast diagonalization on a device, of tensors."""
+    arrays = (*preconditioner.vectors, preconditioner.inverse, preconditioner.scaling)
+    u, v, w, inverse, scaling = (torch.as_tensor(part, device=device) for part in arrays)
+    return _OnDevice((u, v, w), inverse, scaling, preconditioner.singular)  # type: ignore[arg-type]
 
-    def transform(u: Tensor, v: Tensor, w: Tensor, x: Tensor) -> Tensor:
+
+class _OnDevice(FastDiagonalization):
+    def _transform(self, u: Any, v: Any, w: Any, x: Any) -> Any:
         return (v @ torch.tensordot(u, x, 1)) @ w.T
-
-    def precondition(residual: Tensor) -> Tensor:
-        if preconditioner.singular:
-            residual = residual - residual.mean()
-        result = scaling * transform(u, v, w, inverse * transform(u.T, v.T, w.T, scaling * residual))
-        return result - result.mean() if preconditioner.singular else result
-
-    return precondition
-
-
-def _dense(table: Table, n: int, rows: int, derivative: int) -> Array:
-    """Matrix (rows, n) of the basis or its derivatives at the points of a table, with zero rows behind them."""
-    dense = np.zeros((rows, n))
-    columns = table.first[:, None] + np.arange(table.values.shape[2])
-    np.put_along_axis(dense[: len(columns)], columns, table.values[derivative], axis=1)
-    return dense

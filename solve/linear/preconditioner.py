@@ -1,15 +1,12 @@
 """Fast diagonalization: the exact inverse of a Laplacian with separable coefficients, as preconditioner.
 
-Sangalli, Tani, SIAM J. Sci. Comput. 38 (2016), for constant coefficients. Two additions make it cheaper on real maps:
-every direction carries weights for its stiffness and its mass matrix, so that G_dd is met by a product of functions
-of one parameter (after Loli, Sangalli, Tani, CAMWA 2022, who fit by alternating least squares; logarithms turn the fit
-into averages), and a diagonal scaling makes the diagonal agree with the operator's. A reaction and Robin's conditions
-enter by their averages.
+Sangalli, Tani, SIAM J. Sci. Comput. 38 (2016), for constant coefficients; docs/solver.md says how real maps, a reaction
+and Robin's conditions enter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,12 +14,13 @@ from scipy.linalg import eigh
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES
+from parameterize.threads import in_parallel
 
 from ..discretization.operator import Operator
-from ..discretization.quadrature import Table
-from ..threads import in_parallel
+from .shear import IncompleteCholesky, helps, incomplete_cholesky
 
 DIAGONAL = (0, 3, 5)  # the places of uu, vv, ww among the six factors
+COLUMNS, LAYERS = 4096, 8  # in a piece of work
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +29,7 @@ class FastDiagonalization:
 
     vectors: per direction (n, n), generalized eigenvectors in columns. inverse, scaling: (n_u, n_v, n_w), the diagonals
     L^-1 and D. singular: constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin face), and
-    the preconditioner keeps to their orthogonal complement.
+    the preconditioner keeps to their orthogonal complement. local: of a sheared map, what is added (`shear`).
     """
 
     vectors: tuple[Array, Array, Array]
@@ -39,6 +37,7 @@ class FastDiagonalization:
     scaling: Array
     singular: bool = False
     threads: int = 1
+    local: IncompleteCholesky | None = None
 
     def __call__(self, residual: Array) -> Array:
         """Return the preconditioned residual, both (n_u, n_v, n_w) or (1, n_u, n_v, n_w)."""
@@ -50,29 +49,29 @@ class FastDiagonalization:
         spectral *= self.inverse
         result = self._transform(u, v, w, spectral)
         result *= self.scaling
+        if self.local is not None:
+            u, v, w = self.local.inverses
+            result += self._transform(u, v, w, self.local(self._transform(u.T, v.T, w.T, residual.copy())))
         if self.singular:
             result -= result.mean()
         return result.reshape(shape)
 
     def _transform(self, u: Array, v: Array, w: Array, x: Array) -> Array:
         """Apply three small matrices along the three axes of x, which is overwritten."""
-        columns, rows = x.reshape(x.shape[0], -1), np.empty((x.shape[0], x[0].size))
-        along_u = rows.reshape(x.shape)
+        columns, along_u = x.reshape(len(x), -1), np.empty_like(x)
+        rows = along_u.reshape(columns.shape)
 
-        def first(piece: slice) -> None:
+        def first(start: int) -> None:
+            piece = slice(start, start + COLUMNS)
             np.matmul(u, columns[:, piece], out=rows[:, piece])
 
-        def second(piece: slice) -> None:
-            for i in range(*piece.indices(len(x))):
+        def second(start: int) -> None:
+            for i in range(start, min(start + LAYERS, len(x))):
                 np.matmul(v @ along_u[i], w.T, out=x[i])
 
-        in_parallel(first, _pieces(rows.shape[1], 4096), self.threads)
-        in_parallel(second, _pieces(len(x), 8), self.threads)
+        in_parallel(first, range(0, rows.shape[1], COLUMNS), self.threads)
+        in_parallel(second, range(0, len(x), LAYERS), self.threads)
         return x
-
-
-def _pieces(length: int, size: int) -> list[slice]:
-    return [slice(start, start + size) for start in range(0, length, size)]
 
 
 def fast_diagonalization(
@@ -87,14 +86,15 @@ def fast_diagonalization(
     slopes, masses, averages = _directional_matrices(operator, robin)
     reaction = operator.mean_mass() / float(np.prod(averages))
     values, vectors = zip(*(eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
-    spectrum = _sum_outer(values) + reaction
+    spectrum = values[0][:, None, None] + values[1][:, None] + values[2] + reaction
     scaling = _scaling(operator, slopes, masses, reaction, extra_diagonal)
     whole = all(free == slice(0, n) for free, n in zip(operator.window, operator.space.shape, strict=True))
     singular = whole and reaction == 0.0 and not any(robin.values())
     if singular:
         spectrum[0, 0, 0] = np.inf
     u, v, w = vectors
-    return FastDiagonalization((u, v, w), 1.0 / spectrum, scaling, singular, operator.threads)
+    local = incomplete_cholesky(operator) if not singular and helps(operator) else None
+    return FastDiagonalization((u, v, w), 1.0 / spectrum, scaling, singular, operator.threads, local)
 
 
 def _directional_matrices(
@@ -107,9 +107,9 @@ def _directional_matrices(
     along, across = _separable_coefficients(operator)
     averages = [float(w @ b) for w, b in zip(operator.rule.weights, across, strict=True)]
     slopes, masses = [], []
-    for axis, (table, n, free) in enumerate(zip(operator.tables, operator.space.shape, operator.window, strict=True)):
-        mass = _gram(table, operator.rule.weights[axis] * across[axis], n, 0)
-        slope = _gram(table, operator.rule.weights[axis] * along[axis], n, 1)
+    for axis, free in enumerate(operator.window):
+        mass = _gram(operator, axis, operator.rule.weights[axis] * across[axis], 0)
+        slope = _gram(operator, axis, operator.rule.weights[axis] * along[axis], 1)
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
             # one function only is nonzero at the end, with value 1
             slope[end, end] += robin.get(name, 0.0) * averages[axis] / float(np.prod(averages))
@@ -139,38 +139,29 @@ def _separable_coefficients(operator: Operator) -> tuple[list[Array], list[Array
     logarithms. There the fit is additive, and its terms are averages of log G_dd over planes. One point a span, the
     middle one, stands for the span.
     """
-    starts = [np.unique(table.first, return_index=True)[1] for table in operator.tables]  # of the spans
+    starts = [np.unique(first, return_index=True)[1] for first, _, _ in operator.tables]  # of the spans
     counts = [np.diff(s, append=q) for s, q in zip(starts, operator.rule.shape, strict=True)]  # points per span
     lengths = [np.add.reduceat(w, s) for w, s in zip(operator.rule.weights, starts, strict=True)]
     u, v, w = (s + c // 2 for s, c in zip(starts, counts, strict=True))  # the middle points
-    means = [[np.zeros(len(s)) for s in starts] for _ in range(3)]  # means[d][axis]: of log G_dd over the other axes
-    block, lane = np.divmod(v, operator.factors.shape[4])
+    means = [np.zeros((3, len(s))) for s in starts]  # of log G_dd, d = u, v, w, over the other two directions
     for span, q in enumerate(u):
         weights = operator.rule.plane_weights(int(q))[np.ix_(w, v)]
-        factors = operator.factors[q][block, w[:, None], :, lane]  # (spans of w, spans of v, 6 or 7)
-        for mean, index in zip(means, DIAGONAL, strict=True):
-            logarithm = np.log(np.maximum(np.abs(factors[:, :, index] / weights), 1e-300))
-            mean[0][span] = lengths[2] @ logarithm @ lengths[1]
-            mean[1] += lengths[0][span] * (lengths[2] @ logarithm)
-            mean[2] += lengths[0][span] * (logarithm @ lengths[1])
-    overall = [float(lengths[0] @ mean[0]) for mean in means]
+        logarithm = np.log(np.maximum(np.abs(operator.factors[q][np.ix_(DIAGONAL, w, v)] / weights), 1e-300))
+        over_w = lengths[2] @ logarithm
+        means[0][:, span] = over_w @ lengths[1]
+        means[1] += lengths[0][span] * over_w
+        means[2] += lengths[0][span] * (logarithm @ lengths[1])
+    overall = means[0] @ lengths[0]
     along, across = [], []
     for axis, count in enumerate(counts):
-        others = sum(means[d][axis] - overall[d] for d in range(3) if d != axis)
+        others = np.delete(means[axis] - overall[:, None], axis, axis=0).sum(axis=0)
         along.append(np.repeat(np.exp(means[axis][axis]), count))
         across.append(np.repeat(np.exp(0.5 * others), count))
     return along, across
 
 
-def _gram(table: Table, weights: Array, n: int, derivative: int) -> Array:
+def _gram(operator: Operator, axis: int, weights: Array, derivative: int) -> Array:
     """Return the matrix (n, n) of the integrals of products of one direction's functions, or of their derivatives."""
-    dense = np.zeros((len(weights), n))
-    columns = table.first[:, None] + np.arange(table.values.shape[2])
-    np.put_along_axis(dense, columns, table.values[derivative], axis=1)
-    matrix: Array = dense.T @ (weights[:, None] * dense)
+    basis = operator.dense(axis, derivative)
+    matrix: Array = basis.T @ (weights[:, None] * basis)
     return matrix
-
-
-def _sum_outer(rows: Sequence[Array]) -> Array:
-    total: Array = rows[0][:, None, None] + rows[1][:, None] + rows[2]
-    return total

@@ -1,7 +1,5 @@
 """Cells of volume formats: triangles and polygons as they are, or the boundary of tetrahedra."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable
 from pathlib import Path

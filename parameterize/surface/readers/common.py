@@ -1,11 +1,9 @@
-"""What the readers of all formats share: what they return, how they count, and how a library's errors are told."""
-
-from __future__ import annotations
+"""What the readers share: what they return, the lines and numbers of a text, and how a library's errors are told."""
 
 import io
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 
@@ -15,6 +13,9 @@ from ..errors import MeshError
 DAMAGED = "the file is truncated or damaged, export it again"
 BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
 BYTES_AT_LEAST = 64 << 20
+NUMBER = r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf(?:inity)?)"
+NUMBERS = re.compile(rf"{NUMBER}(?: {NUMBER})*+", re.ASCII | re.IGNORECASE)
+WHOLE_NUMBERS = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*+", re.ASCII)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,29 @@ def header_count(word: str) -> int:
     if not re.fullmatch(r"\d{1,18}", word, re.ASCII):
         raise MeshError(f"the header's count {word[:20]!r} is not a number of elements; {DAMAGED}")
     return int(word)
+
+
+def text_lines(data: bytes) -> list[str]:
+    r"""Return the lines of a text without its byte order mark; \n, \r\n and \r end a line."""
+    text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+    return text.split("\n")
+
+
+def coordinates(words: Sequence[str], line: int) -> list[float]:
+    """Return the three coordinates that a record begins with; raise MeshError naming its line where it has fewer."""
+    place = " ".join(words[:3])
+    if len(words) < 3 or not NUMBERS.fullmatch(place):
+        raise MeshError(f"line {line}: a vertex needs three numbers, got {place[:40]!r}")
+    return [float(word) for word in words[:3]]
+
+
+def corners(words: Sequence[str], line: int) -> list[int]:
+    """Return the vertex numbers of a face; raise MeshError naming its line where they are none, or fewer than three."""
+    if words and not WHOLE_NUMBERS.fullmatch(" ".join(words)):
+        raise MeshError(f"line {line}: a face needs vertex numbers, got {' '.join(words)[:40]!r}")
+    if len(words) < 3:
+        raise MeshError(f"line {line}: a face has {len(words)} corners, expected at least 3; export it again")
+    return [int(word) for word in words]
 
 
 @contextmanager

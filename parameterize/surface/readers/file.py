@@ -1,7 +1,5 @@
 """Reading a surface file: its bytes within a limit, the reader of its format, checks, triangles."""
 
-from __future__ import annotations
-
 import gzip
 import hashlib
 import io

@@ -3,8 +3,6 @@
 meshio allocates up to the highest node number, so one damaged digit would take all memory.
 """
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Medit text: the sections that hold vertices and cells; others are skipped, and so are reference numbers."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -10,8 +8,7 @@ from numpy.typing import NDArray
 from ...arrays import IntArray
 from ..errors import MeshError
 from .cells import from_cells
-from .common import DAMAGED, Content, header_count
-from .text import NUMBERS, WHOLE_NUMBERS, text_lines
+from .common import DAMAGED, NUMBERS, WHOLE_NUMBERS, Content, header_count, text_lines
 
 ASIDE = re.compile(r'#[^\n]*|"[^"\n]*"')  # comments, and names of other files
 KEYWORD = re.compile(r"(?<!\S)([A-Z][A-Za-z]{3,})(?!\S)")

@@ -3,21 +3,18 @@
 References to texture coordinates and normals are dropped: at a seam they would split a vertex.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import MeshError, check_face_count
-from .common import Content
-from .text import coordinates, corners, text_lines
+from ..errors import MeshError
+from .common import Content, coordinates, corners, text_lines
 
 FACES = ("f", "fo")
 
 
-def read_obj(data: bytes, max_faces: int) -> Content:
+def read_obj(data: bytes, _: int) -> Content:
     """Read the records `v x y z` and `f a b c ...`; negative vertex numbers count back from the last vertex so far.
 
     Raises MeshError, without the file's name, naming the line.
@@ -41,7 +38,6 @@ def read_obj(data: bytes, max_faces: int) -> Content:
         raise MeshError(
             f"{len(vertices)} vertices and {len(polygons)} faces are no surface: the file is not an OBJ, or it is empty"
         )
-    check_face_count(len(polygons), max_faces)
     notices = ["byte order mark skipped"] if data.startswith(b"\xef\xbb\xbf") else []
     notices += ["negative (relative) vertex numbers resolved"] if relative else []
     return Content(vertices, polygons, tuple(notices))

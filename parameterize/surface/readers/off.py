@@ -1,14 +1,11 @@
 """OFF text: vertices and faces; the colours, normals and texture coordinates that may follow in a row are skipped."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
 
 from ..errors import MeshError, check_face_count
-from .common import DAMAGED, Content, header_count
-from .text import coordinates, corners, text_lines
+from .common import DAMAGED, Content, coordinates, corners, header_count, text_lines
 
 HEADER = re.compile(r"(?:ST)?C?N?OFF", re.IGNORECASE)
 

@@ -4,8 +4,6 @@ Text is read here. Binary files are read by meshio where faces have their corner
 by trimesh where faces have further properties, all faces then with the same number of corners.
 """
 
-from __future__ import annotations
-
 import io
 import re
 from dataclasses import dataclass
@@ -13,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import MeshError, check_face_count
-from .common import DAMAGED, Content, header_count, library
-from .text import coordinates, corners, text_lines
+from .common import DAMAGED, Content, coordinates, corners, header_count, library, text_lines
 
 SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
 SIZES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}

@@ -3,8 +3,6 @@
 Of a text, the names of the solids, which may be any words, and what stands before the first one are cut out first.
 """
 
-from __future__ import annotations
-
 import io
 import re
 

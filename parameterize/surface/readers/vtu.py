@@ -3,8 +3,6 @@
 A few kilobytes can hold gigabytes of zeros; what a block really unpacks to is known only while it is unpacked.
 """
 
-from __future__ import annotations
-
 import lzma
 import re
 import zlib

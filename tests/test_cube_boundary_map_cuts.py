@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from shapes import area, ball, is_closed, turned
 
-from parameterize.cube.boundary_map import BoundaryMap
-from parameterize.cube.correspondence import boundary_map
+from parameterize.cube.boundary_map import BoundaryMap, boundary_map
 from parameterize.cube.cutting import cut_along_rays
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume

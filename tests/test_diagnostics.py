@@ -1,9 +1,12 @@
-"""Numbers that mean nothing are said: formulas that do not vary on the domain, solutions the mesh does not resolve."""
+"""What is said of numbers that are not to be trusted, and only of those."""
 
 import numpy as np
 import pytest
 
-from solve import Elasticity, Poisson, benchmark_volume, solve_problem
+from parameterize.spline.volume import BSplineVolume
+from solve import ConvergenceError, Elasticity, Poisson, benchmark_volume, solve_problem
+from solve.diagnostics import contradictions, worst_place
+from solve.discretization.space import trial_space
 from solve.forms.parser import ExpressionError
 
 UNIT = benchmark_volume(3)
@@ -125,3 +128,75 @@ def test_values_that_are_not_finite_are_refused_with_their_range_and_the_way_out
     with np.errstate(all="ignore"), pytest.raises(ExpressionError, match="not finite") as refused:
         solve_problem(UNIT, Poisson(source=lambda x, y, z: np.log(x - 1e6)))
     assert "try" not in str(refused.value)
+
+
+VOLUME = benchmark_volume(4)
+TWO_PROBLEMS = "the errors compare the solutions of two problems"
+
+
+@pytest.mark.parametrize(
+    ("data", "notice"),
+    [
+        ({"exact": "x", "source": "y"}, f"source is not that of exact: {TWO_PROBLEMS}"),
+        ({"exact": "x*x", "source": "-2", "kappa": "2"}, f"source is not that of exact: {TWO_PROBLEMS}"),
+        ({"exact": "x*x", "boundary": "3"}, f"boundary differs from exact: {TWO_PROBLEMS}"),
+        ({"exact": "abs(x-0.5)"}, "exact contains abs"),
+    ],
+)
+def test_data_that_contradict_the_exact_solution_are_named(data, notice):
+    notices = solve_problem(VOLUME, Poisson(**data)).report.notices
+    assert len(notices) == 1
+    assert notices[0].startswith(notice)
+
+
+def test_force_and_displacement_that_contradict_are_named():
+    body = Elasticity(exact=("x*x", "y", "0"), force=("1", "0", "0"), displacement=("x", "y", "0"))
+    notices = solve_problem(VOLUME, body).report.notices
+    assert notices == (
+        f"force is not that of exact: {TWO_PROBLEMS}",
+        f"displacement differs from exact: {TWO_PROBLEMS}",
+    )
+    fits = Elasticity(exact=("x*x", "y", "0"), force=(str(-2.0 * 3.5 / 2.6), "0", "0"))  # -2 (lambda + 2 mu), nu = 0.3
+    assert contradictions(VOLUME, fits) == []
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"exact": "exp(x)*sin(y)", "source": "0"},  # harmonic: the second derivatives cancel
+        {"exact": "x*x", "source": "-4", "kappa": "2", "boundary": "x*x"},
+        {"exact": "1e9*x*y*z", "source": "0"},
+        {"exact": "x", "boundary": "x+7", "neumann": dict.fromkeys(("u0", "u1", "v0", "v1", "w0", "w1"))},
+        {"exact": lambda x, y, z: x, "source": "1", "boundary": "x"},
+        {"source": "1"},
+        {"exact": "log(x-0.05)", "source": "1", "boundary": "log(abs(x-0.05))"},  # not finite where it is compared
+    ],
+)
+def test_data_that_agree_are_not_doubted(data):
+    assert contradictions(VOLUME, Poisson(**data)) == []
+
+
+def pressed_corner(height):
+    """The trilinear unit cube with its corner (1, 1, 1) moved down to (1, 1, height)."""
+    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1)
+    corners[1, 1, 1, 2] = height
+    return BSplineVolume.uniform(corners, 1)
+
+
+def test_worst_place_is_found_near_the_pressed_corner():
+    """Of the two Gauss points a direction, the one nearest the corner: (1 + 1 / sqrt 3) / 2 = 0.7887 three times."""
+    volume = pressed_corner(0.1)
+    parameters, point, scaled = worst_place(volume, trial_space(volume))
+    assert parameters == pytest.approx([0.788675] * 3, abs=1e-6)
+    assert point == pytest.approx(volume(parameters[None])[0])
+    jacobian = volume.jacobian(parameters[None])[0]
+    assert scaled == pytest.approx(np.linalg.det(jacobian) / np.linalg.norm(jacobian, axis=0).prod())
+
+
+def test_the_line_of_a_failed_solve_has_history_and_place():
+    with pytest.raises(ConvergenceError) as caught:
+        solve_problem(pressed_corner(0.1), Poisson(exact="sin(9*x)*y*z"), refine=2, max_iterations=2, strict=True)
+    line = str(caught.value)
+    assert "residual 1.0e+00 at the start" in line and "after 2 iterations" in line and "\n" not in line
+    assert "the map is worst at u=0.9" in line
+    assert caught.value.solution.report.notices == (line,)

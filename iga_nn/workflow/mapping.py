@@ -18,7 +18,7 @@ from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
 from ..models import resolve
-from ..options import MapOptions, read_corners
+from ..options import Equation, MapOptions, read_corners
 from ..report import advice
 from ..report import document as reports
 from .cost_estimate import Forecast, available_memory_mb, forecast
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from parameterize.progress import ProgressCallback
     from parameterize.run import Parameterization
     from parameterize.surface.surface import Surface
-    from solve import Elasticity, Poisson
 
 log = logging.getLogger(__name__)
 
@@ -38,7 +37,10 @@ _TRIED = 50  # points of the surface
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """What a training starts from. corners: vertices or points; marks: the points (8, 3) that they are, for figures."""
+    """Hold what a training starts from.
+
+    corners: vertices or points; marks: the points (8, 3) that they are, for figures.
+    """
 
     surface: Surface
     corners: Any
@@ -52,7 +54,7 @@ def map_surface(
     options: MapOptions,
     progress: ProgressCallback | None,
     command: str,
-    equation: Poisson | Elasticity | None = None,
+    equation: Equation | None = None,
     unknowns: int = 0,
 ) -> Parameterization:
     """Parameterize a surface, write everything that is known of the map into the folder, and return it.
@@ -68,7 +70,7 @@ def map_surface(
 
 
 def _prepare(
-    state: RunFolder, mesh: str | Path, options: MapOptions, equation: Poisson | Elasticity | None, unknowns: int
+    state: RunFolder, mesh: str | Path, options: MapOptions, equation: Equation | None, unknowns: int
 ) -> _Given:
     """Read the surface and the corners, check the problem's data on it, and announce what the run will take.
 
@@ -77,9 +79,7 @@ def _prepare(
     from parameterize.run import choose_device, corner_vertices
 
     with state.timed("load"):
-        surface = resolve(
-            str(mesh), component=options.component, max_faces=options.max_faces, decimate=options.decimate
-        )
+        surface = resolve(str(mesh), **options.reading())
         corners = read_corners(options.corners, _frame(surface)) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
@@ -105,14 +105,14 @@ def _frame(surface: Surface) -> UnitFrame:
     return UnitFrame((x, y, z), 1.0 / surface.scale)
 
 
-def _check_data(equation: Poisson | Elasticity, surface: Surface) -> None:
+def _check_data(equation: Equation, surface: Surface) -> None:
     """Check the problem's data on the surface: no points inside are known yet. Raises ExpressionError."""
     from parameterize.surface.geometry import vertex_normals
-    from solve.meaning import empty_formulas
+    from solve.diagnostics import empty_formulas
 
     equation = equation.placed(_frame(surface))
     points = surface.vertices.T
-    for evaluate in (equation.boundary_at, equation.source_at, equation.tensor, equation.mass):
+    for evaluate in (equation.boundary_at, equation.source_at, equation.form.tensor, equation.form.mass):
         evaluate(points)
     if equation.exact is not None:
         equation.exact_at(points)

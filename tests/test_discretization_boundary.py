@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from parameterize.spline.bspline import collocation
-from solve.discretization.dirichlet import boundary_coefficients
+from solve.discretization.boundary import boundary_coefficients
+from solve.discretization.quadrature import spline_rule
 from solve.discretization.space import trial_space
-from solve.discretization.spline_quadrature import spline_rule
 from solve.study import benchmark_volume
 
 

@@ -1,12 +1,16 @@
-"""Preconditioned conjugate gradients with the history of its residuals."""
-
-from __future__ import annotations
+"""Krylov methods with the history of their residuals: conjugate gradients, and SciPy's GMRES."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from parameterize.arrays import Array
+
+RESTART = 60  # iterations of GMRES between restarts: as many vectors are kept
 Vector = Any  # a NumPy array or a torch tensor: anything with their arithmetic, `reshape` and `@`
 
 
@@ -69,3 +73,43 @@ def conjugate_gradients(
 def _dot(a: Vector, b: Vector) -> float:
     """Inner product, in words that NumPy and torch share."""
     return float(a.reshape(-1) @ b.reshape(-1))
+
+
+def generalized_residuals(
+    operator: Callable[[Array], Array],
+    b: Array,
+    preconditioner: Callable[[Array], Array],
+    tolerance: float = 1e-10,
+    max_iterations: int = 1000,
+    start: Array | None = None,
+) -> LinearResult:
+    """Solve A x = b, not symmetric, by GMRES; arguments as in `conjugate_gradients`.
+
+    The preconditioner P stands on the right, A P y = b - A x with x + P y the answer: residuals are those of A.
+    """
+    norm = float(np.linalg.norm(b))
+    if norm == 0.0:
+        return LinearResult(np.zeros(b.shape), (0.0,), True)
+    x = np.zeros(b.shape) if start is None else start.copy()
+    rest = b if start is None else b - operator(x)
+    size = float(np.linalg.norm(rest)) / norm
+    residuals, y, left = [size], np.zeros(b.size), max_iterations
+    matrix = LinearOperator(
+        (b.size, b.size), matvec=lambda y: operator(preconditioner(y.reshape(b.shape))).ravel(), dtype=np.float64
+    )
+    while left > 0 and residuals[-1] > tolerance:
+        y, _ = gmres(
+            matrix,
+            rest.ravel(),
+            x0=y,
+            rtol=0.0,
+            atol=tolerance * norm,
+            restart=min(RESTART, left),
+            maxiter=1,  # of restarts
+            callback=lambda residual: residuals.append(float(residual) * size),
+            callback_type="pr_norm",
+        )
+        left -= RESTART
+    if len(residuals) > 1:
+        x += preconditioner(y.reshape(b.shape))
+    return LinearResult(x, tuple(residuals), residuals[-1] <= tolerance)

@@ -5,13 +5,15 @@ import pytest
 from volumes import mapped
 
 from parameterize.spline.volume import BSplineVolume
-from solve.discretization.roughness import is_rough
+from solve.discretization.planes import is_rough
 from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
 
+IDENTITY = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
-def rough(volume, tensor=lambda x: None, refine=0):
-    return is_rough(volume, trial_space(volume, refine), tensor)
+
+def rough(volume, factor=lambda x: np.ones(x.shape[1:]), refine=0, tensor=IDENTITY):
+    return is_rough(volume, trial_space(volume, refine), lambda x: np.multiply.outer(tensor, factor(x)))
 
 
 def test_a_smooth_map_is_rough_only_on_few_spans():
@@ -41,8 +43,8 @@ def test_a_coefficient_that_varies_along_one_direction_is_rough():
 def test_of_a_tensor_only_its_variation_counts():
     box = mapped(lambda u, v, w: (u, v, w))
     entries = np.array([100.0, 0.0, 1.0, 1.0, 0.1, 3.0])
-    assert not rough(box, lambda x: np.broadcast_to(entries[:, None, None], (6, *x.shape[1:])))
-    assert rough(box, lambda x: np.multiply.outer(entries, np.exp(20.0 * x[1])))
+    assert not rough(box, tensor=entries)
+    assert rough(box, lambda x: np.exp(20.0 * x[1]), tensor=entries)
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0])

@@ -1,0 +1,212 @@
+"""When the numbers of a solve are not to be trusted: what is said of data, map, mesh and linear solver."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from parameterize.arrays import Array
+from parameterize.quality.quality import scaled_jacobian
+from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
+
+from .discretization.errors import Errors
+from .discretization.operator import Assembled
+from .discretization.planes import map_planes
+from .discretization.quadrature import gauss_rule
+from .discretization.space import TrialSpace
+from .field import Points
+from .forms.data import in_scaled
+from .forms.parser import Expression, ExpressionError
+from .forms.problem import BoundaryValueProblem
+from .linear.krylov import LinearResult
+from .solution import Solution
+
+# Parameters per direction: the ends, and between them places without a pattern that a periodic formula could share.
+SAMPLES = np.concatenate([[0.0], np.sort(np.random.default_rng(0).uniform(0.0, 1.0, 7)), [1.0]])
+_RANDOM = np.random.default_rng(1)  # points of all sizes, somewhere among which a formula that can vary does so
+ANYWHERE = _RANDOM.choice([-1.0, 1.0], (3, 300)) * 10.0 ** _RANDOM.uniform(-3.0, 4.0, (3, 300))
+INSIDE = np.linspace(0.05, 0.95, 7)  # parameters per direction at which data are compared with `exact`
+SMALLEST = 1e-150  # values whose squares underflow
+ROUNDING = 1e-13  # share of the size by which a formula must vary
+AGREEMENT = 1e-6  # share of the size by which data may differ from those of `exact`
+LARGEST_ERROR = 0.5  # relative L2: beyond it more of the solution is wrong than right
+DECISIVE = ("exact", "source", "boundary")  # without these nothing is solved
+TWO_PROBLEMS = "the errors compare the solutions of two problems"
+
+
+class ConvergenceError(RuntimeError):
+    """The linear solver did not reach its tolerance; the last iterate is `solution`."""
+
+    def __init__(self, solution: Solution) -> None:
+        super().__init__(solution.report.notices[-1])
+        self.solution = solution
+
+
+def judge(
+    volume: BSplineVolume,
+    problem: BoundaryValueProblem,
+    errors: Errors | None,
+    estimate: Errors | None,
+    unknowns: int,
+) -> tuple[list[str], bool]:
+    """Return what is doubtful in a problem and the errors of its solution, a line each; whether these mean anything.
+
+    They do not where a formula that decides what is solved does not vary, or the mesh resolves too little.
+    """
+    points = Points.on(volume, SAMPLES, SAMPLES, SAMPLES)
+    ends = {name: np.take(points, -int(name[1]), 1 + AXES.index(name[0])) for name in FACE_NAMES}
+    contradictory = contradictions(volume, problem)
+    empty = empty_formulas(problem, points, ends)
+    rough, unresolved = [], []
+    if estimate is not None and not (estimate.l2_relative or 0.0) <= LARGEST_ERROR:  # NaN included
+        share = f"its relative L2 error is estimated as {estimate.l2_relative:.2g}"
+        rough.append(f"the mesh does not resolve the solution: {share}")
+    if errors is not None and not contradictory and (errors.l2_relative or 0.0) > LARGEST_ERROR:
+        share = f"{unknowns:,} unknowns do not resolve it, the relative L2 error is {errors.l2_relative:.2g}"
+        described, remedy = _exact_on(problem, points)
+        unresolved.append(f"{described}: {share}{remedy}")
+    meaningful = not rough and not unresolved and not any(role in DECISIVE for role, _ in empty)
+    return [*rough, *contradictory, *(notice for _, notice in empty), *unresolved], meaningful
+
+
+def empty_formulas(
+    problem: BoundaryValueProblem, points: Array, faces: Mapping[str, Array] | None = None
+) -> list[tuple[str, str]]:
+    """Return the data whose formulas underflow, or vary by less than rounding, at points (3, ...): role, notice.
+
+    faces: the points of each face, where data of that face are judged; without them at all points. A formula that is
+    constant everywhere else, too, is meant to be constant. Points where a formula is not finite do not count.
+    """
+    found = []
+    for role, datum, formula in problem.formulas:
+        where = (faces or {}).get(datum.face, points)
+        ends = _range(formula(*where))
+        if ends is None or (fault := _fault(*ends)) is None or _is_constant(formula, where):
+            continue
+        place = f"face {datum.face}" if where is not points else "the domain"
+        described = f"{datum.name} {formula.text!r} runs from {ends[0]:.3g} to {ends[1]:.3g} on {place}"
+        found.append((role, f"{described}: it {fault}, and means nothing here{in_scaled(formula, where)}"))
+    return found
+
+
+def _fault(low: float, high: float) -> str | None:
+    size = max(abs(low), abs(high))
+    if size < SMALLEST:
+        return "underflows"
+    return "varies by less than rounding" if high - low <= ROUNDING * size else None
+
+
+def _is_constant(formula: Expression, where: Array) -> bool:
+    """Whether a formula has one value anywhere, coordinates that do not vary at the points (3, ...) apart.
+
+    On a face x = 0 the formula x*y is meant to be zero.
+    """
+    if not formula.variables:
+        return True
+    middle, length = (0.0, 1.0) if formula.frame is None else (np.array(formula.frame.center), formula.frame.length)
+    anywhere = np.transpose(length * ANYWHERE.T + middle)
+    for i, row in enumerate(where):
+        if np.ptp(row) <= ROUNDING * np.abs(where).max():
+            anywhere[i] = row.flat[0]
+    ends = _range(formula(*anywhere))
+    return ends is not None and ends[0] == ends[1]
+
+
+def _exact_on(problem: BoundaryValueProblem, points: Array) -> tuple[str, str]:
+    """Return a description of `exact` at points (3, ...), and the remedy where its scale is the trouble."""
+    exact = problem.exact_formulas
+    ends = _range(np.array([formula(*points) for formula in exact]))
+    described = "exact"
+    if ends is not None:
+        text = ";".join(formula.text for formula in exact)
+        described = f"exact {text!r} runs from {ends[0]:.3g} to {ends[1]:.3g} on the domain"
+    return described, in_scaled(exact[0], points) if len(exact) == 1 else ""
+
+
+def _range(values: Array) -> tuple[float, float] | None:
+    """Lowest and highest of the values that are finite; None where there is none."""
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if finite.size else None
+
+
+def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list[str]:
+    """Return what does not fit a problem's exact formulas on the volume, one line each; none without such formulas.
+
+    Source and Dirichlet data are compared with those of the formulas at 7 points per direction, unless these are not
+    finite there.
+    """
+    found = []
+    if not problem.exact_formulas:
+        return []
+    if not problem.knows("source"):
+        if any("abs" in formula.text for formula in problem.exact_formulas):
+            found.append(
+                "exact contains abs: where its argument changes sign, u has a kink that the source derived from it "
+                "does not know, and the errors stay"
+            )
+    elif not problem.not_differentiable:
+        x = Points.on(volume, INSIDE, INSIDE, INSIDE)
+        # rounding is measured by the terms of the law, which may cancel in the source
+        if not _agree(problem.source_at(x), lambda: (problem.source_of_exact(x), problem.size_of_exact(x))):
+            found.append(f"{problem.label('source')} is not that of exact: {TWO_PROBLEMS}")
+    if problem.knows("boundary") and not all(_values_fit(volume, problem, face) for face in problem.dirichlet):
+        found.append(f"{problem.label('boundary')} differs from exact: {TWO_PROBLEMS}")
+    return found
+
+
+def _values_fit(volume: BSplineVolume, problem: BoundaryValueProblem, face: str) -> bool:
+    x = Points.on(volume, *(np.array([float(face[1])]) if axis == face[0] else INSIDE for axis in AXES))
+    return _agree(problem.boundary_at(x), lambda: (problem.exact_at(x)[0], 0.0))
+
+
+def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:
+    """Whether data are those of `exact`: a function that returns them, and the size of what cancels in them."""
+    try:
+        derived, size = of_exact()
+    except ExpressionError:  # perhaps the reason why they are given
+        return True
+    size = max(np.abs(given).max(), np.abs(derived).max(), size)
+    return bool(np.abs(given - derived).max() <= AGREEMENT * size)
+
+
+def solve_notices(
+    volume: BSplineVolume, space: TrialSpace, assembled: Assembled, certified: str | None, result: LinearResult
+) -> list[str]:
+    """Return what is to be said of map and linear solver; the last line is that of a solver that did not converge."""
+    notices = []
+    if certified not in (None, "certified"):
+        notices.append(f"the map is {certified}, not certified: do not trust the solution")
+    if assembled.folded:
+        notices.append(
+            f"det J < 0 at {assembled.folded} of {assembled.points} Gauss points: solved with |det J| instead"
+        )
+    if not result.converged:
+        parameters, point, scaled = worst_place(volume, space)
+        cube, where = (
+            ", ".join(f"{axis}={value:.4g}" for axis, value in zip(axes, place, strict=True))
+            for axes, place in ((AXES, parameters), ("xyz", point))
+        )
+        residuals = result.residuals
+        notices.append(
+            f"no convergence: residual {residuals[0]:.1e} at the start, {residuals[-1]:.1e} after {result.iterations} "
+            f"iterations (lowest {min(residuals):.1e}); the map is worst at {cube} ({where}): "
+            f"scaled Jacobian {scaled:.2g}"
+        )
+    return notices
+
+
+def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array, float]:
+    """Return where the map's scaled Jacobian, det J over the product of its columns' lengths, is least.
+
+    Of all Gauss points: parameters (3,), the point in space (3,) and the value there, 1 where the parameter lines meet
+    at right angles, 0 where the map degenerates.
+    """
+    rule = gauss_rule(space)
+    parameters, point, least = np.zeros(3), np.zeros(3), np.inf
+    for q, fields, _ in map_planes(volume, rule):
+        scaled = scaled_jacobian(np.moveaxis(fields[:, 1:], (0, 1), (2, 3)))  # of (q_w, q_v, 3, 3)
+        w, v = (int(i) for i in np.unravel_index(np.argmin(scaled), scaled.shape))
+        if scaled[w, v] < least:
+            least = float(scaled[w, v])
+            parameters = np.array([rule.points[a][i] for a, i in enumerate((q, v, w))])
+            point = fields[:, 0, w, v].copy()
+    return parameters, point, least

@@ -1,0 +1,112 @@
+"""Data on the images of the cube's faces: Dirichlet's values projected, Neumann's load and Robin's term integrated."""
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from parameterize.arrays import Array
+from parameterize.spline.bspline import apply_along, collocation
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+
+from ..field import Points
+from ..forms.frame import face_geometry
+from .quadrature import gauss_rule, spline_rule
+from .space import TrialSpace
+
+FREE = None
+
+
+def boundary_coefficients(
+    volume: BSplineVolume,
+    space: TrialSpace,
+    values: Callable[[Array], Array],
+    faces: Collection[str] = FACE_NAMES,
+    components: int = 1,
+) -> Array:
+    """Return coefficients (c, n_u, n_v, n_w) of an approximation of boundary data on the named faces, zero elsewhere.
+
+    values: takes points (3, ...) and returns (c, ...), one row for each of the components. Corners are interpolated,
+    then edges and faces projected in L2, in the parametric measure; each takes up what the smaller ones have fixed.
+    """
+    coefficients = np.zeros((components, *space.shape))
+    points, bases, projections = zip(*map(_projection, space.knots, space.degrees), strict=True)
+    for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
+        if not any(FACE_NAMES[2 * axis + side] in faces for axis, side in enumerate(entity) if side is not FREE):
+            continue
+        free = [a for a in range(3) if entity[a] is FREE]
+        u, v, w = (points[a] if side is FREE else np.array([float(side)]) for a, side in enumerate(entity))
+        ends = [slice(None) if side is FREE else slice(-side, 1 - side or None) for side in entity]
+        inside = [slice(1, -1) if side is FREE else end for side, end in zip(entity, ends, strict=True)]
+        fixed = coefficients[:, *ends]  # on the closed entity: its own ends are known already
+        for a in free:
+            fixed = apply_along(bases[a], fixed, a + 1)
+        residual = values(Points.on(volume, u, v, w)) - fixed
+        for a in free:
+            residual = np.moveaxis(np.tensordot(projections[a], residual, (1, a + 1)), 0, a + 1)
+        coefficients[:, *inside] = residual
+    return coefficients
+
+
+def _projection(knots: Array, degree: int) -> tuple[Array, csr_array, Array]:
+    """Return points (q,) of a direction, its functions there (q, n), and the L2 projection (n - 2, q).
+
+    The projection is that onto the functions that vanish at both ends.
+    """
+    points, weights = spline_rule(knots, degree, 2 * degree)
+    basis = collocation(knots, degree, points)
+    inside = basis[:, 1:-1].toarray()
+    inner = (weights[:, None] * inside).T
+    return points, basis, np.linalg.solve(inner @ inside, inner)
+
+
+@dataclass(frozen=True, eq=False)
+class FaceRule:
+    """Gauss points on the image of one face, degree + 1 a span and direction, and the trial functions there.
+
+    points, normal: (3, q_b, q_c) in space, the normal outward and of unit length. measure: (q_b, q_c), surface element
+    times weight. bases: (q_b, n_b) and (q_c, n_c), of the two directions that run along the face.
+    layer: the face's coefficients in an array (n_u, n_v, n_w).
+    """
+
+    points: Points
+    normal: Array
+    measure: Array
+    bases: tuple[csr_array, csr_array]
+    layer: tuple[int | slice, ...]
+
+    def integrate(self, density: Array) -> Array:
+        """Return integrals (n_b, n_c) of a density (q_b, q_c), weights included, times each trial function."""
+        return self.bases[0].T @ density @ self.bases[1]
+
+    def add_mass(self, weights: Array, coefficients: Array, result: Array) -> None:
+        """Add Robin's term, the integral of alpha u v, of coefficients (n_u, n_v, n_w) to `result` of the same shape.
+
+        weights: (q_b, q_c), alpha times `measure`.
+        """
+        values = self.bases[0] @ coefficients[self.layer] @ self.bases[1].T
+        result[self.layer] += self.integrate(weights * values)
+
+    def add_mass_diagonal(self, weights: Array, diagonal: Array) -> None:
+        """Add the diagonal of Robin's term to an array (n_u, n_v, n_w)."""
+        b, c = (basis.power(2) for basis in self.bases)
+        diagonal[self.layer] += b.T @ weights @ c
+
+
+def face_rule(volume: BSplineVolume, space: TrialSpace, name: str) -> FaceRule:
+    """Return the rule of a face, one of FACE_NAMES."""
+    axis, side = divmod(FACE_NAMES.index(name), 2)
+    rule = gauss_rule(space, [degree + 1 for degree in space.degrees])
+    b, c = (a for a in range(3) if a != axis)
+    points, area = face_geometry(volume, rule.points, axis, side)
+    size = np.linalg.norm(area, axis=0)
+    bases = [collocation(space.knots[a], space.degrees[a], rule.points[a]) for a in (b, c)]
+    return FaceRule(
+        points=points,
+        normal=area / np.where(size > 0.0, size, 1.0),  # a face may shrink to a point at a corner
+        measure=size * np.multiply.outer(rule.weights[b], rule.weights[c]),
+        bases=(bases[0], bases[1]),
+        layer=tuple(-side if a == axis else slice(None) for a in range(3)),
+    )

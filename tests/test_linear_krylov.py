@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+
+from solve.linear.krylov import conjugate_gradients, generalized_residuals
+
+
+def identity(r):
+    return r
+
+
+def test_diagonal_with_three_eigenvalues_takes_three_iterations():
+    d = np.repeat([1.0, 2.0, 5.0], 10)
+    b = np.linspace(1.0, 2.0, 30)
+    result = conjugate_gradients(lambda p: d * p, b, identity, 1e-12)
+    assert result.converged
+    assert result.iterations == 3
+    assert np.allclose(result.x, b / d, atol=1e-12)
+
+
+def test_exact_preconditioner_takes_one_iteration():
+    d = np.linspace(1.0, 100.0, 50)
+    result = conjugate_gradients(lambda p: d * p, np.ones(50), lambda r: r / d, 1e-12)
+    assert result.iterations == 1
+
+
+def test_history_holds_the_true_residuals():
+    rng = np.random.default_rng(0)
+    q = np.linalg.qr(rng.standard_normal((20, 20)))[0]
+    matrix = q @ np.diag(np.geomspace(1.0, 1e3, 20)) @ q.T
+    b = rng.standard_normal(20)
+    result = conjugate_gradients(lambda p: matrix @ p, b, identity, 1e-10, 7)
+    assert len(result.residuals) == 8
+    assert result.residuals[0] == 1.0
+    true = np.linalg.norm(b - matrix @ result.x) / np.linalg.norm(b)
+    assert result.residuals[-1] == pytest.approx(true, rel=1e-8)
+
+
+def test_iteration_limit_is_reported():
+    d = np.geomspace(1.0, 1e6, 100)
+    result = conjugate_gradients(lambda p: d * p, np.ones(100), identity, 1e-10, 5)
+    assert not result.converged
+    assert result.iterations == 5
+
+
+def test_zero_right_hand_side_needs_no_iteration():
+    result = conjugate_gradients(identity, np.zeros(4), identity)
+    assert result.converged
+    assert result.iterations == 0
+
+
+@pytest.mark.parametrize("value", [-1.0, 0.0, np.nan])
+def test_stops_where_the_matrix_is_not_positive(value):
+    result = conjugate_gradients(lambda p: value * p, np.ones(4), identity)
+    assert not result.converged
+    assert result.iterations == 0
+    assert np.all(result.x == 0.0)
+
+
+def test_starts_where_it_is_told_to():
+    d = np.geomspace(1.0, 1e3, 100)
+    b = np.ones(100)
+    near = b / d * (1.0 + 1e-6)
+    result = conjugate_gradients(lambda p: d * p, b, identity, 1e-10, start=near)
+    assert result.residuals[0] == pytest.approx(1e-6, rel=1e-6)
+    assert result.iterations < conjugate_gradients(lambda p: d * p, b, identity, 1e-10).iterations
+    assert np.allclose(result.x, b / d, rtol=1e-6)
+    assert near[0] == 1.0 + 1e-6
+
+
+@pytest.fixture
+def case():
+    """A matrix far from symmetric, and an approximate inverse."""
+    rng = np.random.default_rng(0)
+    matrix = np.diag(np.arange(1.0, 61.0)) + 2.0 * np.triu(rng.standard_normal((60, 60)), 1)
+    inverse = np.linalg.inv(np.tril(matrix) + 0.8 * np.triu(matrix, 1))
+    return matrix, inverse, rng.standard_normal((3, 4, 5))
+
+
+def test_solution_and_residuals_are_those_of_the_system(case):
+    matrix, inverse, b = case
+    result = generalized_residuals(
+        lambda x: (matrix @ x.ravel()).reshape(b.shape), b, lambda r: (inverse @ r.ravel()).reshape(b.shape), 1e-9
+    )
+    assert result.converged and result.x.shape == b.shape and result.iterations < 40
+    assert np.allclose(result.x.ravel(), np.linalg.solve(matrix, b.ravel()), atol=1e-6)
+    left = np.linalg.norm(b.ravel() - matrix @ result.x.ravel()) / np.linalg.norm(b)
+    assert result.residuals[0] == 1.0 and result.residuals[-1] == pytest.approx(left, rel=1e-3)
+    assert all(after <= before for before, after in zip(result.residuals, result.residuals[1:], strict=False))
+
+
+def test_a_good_start_saves_iterations_and_a_limit_ends_them(case):
+    matrix, _, b = case
+
+    def solve(**arguments):
+        return generalized_residuals(lambda x: (matrix @ x.ravel()).reshape(b.shape), b, np.copy, **arguments)
+
+    exact = np.linalg.solve(matrix, b.ravel()).reshape(b.shape)
+    near = solve(start=exact + 1e-6 * np.ones(b.shape), tolerance=1e-7)
+    assert near.residuals[0] < 1e-3 and near.converged and np.allclose(near.x, exact, atol=1e-4)
+    assert solve(start=exact, tolerance=1e-6).iterations == 0
+    stopped = solve(max_iterations=7, tolerance=1e-12)
+    assert not stopped.converged and stopped.iterations == 7 and stopped.residuals[-1] < 1.0
+
+
+@pytest.mark.parametrize("limit", [3, 5, 12, 14])
+def test_the_limit_of_iterations_holds_between_restarts(case, limit, monkeypatch):
+    monkeypatch.setattr("solve.linear.krylov.RESTART", 5)
+    matrix, _, b = case
+    result = generalized_residuals(
+        lambda x: (matrix @ x.ravel()).reshape(b.shape), b, np.copy, tolerance=1e-12, max_iterations=limit
+    )
+    assert not result.converged and result.iterations == limit
+    left = np.linalg.norm(b.ravel() - matrix @ result.x.ravel()) / np.linalg.norm(b)
+    assert result.residuals[-1] == pytest.approx(left, rel=1e-6)
+
+
+def test_zero_is_the_answer_to_zero():
+    result = generalized_residuals(lambda x: x, np.zeros((2, 2)), np.copy)
+    assert result.converged and not result.x.any()

@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+from volumes import mapped, scalar_system
+
+from parameterize.spline.volume import FACE_NAMES
+from solve.linear.krylov import conjugate_gradients
+from solve.linear.preconditioner import fast_diagonalization
+from solve.linear.shear import OFFSETS, _stencils, helps, incomplete_cholesky
+from solve.study import benchmark_volume
+
+
+def sheared(slope, shape=(9, 9, 9), degree=3):
+    """A cube whose x runs along with y, and y with z."""
+    return mapped(lambda x, y, z: (x + slope * y, y + slope * z, z), shape, (degree,) * 3)
+
+
+def free_shape(operator):
+    sizes = zip(operator.window, operator.space.shape, strict=True)
+    return tuple(len(range(*free.indices(n))) for free, n in sizes)
+
+
+def matrix_of(operator):
+    shape = free_shape(operator)
+    units = np.eye(int(np.prod(shape))).reshape(-1, *shape)
+    return np.stack([operator.apply_free(unit).ravel() for unit in units])
+
+
+def test_it_acts_on_sheared_maps_alone():
+    assert not helps(scalar_system(sheared(0.5)).operator)
+    assert helps(scalar_system(sheared(3.0)).operator)
+    assert not helps(scalar_system(sheared(3.0, degree=4)).operator)
+    assert fast_diagonalization(scalar_system(benchmark_volume(6)).operator).local is None
+
+
+@pytest.mark.parametrize("faces", [FACE_NAMES, ("u0", "v1")])
+def test_for_degree_one_the_elements_are_those_of_the_operator(faces):
+    operator = scalar_system(sheared(0.7, (5, 4, 6), 1), dirichlet=faces).operator
+    stencils = _stencils(operator)
+    shape = stencils.shape[:3]
+    dense = np.zeros((*shape, *shape))
+    for node in np.ndindex(shape):
+        for offset, value in zip(OFFSETS, stencils[node], strict=True):
+            if value != 0.0:
+                dense[node][tuple(node + offset)] = value
+    lower = dense.reshape(np.prod(shape), -1)
+    assert np.allclose(lower, np.tril(matrix_of(operator)), atol=1e-13)
+
+
+def test_the_factors_are_exact_where_nothing_fills_in():
+    """One free node across: the matrix is tridiagonal."""
+    operator = scalar_system(sheared(0.7, (9, 3, 3), 1)).operator
+    x = np.random.default_rng(0).standard_normal(free_shape(operator))
+    assert np.allclose(incomplete_cholesky(operator)(operator.apply_free(x)), x, atol=1e-12)
+
+
+@pytest.mark.parametrize(("degree", "most"), [(2, 35), (3, 46)])
+def test_fewer_iterations_on_a_sheared_map(degree, most):
+    """Fast diagonalization alone takes 55 and 60."""
+    operator = scalar_system(sheared(3.0, (14, 14, 14), degree)).operator
+    b = np.random.default_rng(1).standard_normal(free_shape(operator))
+    result = conjugate_gradients(operator.apply_free, b, fast_diagonalization(operator))
+    assert result.converged and result.iterations <= most
+
+
+def test_symmetric_and_positive():
+    preconditioner = fast_diagonalization(scalar_system(sheared(3.0), dirichlet=("u0", "w1")).operator)
+    assert preconditioner.local is not None
+    a, b = np.random.default_rng(2).standard_normal((2, *preconditioner.inverse.shape))
+    assert np.vdot(a, preconditioner(b)) == pytest.approx(np.vdot(b, preconditioner(a)), rel=1e-10)
+    assert np.vdot(a, preconditioner(a)) > 0.0
