@@ -43,6 +43,10 @@ LOOKS = {  # what a reader should picture
     "thin": "a wavy sheet, 8 to 15 times as wide as thick, rolled up",
     "flat": "a flat plate with arms, 8 to 15 times as wide as thick",
     "long": "a curved worm with necks, 8 to 12 times as long as wide",
+    "bulb": "a ball on a thin stalk",
+    "fingers": "a palm with 3 to 5 fingers close together",
+    "flap": "a body with thin wings that lie along it",
+    "folded": "a sheet folded once or twice, its layers close together",
 }
 PICTURE = 700, 520  # pixels
 
