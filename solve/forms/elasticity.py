@@ -1,5 +1,7 @@
 """Elasticity: the law and the data of -div sigma(u) = f, isotropic, with displacement or traction on each face."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from typing import Any
 

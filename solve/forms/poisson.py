@@ -1,5 +1,7 @@
 """Poisson: the law and the data of -div(kappa grad u) + c u = f."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

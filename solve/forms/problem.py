@@ -1,5 +1,7 @@
 """Problem: a law and its data in the volume and on the images of the cube's six faces."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import KW_ONLY, dataclass, field
