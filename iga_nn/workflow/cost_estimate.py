@@ -34,7 +34,7 @@ REST = 1000.0  # libraries loaded, figures drawn
 
 # Products
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
-EASY, HARD = (5, 16), (11, 14)  # rounds, and Newton steps a round
+EASY, HARD = (5, 13), (11, 13)  # rounds, and Newton steps a round
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3

@@ -1,6 +1,7 @@
 """Control-point optimisation: distortion, smoothness, boundary and injectivity of F together (section 4.3.2, step 3).
 
 Truncated Newton steps on the energy of energy.py. Between steps the boundary parameters slide (surface_distance.py).
+Steps and sliding by turns converge linearly; acceleration.py looks ahead, and what it finds is kept where it is lower.
 """
 
 import logging
@@ -21,6 +22,7 @@ from ..config import SplineConfig
 from ..progress import History, Progress, ProgressCallback, ignore
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
+from .acceleration import Acceleration
 from .determinant_penalty import edge_spans
 from .energy import Knots, SplineEnergy
 from .surface_distance import SurfaceFit
@@ -238,6 +240,24 @@ def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> tupl
     return None
 
 
+def _look_ahead(found: _Point, acceleration: Acceleration, energy: SplineEnergy) -> _Point | None:
+    """Return the point that the acceleration guesses, parameters slid there; None where it lies no lower than `found`.
+
+    The parameters are then where they were.
+    """
+    if (control := acceleration.guess()) is None:
+        return None
+    places = energy.surface.places
+    before = places.parameters, places.cube_faces
+    energy.slide(control)
+    ahead = _evaluate(control, energy)
+    if ahead.total < found.total:
+        return ahead
+    places.place(*before)
+    acceleration.forget(keep=1)
+    return None
+
+
 def _next_damping(damping: float, length: float, config: SplineConfig) -> float:
     """Raise the damping after a step that had to be shortened to less than half, lower it after a full one."""
     if length < 0.5:
@@ -264,7 +284,7 @@ def _descend(
     config, steps = energy.config, energy.config.steps
     energy.watch_facing(control)
     point = _evaluate(control, energy)
-    lowest, waited, damping = point.total, 0, 0.0
+    lowest, waited, damping, acceleration = point.total, 0, 0.0, Acceleration(config.memory)
     for step in range(steps):
         begun = time.perf_counter()
         direction = energy.newton_direction(point.control, -point.gradient, damping)
@@ -274,9 +294,17 @@ def _descend(
             break
         found, length = searched
         damping = _next_damping(damping, length, config)
-        gain = point.total - found.total
-        energy.slide(found.control)
-        point = replace(found, outer=energy.surface_part(found.control))
+        start = point
+        if length < 1.0:
+            acceleration.forget()
+        else:
+            acceleration.add(start.control, found.control)
+        ahead = _look_ahead(found, acceleration, energy)
+        if ahead is None:
+            energy.slide(found.control)
+            ahead = replace(found, outer=energy.surface_part(found.control))
+        point = ahead
+        gain = start.total - point.total
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
         total = max(number + 1, len(config.usual_steps)) * steps

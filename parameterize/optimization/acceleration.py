@@ -1,0 +1,40 @@
+"""Anderson's acceleration: from several steps of an iteration, a guess at where it leads.
+
+Anderson, J. ACM 12 (1965); Walker, Ni, SIAM J. Numer. Anal. 49 (2011), in the form without constraints.
+"""
+
+import torch
+from torch import Tensor
+
+_DAMPING = 1e-8  # of the least squares, against steps that are nearly alike
+
+
+class Acceleration:
+    """The last steps of an iteration x -> g(x), at most `memory` + 1."""
+
+    def __init__(self, memory: int) -> None:
+        self._memory = memory
+        self._starts: list[Tensor] = []
+        self._ends: list[Tensor] = []
+
+    def add(self, start: Tensor, end: Tensor) -> None:
+        """Take the step from x to g(x)."""
+        self._starts = [*self._starts[-self._memory :], start]
+        self._ends = [*self._ends[-self._memory :], end]
+
+    def forget(self, keep: int = 0) -> None:
+        """Keep the last steps alone: the others do not tell where the iteration leads from here."""
+        self._starts = self._starts[len(self._starts) - keep :]
+        self._ends = self._ends[len(self._ends) - keep :]
+
+    def guess(self) -> Tensor | None:
+        """Return the combination of the ends, factors of sum 1, whose steps cancel best; None with less than two."""
+        if len(self._ends) < 2:
+            return None
+        starts, ends = (torch.stack([x.flatten() for x in kept]) for kept in (self._starts, self._ends))
+        steps = ends - starts
+        changes = steps.diff(dim=0)
+        gram = changes @ changes.T
+        gram += _DAMPING * gram.trace() * torch.eye(len(gram), dtype=gram.dtype)
+        factors = torch.linalg.solve(gram, changes @ steps[-1])
+        return (ends[-1] - factors @ ends.diff(dim=0)).reshape(self._ends[-1].shape)
