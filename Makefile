@@ -5,7 +5,7 @@ RUN := .venv/.run
 DEV := .venv/.dev
 INSTALL := $(BIN)/python -m pip install -c constraints.txt
 
-.PHONY: setup setup-dev demo test lint validate stress fuzz audit
+.PHONY: setup setup-dev demo docs test lint validate stress fuzz audit
 
 setup: $(RUN)
 
@@ -27,7 +27,10 @@ $(DEV): $(RUN)
 
 demo: $(RUN)
 	$(BIN)/iga-nn run poisson seashell --out out/demo --force
-	@echo "Open out/demo/report.html; the numbers are in out/demo/report.json."
+
+# The site, in docs/_build/html; a warning is an error. Nothing is fetched.
+docs: $(DEV)
+	OMP_NUM_THREADS=1 $(BIN)/python -P -m sphinx -W --keep-going -b html docs docs/_build/html
 
 test: lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile

@@ -1,4 +1,7 @@
-"""Many surfaces, one after the other: a folder of results each, a table and a chart; what is refused does not stop it.
+"""Many surfaces
+=============
+
+One after the other: a folder of results each, a table and a chart; what is refused does not stop it.
 
 `python examples/batch.py part1.stl part2.obj ...`; without files, three samples.
 """

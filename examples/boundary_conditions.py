@@ -1,4 +1,7 @@
-"""Boundary conditions of your own: heat in a quarter of a pipe, hot inside, cooled by the air outside.
+"""Boundary conditions
+===================
+
+Heat in a quarter of a pipe, hot inside, cooled by the air outside.
 
 -div(grad u) = 0; u = 1 on the inner wall (face u0), du/dn + 2 u = 0 on the outer one (u1), no flux through the cuts.
 Along a radius the answer is known: u = 1 + a log(r), with a from the outer condition.
@@ -41,6 +44,7 @@ def main(n: int = 12, out: str | Path = "out/boundary_conditions") -> Path:
     print(f"half-way: {solution(middle)[0]:.5f}, by the formula {exact(np.hypot(*volume(middle)[0, :2])):.5f}")
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
+    volume.save(folder / "volume.npz")
     solution.save(folder / "solution.npz")
     if can_draw():
         draw_values(folder / "temperature.png", volume, solution, "temperature")

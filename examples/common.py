@@ -25,10 +25,12 @@ def load(file: str | Path | None) -> iga_nn.BSplineVolume:
     return iga_nn.load_volume(file) if file else twisted_column()
 
 
-def draw(out: str | Path, *what: object, **how: float) -> Path:
-    """Draw a volume, a field on it and a title, where that is possible; returns the picture's path."""
-    picture = Path(out) / "picture.png"
-    picture.parent.mkdir(parents=True, exist_ok=True)
+def draw(out: str | Path, volume: iga_nn.BSplineVolume, field: iga_nn.SplineField, title: str, **how: float) -> Path:
+    """Save a volume and a field on it, and draw them, where that is possible; returns the picture's path."""
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    volume.save(folder / "volume.npz")
+    field.save(folder / "solution.npz")
     if can_draw():
-        draw_values(picture, *what, **how)
-    return picture
+        draw_values(folder / "picture.png", volume, field, title, **how)
+    return folder / "picture.png"

@@ -1,4 +1,7 @@
-"""Two parameterizations of one solid: distortion, and what it costs the solver.
+"""Two maps of one solid
+=====================
+
+Their distortion, and what it costs the solver.
 
 `python examples/compare.py A/volume.npz B/volume.npz` compares two results of yours, say of two seeds. Without files:
 a twisted cube, and the same with its inner control points pushed aside. The boundary is the same, the map is worse.

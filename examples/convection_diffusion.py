@@ -1,4 +1,7 @@
-"""Convection and diffusion, -div(k grad u) + wind . grad u = f, a law that is not symmetric: GMRES solves it.
+"""Convection and diffusion
+========================
+
+The law -div(k grad u) + wind . grad u = f is not symmetric: GMRES solves it.
 
 `python examples/convection_diffusion.py [volume.npz]`. The solution is given, and f follows from law and solution.
 """

@@ -1,4 +1,7 @@
-"""Rates on one fixed curved map, refined exactly: the three ways to enrich a spline space (h, p and k).
+"""h, p and k refinement
+=====================
+
+Rates on one fixed curved map, refined exactly: the three ways to enrich a spline space.
 
 `python examples/convergence.py [--out DIR] [--levels N]` writes convergence.csv and convergence.png with h refinement
 for the degrees 2 to 5, where the errors fall as h^(p + 1) in L2 and h^p in H1, and orders.csv and orders.png, where the

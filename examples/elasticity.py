@@ -1,4 +1,7 @@
-"""Linear elasticity: a beam, clamped at one end, that bends under its own weight; beside beam theory.
+"""Linear elasticity
+=================
+
+A beam, clamped at one end, bends under its own weight; beside beam theory.
 
 A straight beam of length L and square section h under the load f per volume sinks by 12 f L^4 / (8 E h^2) at its tip
 (Euler and Bernoulli, who leave out the shear: some percent at L = 8 h).
@@ -34,6 +37,7 @@ def main(out: str | Path = "out/elasticity") -> Path:
     print(f"tip sinks by {-tip:.4f}, beam theory {1.5 * WEIGHT * LENGTH**4 / (YOUNG * THICKNESS**2):.4f}")
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
+    volume.save(folder / "volume.npz")
     solution.save(folder / "solution.npz")
     if can_draw():
         draw_values(folder / "beam.png", volume, solution, "displacement, drawn 4 times too large", exaggerate=4.0)

@@ -1,4 +1,7 @@
-"""Files for ParaView, MFEM and G+Smo, with the solution; the view, cut open.
+"""Files for other programs
+========================
+
+ParaView, MFEM and G+Smo, with the solution; the view, cut open.
 
 On the command line: `iga-nn export volume.npz --to view --solution solution.npz`. MFEM and G+Smo need the extra
 `interop`: `pip install iga-nn[interop]`.

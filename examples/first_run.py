@@ -1,4 +1,8 @@
-"""A sample surface, parameterized and solved: the package in ten lines of Python, and a picture."""
+"""First run
+=========
+
+A sample surface, parameterized and solved: the package in ten lines of Python, and a picture.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Where the cube's eight corners lie on the surface: given, instead of chosen by the method (the paper's Fig. 13).
+"""Corners of your own
+===================
+
+The cube's eight corners on the surface are given, instead of chosen by the method (the paper's Fig. 13).
 
 The corners come in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the parameters u, v, w: as points, which take
 their nearest vertices, or as vertex numbers. On the command line: `iga-nn parameterize MESH --corners corners.json`.

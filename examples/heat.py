@@ -1,4 +1,7 @@
-"""The heat equation du/dt - div(grad u) = f by BDF2, with the system of one time step used again and again.
+"""The heat equation
+=================
+
+du/dt - div(grad u) = f by BDF2, with the system of one time step used again and again.
 
 `python examples/heat.py [volume.npz]`. With A the matrix of -div(grad), M that of mass, and b(t) source and flux,
 

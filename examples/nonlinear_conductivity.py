@@ -1,4 +1,7 @@
-"""A conductivity that depends on the solution, -div((1 + u^2) grad u) = 0, by Picard's iteration.
+"""A nonlinear conductivity
+========================
+
+The conductivity depends on the solution, -div((1 + u^2) grad u) = 0: Picard's iteration.
 
 `python examples/nonlinear_conductivity.py [volume.npz]`. Every step solves a linear law whose conductivity comes from
 the last solution's field. The answer is known on every volume: w = u + u^3 / 3 (Kirchhoff) has div(grad w) = 0, a

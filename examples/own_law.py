@@ -1,4 +1,7 @@
-"""A law of your own with an exact solution: the errors fall with the rates of its degree, p + 1 in L2 and p in H1.
+"""A law of your own
+=================
+
+With an exact solution, the errors fall with the rates of the degree, p + 1 in L2 and p in H1.
 
 `python examples/own_law.py [volume.npz]`. The source, the flux on the face u1, the preconditioner and the errors follow
 from law and solution.

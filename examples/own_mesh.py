@@ -1,4 +1,7 @@
-"""A mesh file of your own, all the way: what the gate says of it, the run, the output folder with report.html.
+"""A mesh of your own
+==================
+
+All the way: what the gate says of a file, the run, the output folder with report.html.
 
 `python examples/own_mesh.py bracket.stl` does what `iga-nn run poisson bracket.stl` does; without a file, a sample is
 written to one first.

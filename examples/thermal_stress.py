@@ -1,10 +1,10 @@
-"""Thermal stress: a temperature field loads elasticity, sigma = C eps - b T I with b = E a / (1 - 2 nu).
+"""Thermal stress
+==============
 
-`python examples/thermal_stress.py [volume.npz]`. Heat flows in through the face u1 and out through u0, where T = 0 and
-the body is clamped; no traction on the other faces. By default a beam: its tip moves by a T_tip L / 2, nearly, for it
-is free to expand but near the clamp.
-The coupling is a law of four components, three of the displacement and T: its product with the vector (0, T) holds the
-integrals of -b T div v, the load with its sign changed.
+A temperature loads elasticity, sigma = C eps - b T I with b = E a / (1 - 2 nu). `python examples/thermal_stress.py
+[volume.npz]`: heat flows in through the face u1 and out through u0, where T = 0 and the body is clamped. By default a
+beam: its tip moves by a T_tip L / 2, nearly, for it is free to expand but near the clamp. The coupling is a law of
+components (u, T): its product with the vector (0, T) holds the integrals of -b T div v, the load with its sign changed.
 """
 
 from __future__ import annotations

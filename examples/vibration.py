@@ -1,4 +1,7 @@
-"""The lowest vibration modes of an elastic body, clamped at one end: A x = (2 pi f)^2 M x, by SciPy's lobpcg.
+"""Vibration modes
+===============
+
+The lowest modes of an elastic body, clamped at one end: A x = (2 pi f)^2 M x, by SciPy's lobpcg.
 
 `python examples/vibration.py [volume.npz]`, such as that of `iga-nn run poisson conch`; by default a beam, whose first
 frequency stands beside that of beam theory, 1.8751^2 / (2 pi) sqrt(E I / (density area)) / length^2.

@@ -7,7 +7,17 @@ from contextlib import contextmanager
 
 
 class InputError(ValueError):
-    """Say that an option, an input file or the output folder is at fault, in one line with the remedy."""
+    """Say that an option, an input file or the output folder is at fault, in one line with the remedy.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> try:
+    ...     iga_nn.load_volume("nowhere.npz")
+    ... except iga_nn.InputError as error:
+    ...     print(error)
+    nowhere.npz: no such file
+    """
 
 
 @contextmanager

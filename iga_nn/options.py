@@ -65,6 +65,11 @@ class MapOptions(SurfaceOptions):
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
         resume: continue from the checkpoint in the output folder.
         steps_factor: multiply the steps of every stage by this factor; a small one gives a quick look.
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.MapOptions(control_points=20, steps_factor=0.5).config().spline.control_points
+        20
     """
 
     preset: Literal["fast", "paper"] = "fast"
@@ -141,6 +146,11 @@ class PoissonOptions(ProblemOptions):
         neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for that of the exact solution.
         robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
             solution.
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.PoissonOptions(source="1", robin=("u1=2:0",), refine=(0,)).problem().robin
+        {'u1': ('2', '0')}
     """
 
     source: Formula | None = None
@@ -191,6 +201,11 @@ class ElasticityOptions(ProblemOptions):
         traction: faces where a traction is given, each as "FACE=VECTOR", or FACE for that of the exact solution.
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.ElasticityOptions(body_force="0;0;-1", young=210.0).problem().force
+        ['0', '0', '-1']
     """
 
     body_force: Formula | None = None

@@ -17,7 +17,21 @@ GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 def sample(name: str) -> Surface:
     """Return the surface of that name (1 500 to 4 000 vertices), checked like one from a file.
 
-    Raises ValueError naming the samples for any other name.
+    Parameters
+    ----------
+    name : str
+        "bean", "bumpy_ball", "cube", "ellipsoid" or "seashell".
+
+    Raises
+    ------
+    ValueError
+        For any other name; the message names the samples.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> iga_nn.sample("ellipsoid").vertices.shape
+    (2500, 3)
     """
     if name not in SAMPLES:
         raise ValueError(f"no sample {name!r}: choose one of {', '.join(SAMPLES)}")

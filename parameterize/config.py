@@ -144,7 +144,27 @@ LAYOUT = LayoutConfig()
 
 @dataclass(frozen=True)
 class Config:
-    """All options of `parameterize.parameterize`."""
+    """All options of `parameterize.parameterize`.
+
+    Attributes
+    ----------
+    name : str
+        Of the preset it started as.
+    network : NetworkConfig
+    train : TrainConfig
+    stages : tuple of StageConfig
+    spline : SplineConfig
+        Fit and optimisation, `control_points` a direction and `degree` among them.
+    layout : LayoutConfig
+    starts : int
+        A map that is not certified is tried anew with the cube rotated, so many times in all.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> iga_nn.preset("paper").network.width
+    512
+    """
 
     name: str
     network: NetworkConfig
@@ -193,7 +213,25 @@ PRESETS = {
 
 
 def preset(name: str) -> Config:
-    """Return the preset "fast" (the default, made for two CPU cores) or "paper"; raise ValueError for another name."""
+    """Return a set of options by its name.
+
+    Parameters
+    ----------
+    name : str
+        "fast", the default, made for two CPU cores; or "paper", the paper's network and steps: hours without a GPU.
+
+    Raises
+    ------
+    ValueError
+        For another name.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> config = iga_nn.preset("fast").scaled(0.5).with_control_points(20)
+    >>> config.spline.control_points, config.stages[0].steps
+    (20, 60)
+    """
     if name not in PRESETS:
         raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")
     return PRESETS[name]

@@ -46,9 +46,33 @@ _log = logging.getLogger(__name__)
 class Parameterization:
     """What `parameterize` returns; lengths in the user's units.
 
-    volume: F. boundary: every surface vertex with its parameter. certificate, quality: what is proved and measured.
-    history: columns of equal length, one row a step. seconds: wall seconds of train, fit, optimize and certify, the
-    last with quality, at the end: the certificates on the way count as optimize.
+    Attributes
+    ----------
+    volume : BSplineVolume
+        The map F.
+    boundary : BoundaryMap
+        Every surface vertex with its parameters.
+    certificate : Certificate
+        What is proved of det J.
+    quality : QualityReport
+        What is measured; printed, a table.
+    history : dict of str to array
+        Columns of equal length, one row a training step.
+    seconds : dict of str to float
+        Wall seconds of train, fit, optimize and certify, the last with quality, at the end: the certificates on the way
+        count as optimize.
+    device : str
+        Where the network was trained.
+    seed : int
+    config : Config
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> config = iga_nn.preset("fast").scaled(0.02).with_control_points(6)  # a quick look
+    >>> result = iga_nn.parameterize(iga_nn.sample("cube"), config)
+    >>> result.quality.certificate is result.certificate, sorted(result.seconds)
+    (True, ['certify', 'fit', 'optimize', 'train'])
     """
 
     volume: BSplineVolume
@@ -76,14 +100,52 @@ def parameterize(
 ) -> Parameterization:
     """Map the unit cube onto the solid inside a closed surface (paper, section 4.3).
 
-    config: options, `preset("fast")` by default. device: where the network trains, "auto", "cpu" or "cuda"; dtype: of
-    the network. The number of threads (OMP_NUM_THREADS, or all cores) does not change the result on a CPU.
-    corners: (8, 3) points in the surface's units or 8 vertex numbers, in the order (0,0,0), (0,0,1), (0,1,0), ...
-    checkpoint_dir: where checkpoints go; with `resume` the run goes on from the last one.
+    Parameters
+    ----------
+    surface : Surface
+        What bounds the solid.
+    config : Config, optional
+        Options, `preset("fast")` by default.
+    seed : int
+        Equal seeds give equal volumes, bit for bit; the number of threads (OMP_NUM_THREADS, or all cores) does not
+        change the result on a CPU.
+    device : str
+        Where the network trains: "auto", "cpu" or "cuda".
+    dtype : torch.dtype
+        Of the network.
+    corners : (8, 3) array or (8,) array of int, optional
+        The cube's corners on the surface: points in the surface's units, which take their nearest vertices, or vertex
+        numbers; in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1). Chosen by the method where they are not given.
+    progress : callable, optional
+        Called with a `Progress` at every step.
+    checkpoint_dir : str or Path, optional
+        Where checkpoints go.
+    resume : bool
+        Go on from the last checkpoint.
 
-    Raises TypeError for a surface or config of another type, ValueError for a negative seed, bad corners or a device
-    that is not there, CheckpointError for a checkpoint of another run, PathError where the training stays too far
-    from a cube for its edges to be found.
+    Returns
+    -------
+    Parameterization
+        The volume with its certificate, whatever the verdict is.
+
+    Raises
+    ------
+    TypeError
+        For a surface or config of another type.
+    ValueError
+        For a negative seed, bad corners or a device that is not there.
+    CheckpointError
+        For a checkpoint of another run.
+    PathError
+        Where the training stays too far from a cube for its edges to be found.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> config = iga_nn.preset("fast").scaled(0.02).with_control_points(6)  # a quick look
+    >>> result = iga_nn.parameterize(iga_nn.sample("cube"), config, seed=1)
+    >>> result.volume.shape, result.seed
+    ((6, 6, 6), 1)
     """
     config, seed = _checked(surface, config, seed)
     place = choose_device(device)

@@ -34,7 +34,17 @@ TWO_PROBLEMS = "the errors compare the solutions of two problems"
 
 
 class ConvergenceError(RuntimeError):
-    """The linear solver did not reach its tolerance; the last iterate is `solution`."""
+    """The linear solver did not reach its tolerance; the last iterate is `solution`.
+
+    Examples
+    --------
+    >>> import iga_nn, solve
+    >>> try:
+    ...     iga_nn.solve(solve.benchmark_volume(2), iga_nn.Poisson(), max_iterations=1, strict=True)
+    ... except solve.ConvergenceError as error:
+    ...     print(error.solution.report.iterations)
+    1
+    """
 
     def __init__(self, solution: Solution) -> None:
         super().__init__(solution.report.notices[-1])

@@ -40,9 +40,30 @@ class Points(np.ndarray[Any, Any]):
 class SplineField:
     """A function of the parameters.
 
-    degrees: one per direction. knots: three open knot vectors on [0, 1]. coefficients: (m_u, m_v, m_w), with c
-    components (m_u, m_v, m_w, c). geometry: the volume on which it was found, None for a function of any.
-    Raises ValueError where the parts do not fit together.
+    Parameters
+    ----------
+    degrees : three int
+        One a direction.
+    knots : three arrays
+        Open knot vectors on [0, 1].
+    coefficients : (m_u, m_v, m_w) array
+        With c components (m_u, m_v, m_w, c).
+    geometry : BSplineVolume, optional
+        The volume on which it was found, None for a function of any.
+
+    Raises
+    ------
+    ValueError
+        Where the parts do not fit together.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> volume = benchmark_volume(2)
+    >>> field = iga_nn.solve(volume, iga_nn.Poisson(exact="1+x")).field
+    >>> bool(abs(field([[0.2, 0.5, 0.5]]) - volume([[0.2, 0.5, 0.5]])[:, 0] - 1) < 1e-6)
+    True
     """
 
     degrees: tuple[int, int, int]

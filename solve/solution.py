@@ -27,14 +27,39 @@ def _known(part: str, norm: str) -> property:
 class SolveReport:
     """One entry of `poisson.levels` in report.json.
 
-    elements, dofs: totals; the unknowns fixed by boundary data count as dofs.
-    h: longest straight edge of a mapped element, in the volume's units.
-    errors: the norms, None without an exact solution. estimate: of the L2 error, from the residual, where there is no
-        exact solution, or on request. The names of NORMS are properties, None where they are unknown.
-    residual: |r| / |b| at the end; residuals: the same before the first and after every iteration.
-    seconds: process CPU seconds of setup, solve and errors.
-    notices: what the reader of these numbers must know, one line each.
-    meaningful: False where a formula does not vary on the domain, or the mesh does not resolve the exact solution.
+    `l2`, `l2_relative`, `h1_seminorm`, `h1_relative`, `error_estimate` and `error_estimate_relative` are float, None
+    where they are unknown; absolute ones in the units of u, and of u times length^(3/2).
+
+    Attributes
+    ----------
+    elements, dofs : int
+        Totals; the unknowns fixed by boundary data count as dofs.
+    h : float
+        Longest straight edge of a mapped element, in the volume's units.
+    iterations : int
+    converged : bool
+    residual : float
+        Norm of the residual at the end, over that of the right-hand side.
+    seconds : dict of str to float
+        Process CPU seconds of setup, solve and errors.
+    errors : Errors or None
+        The norms, None without an exact solution.
+    estimate : Errors or None
+        Of the L2 error, from the residual, where there is no exact solution, or on request.
+    notices : tuple of str
+        What the reader of these numbers must know, one line each.
+    meaningful : bool
+        False where a formula does not vary on the domain, or the mesh does not resolve the exact solution.
+    residuals : tuple of float
+        The same before the first and after every iteration.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> report = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(source="1")).report
+    >>> report.converged, report.dofs, report.l2, report.error_estimate > 0
+    (True, 125, None, True)
     """
 
     elements: int
@@ -72,7 +97,23 @@ class SolveReport:
 
 @dataclass(frozen=True, eq=False)
 class Solution(SplineField):
-    """The discrete solution: a spline of the parameters, the map it lives on, and the report."""
+    """The discrete solution: a spline of the parameters, the map it lives on, and the report.
+
+    Attributes
+    ----------
+    geometry : BSplineVolume
+        The map.
+    report : SolveReport
+        Unknowns, errors, iterations and seconds.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> solution = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="x*y*z"))
+    >>> solution([[0.5, 0.5, 0.5]]).shape, solution.grid([0.1, 0.9], [0.5], [0.5]).shape
+    ((1,), (2, 1, 1))
+    """
 
     geometry: BSplineVolume
     report: SolveReport = field(kw_only=True)

@@ -28,11 +28,61 @@ log = logging.getLogger(__name__)
 def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution:
     """Solve a problem on a volume.
 
-    how: the fields of `SpaceOptions`, refine, degree, threads and quadrature; and those of `SolverOptions`, tolerance,
-    max_iterations, certified, device, start, estimate and strict.
+    Parameters
+    ----------
+    volume : BSplineVolume
+        The map.
+    problem : Poisson, Elasticity or Problem
+        The law and its data.
+    **how
+        The options below, by name.
 
-    Raises ValueError for arguments out of range and for Neumann data that do not balance the source, ExpressionError
-    where the data are not finite or have the wrong sign, TypeError for what is no problem or no volume.
+    Other Parameters
+    ----------------
+    refine : int
+        How often every span of the map's knots is halved for the trial space; 0 by default.
+    degree : int, optional
+        Of the trial space; the map's own by default.
+    threads : int, optional
+        The result is the same for any number. Default: NUMBA_NUM_THREADS, OMP_NUM_THREADS, or the cores at hand.
+    quadrature : str
+        "spline", "gauss" or "gauss+1" (`solve.options.SpaceOptions`).
+    tolerance : float
+        Of the residual, relative to the right-hand side; 1e-10 by default.
+    max_iterations : int
+        1000 by default.
+    certified : str, optional
+        The verdict of the map's certificate, if known; anything but "certified" is logged and noted.
+    device : str
+        "cpu", or "cuda" for the iteration on a GPU (Poisson's equation without Robin faces).
+    start : SplineField, optional
+        A solution in a space that this one contains, where the iteration starts.
+    estimate : bool, optional
+        Of the error from the residual; by default where the problem has no exact solution.
+    strict : bool
+        Raise ConvergenceError where the linear solver fails; otherwise `report.converged` is False.
+
+    Returns
+    -------
+    Solution
+        The spline u_h, its `field` and its `report`.
+
+    Raises
+    ------
+    ValueError
+        For arguments out of range and for Neumann data that do not balance the source.
+    ExpressionError
+        Where the data are not finite or have the wrong sign.
+    TypeError
+        For what is no problem or no volume.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> solution = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="x*y*z"), refine=1)
+    >>> solution.report.dofs, solution.report.l2_relative < 1e-3
+    (343, True)
     """
     of_space = {field.name for field in fields(SpaceOptions)} & how.keys()
     of_solver = {name: value for name, value in how.items() if name not in of_space}
@@ -43,9 +93,33 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
 
 
 def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> System:
-    """Return the linear system of a problem, for loops of one's own. how: the fields of `SpaceOptions`.
+    """Return the linear system of a problem, for loops of one's own.
 
-    Raises what `solve_problem` does.
+    Parameters
+    ----------
+    volume : BSplineVolume
+        The map.
+    problem : Poisson, Elasticity or Problem
+        The law and its data.
+    **how
+        refine, degree, threads and quadrature, as in `iga_nn.solve`.
+
+    Returns
+    -------
+    System
+
+    Raises
+    ------
+    ValueError, ExpressionError, TypeError
+        What `iga_nn.solve` raises.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> system = iga_nn.discretize(benchmark_volume(2), iga_nn.Poisson(exact="x*y*z"), refine=1)
+    >>> system.operator.shape, system.load.shape
+    ((125, 125), (125,))
     """
     options = SpaceOptions(**how)
     _check_types(volume, problem)

@@ -19,7 +19,22 @@ from .solver import solve_problem
 
 @dataclass(frozen=True)
 class ConvergenceRow:
-    """One level of a study; the rates compare it with the level before (None for the first, or without errors)."""
+    """One level of a study; printed, a line.
+
+    Attributes
+    ----------
+    report : SolveReport
+    rate_l2, rate_h1 : float or None
+        Observed orders against the level before; None for the first, or without errors.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> first, second = iga_nn.convergence(benchmark_volume(2), iga_nn.Poisson(), refine=range(2))
+    >>> first.rate_l2, second.rate_l2 > 3
+    (None, True)
+    """
 
     report: SolveReport
     rate_l2: float | None
@@ -41,7 +56,38 @@ def convergence(
 ) -> list[ConvergenceRow]:
     """Solve on each refinement level of one map; for smooth solutions the L2 rate tends to degree + 1.
 
-    tolerance: of the linear solver; a degree of 5 needs less than its default to show its rate.
+    Parameters
+    ----------
+    volume : BSplineVolume
+        The map.
+    problem : Poisson, Elasticity or Problem
+        The law and its data.
+    refine : iterable of int
+        Levels; level n halves every span n times.
+    degree : int, optional
+        Of the trial space; the map's own by default.
+    certified : str, optional
+        The verdict of the map's certificate, if known.
+    tolerance : float
+        Of the linear solver; a degree of 5 needs less than its default to show its rate.
+
+    Returns
+    -------
+    list of ConvergenceRow
+        One a level.
+
+    Raises
+    ------
+    ValueError, TypeError
+        What `solve` raises.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> rows = iga_nn.convergence(benchmark_volume(2), iga_nn.Poisson(exact="exp(X+Z)*sin(Y)"), refine=range(3))
+    >>> [row.report.dofs for row in rows], round(rows[-1].rate_l2)
+    ([125, 343, 1331], 4)
     """
     solve = partial(solve_problem, volume, problem, degree=degree, certified=certified, tolerance=tolerance)
     reports = [solve(refine=level).report for level in refine]

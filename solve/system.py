@@ -73,6 +73,16 @@ class System:
 
     A vector (N,) holds the free coefficients in C order of (c, m_u, m_v, m_w): components, and functions a direction,
     those that Dirichlet data fix left out; `operator`, `mass` and `preconditioner` are SciPy LinearOperators (N, N).
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from scipy.sparse.linalg import cg
+    >>> from solve import benchmark_volume
+    >>> system = iga_nn.discretize(benchmark_volume(2), iga_nn.Poisson(exact="x*y*z"))
+    >>> x, failed = cg(system.operator, system.load, M=system.preconditioner)
+    >>> failed, system.field(x).coefficients.shape
+    (0, (5, 5, 5))
     """
 
     volume: BSplineVolume

@@ -79,6 +79,26 @@ def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 
 @pytest.fixture
+def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Train and optimise for about a second wherever a training is asked for, with at most 8 control points."""
+    from small_run import shortened
+
+    import iga_nn
+    import parameterize.run as home
+    from parameterize.config import preset
+
+    full = home.parameterize
+
+    @functools.wraps(full)
+    def parameterize(surface: Any, config: Any = None, **options: Any) -> Any:
+        short = shortened(config or preset("fast"))
+        return full(surface, short.with_control_points(min(8, short.spline.control_points)), **options)
+
+    monkeypatch.setattr(home, "parameterize", parameterize)
+    monkeypatch.setattr(iga_nn, "parameterize", parameterize, raising=False)
+
+
+@pytest.fixture
 def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let VTK draw a tenth of the pixels: without a graphics card they are what a figure costs."""
     for module in ("map", "style"):

@@ -4,6 +4,8 @@ import os
 import re
 import subprocess
 import sys
+import sysconfig
+import venv
 import zipfile
 from pathlib import Path
 
@@ -80,17 +82,56 @@ def test_imports_run_one_way():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_wheel_holds_the_three_packages(tmp_path):
-    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
-    done = subprocess.run(build, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    (wheel,) = tmp_path.glob("iga_nn-*.whl")
-    names = zipfile.ZipFile(wheel).namelist()
-    assert {name.split("/")[0] for name in names if not name.split("/")[0].endswith(".dist-info")} == {
-        "iga_nn",
-        "parameterize",
-        "solve",
-    }
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel of the source archive, as `python -m build` makes both."""
+    folder = tmp_path_factory.mktemp("dist")
+    build = [sys.executable, "-P", "-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+    done = subprocess.run(build, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len(list(folder.glob(f"iga_nn-{iga_nn.__version__}.tar.gz"))) == 1
+    (built,) = folder.glob("iga_nn-*.whl")
+    return built
+
+
+def test_wheel_holds_the_three_packages_and_their_data(wheel):
+    names = set(zipfile.ZipFile(wheel).namelist())
+    packages = {"iga_nn", "parameterize", "solve"}
+    assert {name.split("/")[0] for name in names if not name.split("/")[0].endswith(".dist-info")} == packages
+    kept = {path for name in packages for path in (ROOT / name).rglob("*") if path.is_file() and path.suffix != ".pyc"}
+    assert {
+        path.relative_to(ROOT).as_posix() for path in kept if "__pycache__" not in path.parts
+    } <= names  # code, templates, scripts, stubs, py.typed
+    assert {f"{name}/py.typed" for name in packages} <= names
     assert {
         f"iga_nn-{iga_nn.__version__}.dist-info/{name}" for name in ("entry_points.txt", "licenses/LICENSE")
-    } <= set(names)
+    } <= names
+
+
+def test_wheel_runs_in_an_environment_of_its_own(wheel, tmp_path):
+    """Installed without its dependencies, which are those of this environment: nothing is downloaded."""
+    venv.create(tmp_path / "env", with_pip=False)
+    (packages,) = (tmp_path / "env").glob("lib*/python3*/site-packages")
+    (packages / "dependencies.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    pip = [sys.executable, "-P", "-m", "pip", "--python", str(tmp_path / "env" / "bin" / "python")]
+    install = [*pip, "install", "--no-deps", "--no-index", "--no-compile", str(wheel)]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(install, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    arguments = ["--steps-factor", "0.005", "--control-points", "6", "--refine", "0", "--out", "out", "--quiet"]
+    run = [tmp_path / "env" / "bin" / "iga-nn", "run", "poisson", "cube", *arguments]
+    done = subprocess.run(run, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode in (0, 3), done.stderr  # so few steps may leave folds
+    assert {"volume.npz", "solution.npz", "report.html"} <= {file.name for file in (tmp_path / "out").iterdir()}
+    where = [tmp_path / "env" / "bin" / "python", "-P", "-c", "import iga_nn; print(iga_nn.__file__)"]
+    found = subprocess.run(where, env=environment, cwd=tmp_path, capture_output=True, text=True).stdout
+    assert Path(found.strip()).is_relative_to(packages)
+
+
+def test_the_version_stands_in_one_place():
+    written = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {iga_nn.__version__}\n" in written
+    assert 'dynamic = ["version"]' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    heads = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert heads[0] == "Unreleased" or heads[0] == iga_nn.__version__
+    assert iga_nn.__version__ in heads

@@ -1,63 +1,67 @@
-"""Every command and every Python block of the README is run, trainings shortened."""
+"""Every command and every Python block of README.md and of the documentation's pages is run, trainings shortened."""
 
 from __future__ import annotations
 
+import doctest
 import re
-import shlex
 from pathlib import Path
 
 import pytest
-from small_run import shortened
+from documents import PAGES, README, ROOT, blocks, commands
 
-import iga_nn
 from iga_nn.cli.commands import main
-from iga_nn.options import MapOptions
 
-ROOT = Path(iga_nn.__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
 TRAINS = ("run", "parameterize")
-SHORT = {"--steps-factor": "0.005", "--control-points": "8"}
-CONFIG = MapOptions.config
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
-
-
-def test_commands_run(in_folder, monkeypatch):
-    monkeypatch.setattr(MapOptions, "config", lambda options: shortened(CONFIG(options)))
-    commands = [shlex.split(line) for block in blocks("sh") for line in block.splitlines()]
-    assert len(commands) >= 8
-    for program, *arguments in commands:
+def test_commands_run(in_folder, short_training):
+    """Those of README.md first: the pages go on with its results. What stands in two places is run once."""
+    assert len(commands(README)) >= 6
+    known = {" ".join(words): words for page in PAGES for words in commands(page)}
+    assert len(known) >= 20
+    for program, *arguments in known.values():
         if program == "make":
             assert re.search(rf"^{arguments[0]}:", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
             continue
         assert program == "iga-nn"
-        if arguments[0] in TRAINS:  # a short training may leave folds: exit code 3, as the README says
-            added = [word for option in SHORT.items() if option[0] not in arguments for word in option]
-            assert main([*arguments, *added]) in (0, 3), arguments
+        if arguments[0] in TRAINS and "--help" not in arguments:  # folds may be left: exit code 3
+            assert main(arguments) in (0, 3), arguments
         else:
             folded_is_fine = arguments[0] in ("solve", "study") or "volume.npz" in arguments[1]
             assert main(arguments) in ((0, 3) if folded_is_fine else (0,)), arguments
 
 
-def test_python_runs(in_folder, monkeypatch, capsys):
-    full = iga_nn.preset
-    monkeypatch.setattr(iga_nn, "preset", lambda name: shortened(full(name)).with_control_points(8))
-    (block,) = blocks("python")
+def test_python_runs(in_folder, short_training, capsys):
+    (block,) = blocks(README, "python")
     exec(compile(block, "README.md", "exec"), {})  # noqa: S102 our own text
     out = capsys.readouterr().out
     assert "rate" in out
     assert Path("volume.npz").exists()
 
 
+@pytest.mark.parametrize("page", PAGES[1:], ids=lambda page: page.stem)
+def test_what_a_page_shows_is_what_python_answers(page, in_folder, short_training):
+    text = "\n".join(block for block in blocks(page, "python") if ">>>" in block)
+    if not text:
+        pytest.skip("no Python on this page")
+    parser, runner = doctest.DocTestParser(), doctest.DocTestRunner()
+    runner.run(parser.get_doctest(text, {}, page.name, str(page), 0))
+    assert runner.tries > 0 and runner.failures == 0
+
+
 @pytest.mark.parametrize("code", ["0", "1", "2", "3", "4", "130"])
 def test_exit_codes_are_explained(code):
-    assert re.search(rf"^\| {code} \| \w", README, flags=re.MULTILINE)
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert re.search(rf"^\| {code} \| \w", text, flags=re.MULTILINE)
 
 
 def test_links_and_pictures_exist():
-    for target in re.findall(r"\]\(([^)#]+)\)", README):
+    for target in re.findall(r"\]\(([^)#]+)\)", README.read_text(encoding="utf-8")):
         assert target.startswith("https://") or (ROOT / target).exists(), target
     picture = ROOT / "examples" / "pictures" / "seashell.png"
     assert picture.stat().st_size < 300_000
+
+
+def test_readme_is_short():
+    lines = README.read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= 130 and max(map(len, lines)) <= 420  # rows of tables are the longest

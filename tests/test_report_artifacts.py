@@ -8,8 +8,8 @@ from iga_nn.report.artifacts import ARTIFACTS, as_markdown, figures_of, files_of
 ROOT = Path(figures.__file__).resolve().parents[2]
 
 
-def test_readme_shows_the_table_of_files():
-    assert as_markdown() in (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_documentation_shows_the_table_of_files():
+    assert as_markdown() in (ROOT / "docs" / "output.md").read_text(encoding="utf-8")
 
 
 def test_every_file_stands_once_and_every_figure_can_be_drawn():

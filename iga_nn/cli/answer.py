@@ -7,6 +7,7 @@ from typing import Any
 from ..levels import ESTIMATES, TITLES
 from ..report import advice
 from ..report import document as reports
+from ..report.artifacts import PAGE
 from ..workflow.output_folder import Outcome
 from .exit_codes import DONE, NOT_CERTIFIED, NOT_SOLVED
 
@@ -26,32 +27,31 @@ def verdict_as_json(outcome: Outcome) -> str:
 
 
 def verdict_in_words(outcome: Outcome) -> str:
-    """Return the verdict of a finished run for a reader, one fact a line, followed by what to try."""
+    """Return a finished run for a reader: numbers, what to try, and in the end verdict, error and what to open."""
     verdict = reports.verdict(outcome.report, outcome.folder)
-    lines = _proved(outcome.report)
+    lines = []
     for scale, arap in verdict.get("arap", {}).items():
         rms = verdict["boundary_rms"][scale]
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
-    for level in verdict.get("levels", []):
-        errors = [f"{TITLES[key]} {level[key]:.3e}, " for key in SHOWN_ERRORS if level.get(key) is not None]
-        end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANINGLESS")
-        lines.append(f"{level['dofs']:>8} unknowns {''.join(errors)}{level['iterations']} iterations{end}")
-    lines.append(f"{verdict['seconds']:.1f} s; results in {verdict['folder']}")
-    return "\n".join([*lines, *advice.in_words(outcome.report)])
+    levels = [_level(level) for level in verdict.get("levels", [])]
+    lines += [*levels[:-1], f"{verdict['seconds']:.1f} s", *advice.in_words(outcome.report)]
+    proved = f"det J > 0 {verdict['bijective']}; one-to-one: {verdict['one_to_one']}"
+    ending = {"verdict": proved, "error": "".join(levels[-1:]), "open": str(outcome.folder / PAGE)}
+    return "\n".join([*lines, *(f"{name:16s} {text}" for name, text in ending.items() if text)])
 
 
-def _proved(report: reports.Report) -> list[str]:
-    """Return the two verdicts on a map: on the sign of det J, and on whether it is one-to-one."""
-    return [
-        f"det J > 0        {report['parameterization']['bijective']}",
-        f"one-to-one       {reports.one_to_one(report)}",
-    ]
+def _level(level: dict[str, Any]) -> str:
+    """Return the errors of one mesh, its unknowns, and whether the numbers are to be trusted."""
+    errors = [f"{TITLES[key]} {level[key]:.3e}, " for key in SHOWN_ERRORS if level.get(key) is not None]
+    end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANINGLESS")
+    return f"{''.join(errors)}{level['dofs']:,} unknowns, {level['iterations']} iterations{end}"
 
 
 def volume_in_words(facts: reports.Report) -> str:
     """Return the facts that `check` found out about a volume, the verdicts first."""
     others = {key: value for key, value in facts.items() if key not in ("bijective", "boundary_injective")}
-    return "\n".join([*_proved({"parameterization": facts}), facts_in_words(others)])
+    proved = {"det J > 0": facts["bijective"], "one-to-one": reports.one_to_one({"parameterization": facts})}
+    return "\n".join([*(f"{name:16s} {text}" for name, text in proved.items()), facts_in_words(others)])
 
 
 def facts_in_words(facts: dict[str, Any]) -> str:

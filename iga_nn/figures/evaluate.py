@@ -14,7 +14,7 @@ from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 from solve.forms.frame import UnitFrame
 
 if TYPE_CHECKING:
-    from solve import Solution
+    from solve import SplineField
 
     from ..options import Equation
 
@@ -55,7 +55,7 @@ def distortions(volume: BSplineVolume, grids: Sequence[Grid]) -> list[Array]:
     return [np.tanh(np.sqrt(_flat(arap(volume.grid_jacobian(*grid) / length))) / 2.0) for grid in grids]
 
 
-def solution_on(solution: Solution, grid: Grid) -> Array:
+def solution_on(solution: SplineField, grid: Grid) -> Array:
     """Return u_h, or the length of a vector u_h: (samples, samples)."""
     values = _flat(solution.grid(*grid))
     return values if values.ndim == 2 else np.asarray(np.linalg.norm(values, axis=-1))
@@ -70,7 +70,7 @@ def error_at(found: Array, problem: Equation, points: Array) -> Array:
 
 
 def sampled_error(
-    volume: BSplineVolume, solution: Solution, problem: Equation, samples: int
+    volume: BSplineVolume, solution: SplineField, problem: Equation, samples: int
 ) -> tuple[list[Array], list[Array]]:
     """Return points (samples, samples, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
     problem = problem.on(volume)

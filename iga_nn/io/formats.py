@@ -98,8 +98,28 @@ def is_volume(path: str | Path) -> bool:
 def load_volume(path: str | Path) -> BSplineVolume:
     """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh or splinepy JSON, told apart by their beginnings.
 
-    Raises InputError where the file is none of them, damaged, rational or of several patches, and where splinepy is
-    needed and missing.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    BSplineVolume
+
+    Raises
+    ------
+    InputError
+        Where the file is none of them, damaged, rational or of several patches, and where splinepy is needed and
+        missing.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> benchmark_volume(2).save("volume.npz")
+    >>> iga_nn.load_volume("volume.npz").degrees
+    (3, 3, 3)
     """
     source = Path(path)
     if source.is_dir():
@@ -125,10 +145,32 @@ def export(
 ) -> Path:
     """Write the volume of a file in another format and return the path written; atomic.
 
-    out: by default the volume's stem with the format's ending, in the current folder.
-    solution: solution.npz of a solve on this volume. The view shows its error where the report.json beside it knows
-    the exact solution; with G+Smo, MFEM and splinepy's JSON it is a file of its own, NAME_u.xml, NAME.gf, NAME_u.json.
-    Raises InputError where a file cannot be read or written, exists (unless `force`), or a package is missing.
+    Parameters
+    ----------
+    volume : str or Path
+        File with the volume.
+    to : str
+        "gismo", "mfem", "vtk", "view" or "json".
+    out : str or Path, optional
+        By default the volume's stem with the format's ending, in the current folder.
+    solution : str or Path, optional
+        solution.npz of a solve on this volume. The view shows its error where the report.json beside it knows the exact
+        solution; with G+Smo, MFEM and splinepy's JSON it is a file of its own, NAME_u.xml, NAME.gf, NAME_u.json.
+    force : bool
+        Replace a file that exists.
+
+    Raises
+    ------
+    InputError
+        Where a file cannot be read or written, exists (unless `force`), or a package is missing.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> benchmark_volume(2).save("volume.npz")
+    >>> iga_nn.export("volume.npz", "view", "seen.vtu").name
+    'seen.vtu'
     """
     if to not in FORMATS:
         raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines")

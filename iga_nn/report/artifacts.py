@@ -1,6 +1,6 @@
 """Lists every file of an output folder: what it shows, which part of a run writes it, how a figure is drawn.
 
-The output folder, the report page, the live page and README's table of files are made from this table. A new figure
+The output folder, the report page, the live page and the table of docs/output.md are made from this table. A new figure
 needs a function in `iga_nn.figures` and a row here.
 """
 
@@ -86,7 +86,7 @@ def figures_of(report: Mapping[str, Any]) -> list[Artifact]:
 
 
 def as_markdown() -> str:
-    """Return the table of files as README shows it."""
+    """Return the table of files as docs/output.md shows it."""
     rows = ["| file | content |", "| --- | --- |"]
     for artifact in ARTIFACTS:
         arrays = ": " + ", ".join(f"`{name}`" for name in artifact.arrays) if artifact.arrays else ""

@@ -57,17 +57,9 @@ def _bare(report: Report, reason: str) -> str:
 
 def page(report: Report, scene: Scene | None, folder: Path) -> str:
     """Return the page as text."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-
-    here = files(__package__)
-    own = {"style": "page.css", "script": "viewer.js"}  # inserted as they are
     section = reports.solved(report)
-    environment = Environment(
-        loader=PackageLoader(__package__, ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    return environment.get_template("page.html").render(
-        {name: Markup((here / file).read_text(encoding="utf-8")) for name, file in own.items()},  # noqa: S704
+    return _render(
+        "page.html",
         title=f"{Path(report['input']['file']).name}: {_heading(report)}",
         report=report,
         verdicts=_verdicts(report),
@@ -80,6 +72,25 @@ def page(report: Report, scene: Scene | None, folder: Path) -> str:
         figures=_figures(report, folder),
         details=_details(report),
     )
+
+
+def scene_page(scene: Scene, title: str) -> str:
+    """Return a page with the interactive view alone, to stand in a frame of another page."""
+    return _render("scene.html", title=title, scene=scene)
+
+
+def _render(template: str, **content: Any) -> str:
+    """Return a template of this folder with its content, which is escaped, and with the style and the viewer."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    here = files(__package__)
+    own = {"style": "page.css", "script": "viewer.js"}  # inserted as they are
+    environment = Environment(
+        loader=PackageLoader(__package__, ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    inserted = {name: Markup((here / file).read_text(encoding="utf-8")) for name, file in own.items()}  # noqa: S704
+    return environment.get_template(template).render(inserted, **content)
 
 
 def _heading(report: Report) -> str:

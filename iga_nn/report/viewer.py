@@ -23,7 +23,7 @@ from ..figures.evaluate import distortions, points_on, solution_on
 from ..figures.render import TILT, widest_view
 
 if TYPE_CHECKING:
-    from solve import Solution
+    from solve import SplineField
 
     from ..options import Equation
 
@@ -32,11 +32,20 @@ SAMPLES = 81  # per direction of a patch
 Scene = dict[str, Any]
 
 
-def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: Equation | None = None) -> Scene:
-    """Return what viewer.js draws, in JSON's own types; solution and error only where they are known and finite."""
+def scene_of(
+    volume: BSplineVolume,
+    solution: SplineField | None = None,
+    problem: Equation | None = None,
+    *,
+    samples: int = SAMPLES,
+) -> Scene:
+    """Return what viewer.js draws, in JSON's own types; solution and error only where they are known and finite.
+
+    samples: points per direction of a patch.
+    """
     from matplotlib import colormaps
 
-    grids = evaluate.all_grids(SAMPLES)
+    grids = evaluate.all_grids(samples)
     points = [points_on(volume, grid) for grid in grids]
     fields = [_field("distortion", "tanh(√ARAP / 2), volume 1", distortions(volume, grids), ColorRange(0.0, 1.0))]
     if solution is not None and np.all(np.isfinite(solution.coefficients)):
@@ -44,15 +53,15 @@ def scene_of(volume: BSplineVolume, solution: Solution | None = None, problem: E
         values = [solution_on(solution, grid) for grid in grids]
         fields.append(_field("solution", name, values, even_range(values)))
         if problem is not None and problem.exact is not None:
-            _, errors = evaluate.sampled_error(volume, solution, problem, SAMPLES)
+            _, errors = evaluate.sampled_error(volume, solution, problem, samples)
             fields.append(_field("error", "|u − uₕ|, logarithmic", errors, error_range([errors])))
     cloud = np.concatenate([where.reshape(-1, 3) for where in points])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
-    view = widest_view(cloud[: 6 * SAMPLES**2], tilt=TILT)
+    view = widest_view(cloud[: 6 * samples**2], tilt=TILT)
     frame = np.stack([view.right, view.up, view.towards])
     half = np.abs((cloud - (low + high) / 2.0) @ frame[:2].T).max(axis=0)  # width and height as first seen
     return {
-        "samples": SAMPLES,
+        "samples": samples,
         "low": low.tolist(),
         "high": high.tolist(),
         "view": frame.tolist(),

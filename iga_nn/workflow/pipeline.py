@@ -46,11 +46,46 @@ def run(
 ) -> Outcome:
     """Parameterize a surface, solve a problem on the volume and return the output folder with its report.
 
-    problem: "poisson" or "elasticity"; its options are given under the same name, poisson=PoissonOptions(...).
-    mesh: path of a closed surface, or the name of a sample or a model. out: the output folder, by default the input's
-    stem in the current folder; README lists its files. vector: write plots of curves as PDF, too.
-    Raises MeshError for a surface that is not accepted, solve.ExpressionError for a formula, InputError for other
-    options and for an output folder that holds a result (unless `force`) or cannot be written.
+    Parameters
+    ----------
+    problem : str
+        "poisson" or "elasticity".
+    mesh : str or Path
+        Path of a closed surface, or the name of a sample or a model.
+    out : str or Path, optional
+        The output folder, by default the input's stem in the current folder; docs/output.md lists its files.
+    mapping : MapOptions, optional
+        How the surface becomes a volume.
+    force : bool
+        Replace a finished result in that folder.
+    vector : bool
+        Write plots of curves as PDF, too.
+    progress : callable, optional
+        Called with a `Progress` at every step.
+    **given : PoissonOptions or ElasticityOptions
+        Options of the problem, under its name: poisson=PoissonOptions(...).
+
+    Returns
+    -------
+    Outcome
+        Its `folder`, a Path, and its `report`, the content of report.json.
+
+    Raises
+    ------
+    MeshError
+        For a surface that is not accepted.
+    ExpressionError
+        For a formula that is refused.
+    InputError
+        For other options, and for an output folder that holds a result (unless `force`) or cannot be written.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> quick = iga_nn.MapOptions(steps_factor=0.02, control_points=6)
+    >>> outcome = iga_nn.run("poisson", "cube", "out", mapping=quick, poisson=iga_nn.PoissonOptions(refine=(0,)))
+    >>> [level["dofs"] for level in outcome.report["poisson"]["levels"]], (outcome.folder / "report.html").exists()
+    ([216], True)
     """
     if problem not in PROBLEMS:
         raise InputError(f"problem {problem!r}: choose one of {', '.join(PROBLEMS)}")

@@ -23,11 +23,25 @@ _TIGHT = 0.5  # a proved bound below this share of the least known value of det 
 class Certificate:
     """What is known about the sign of det J.
 
-    verdict: "certified" (det J > 0 on the whole cube), "folded" (det J < 0 at `witness`), or "undecided".
-    lower_bound: proved lower bound of det J over the cube, divided by the magnitude of its mean.
-    mean_det: integral of det J over the cube, which is the signed volume, in the volume's own units.
-    witness: the parameters of a point where det J is negative; None unless folded.
-    unproved: (k, 3) span numbers (i, j, l) on which det J was not proved positive.
+    Attributes
+    ----------
+    verdict : str
+        "certified" (det J > 0 on the whole cube), "folded" (det J < 0 at `witness`), or "undecided".
+    lower_bound : float
+        Proved lower bound of det J over the cube, divided by the magnitude of its mean.
+    mean_det : float
+        Integral of det J over the cube, which is the signed volume, in the volume's own units.
+    witness : three float or None
+        The parameters of a point where det J is negative; None unless folded.
+    unproved : (k, 3) array of int
+        Span numbers (i, j, l) on which det J was not proved positive.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> iga_nn.certify(benchmark_volume(4, amplitude=0.4)).verdict
+    'folded'
     """
 
     verdict: Literal["certified", "folded", "undecided"]
@@ -40,7 +54,29 @@ class Certificate:
 def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
     """Decide whether det J > 0 on the whole cube, cutting doubtful spans at most `max_depth` times in eight.
 
-    Raises ValueError for a negative depth, or where derivatives overflow.
+    Parameters
+    ----------
+    volume : BSplineVolume
+        The map.
+    max_depth : int
+        0 or more; each cut makes the bounds on the pieces closer.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    ValueError
+        For a negative depth, or where derivatives overflow.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> certificate = iga_nn.certify(benchmark_volume(4))
+    >>> certificate.verdict, certificate.lower_bound > 0, certificate.witness
+    ('certified', True, None)
     """
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")

@@ -20,11 +20,27 @@ from .flips import orientation, untangle
 class BoundaryMap:
     """Every vertex of a closed surface with its place on the boundary of the unit cube.
 
-    vertices: (n, 3), in the user's units.
-    parameters: (n, 3), on the faces of the cube: all in [0, 1], at least one of the three exactly 0 or 1.
-    faces: (m, 3) vertex numbers, outward.
+    Parameters
+    ----------
+    vertices : (n, 3) array
+        In the user's units.
+    parameters : (n, 3) array
+        On the faces of the cube: all in [0, 1], at least one of the three exactly 0 or 1.
+    faces : (m, 3) array of int
+        Vertex numbers, outward.
 
-    Raises ValueError where the parts do not fit together or a parameter lies off the cube's faces.
+    Raises
+    ------
+    ValueError
+        Where the parts do not fit together or a parameter lies off the cube's faces.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from parameterize import BoundaryMap
+    >>> cube = iga_nn.sample("cube")
+    >>> BoundaryMap(cube.vertices, cube.vertices, cube.faces).parameters.shape
+    (1538, 3)
     """
 
     vertices: Array

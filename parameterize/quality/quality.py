@@ -42,13 +42,36 @@ class BothScales(Generic[Measure]):  # noqa: UP046 - the new syntax needs Python
 class QualityReport:
     """The `parameterization` section of report.json.
 
-    control_points, degrees: per direction.
-    certificate: whether det J > 0 on the whole cube, its lower bound, the witness of a fold.
-    boundary_check: whether the six boundary surfaces do not meet but at their common edges, and where they do.
-    arap: sum of (sigma_i - 1)^2, the smallest sigma signed with det J, over `arap_points` Gauss points.
-    boundary: ||F(v_p) - v|| over the mesh's own `mesh_vertices` vertices; cuts and subdivisions do not count.
-    mesh_to_spline: from each of `mesh_vertices` vertices to the spline's boundary (foot point refined on the spline).
-    spline_to_mesh: from SAMPLES x SAMPLES points a cube face to the mesh's triangles.
+    Each measure has `unit_volume`, the model brought to volume 1, and `as_given`, in the user's units.
+
+    Attributes
+    ----------
+    control_points : three int
+    degrees : three int
+    certificate : Certificate
+        Whether det J > 0 on the whole cube, its lower bound, the witness of a fold.
+    boundary_check : BoundaryCheck
+        Whether the six boundary surfaces do not meet but at their common edges, and where they do.
+    arap : BothScales of Distortion
+        Mean and max of the sum of (sigma_i - 1)^2, the smallest sigma signed with det J, over `arap_points` Gauss
+        points.
+    arap_points : int
+    boundary : BothScales of Distances
+        Rms, mean and max of the distance from F(v_p) to v over the mesh's own `mesh_vertices` vertices; cuts and
+        subdivisions do not count.
+    mesh_to_spline : BothScales of Distances
+        From each of `mesh_vertices` vertices to the spline's boundary (foot point refined on the spline).
+    mesh_vertices : int
+    spline_to_mesh : BothScales of Distances
+        From 160 x 160 points a cube face to the mesh's triangles.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> config = iga_nn.preset("fast").scaled(0.02).with_control_points(6)  # a quick look
+    >>> quality = iga_nn.parameterize(iga_nn.sample("cube"), config).quality
+    >>> quality.mesh_vertices, quality.arap.unit_volume.mean >= 0.0
+    (1538, True)
     """
 
     control_points: tuple[int, int, int]

@@ -63,11 +63,32 @@ def load_spline(path: str | Path, content: str) -> tuple[tuple[int, int, int], K
 class BSplineVolume:
     """A trivariate B-spline.
 
-    degrees: one per parametric direction.
-    knots: three open knot vectors on [0, 1].
-    control_points: (n_u, n_v, n_w, 3), in the user's units.
+    Parameters
+    ----------
+    degrees : three int
+        One a parametric direction.
+    knots : three arrays
+        Open knot vectors on [0, 1], of n + degree + 1 numbers.
+    control_points : (n_u, n_v, n_w, 3) array
+        In the user's units.
 
-    Raises ValueError where the parts do not fit together.
+    Raises
+    ------
+    ValueError
+        Where the parts do not fit together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import iga_nn
+    >>> grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 4)] * 3, indexing="ij"), axis=-1)
+    >>> rod = iga_nn.BSplineVolume.uniform(grid * [4, 1, 1])  # control points (4, 4, 4, 3)
+    >>> rod([[0.5, 0.5, 0.5]]).round(12)
+    array([[2. , 0.5, 0.5]])
+    >>> rod.jacobian([[0.5, 0.5, 0.5]])[0].diagonal().round(12)
+    array([4., 1., 1.])
+    >>> rod.refined().shape  # the same map
+    (5, 5, 5)
     """
 
     degrees: tuple[int, int, int]

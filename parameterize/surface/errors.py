@@ -8,7 +8,17 @@ LARGEST = 1e90  # coordinate: volumes beyond its cube leave double precision
 
 
 class MeshError(ValueError):
-    """A surface is refused. One line: the file, the defect, how many, where the first is, the remedy."""
+    """A surface is refused. One line: the file, the defect, how many, where the first is, the remedy.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> try:
+    ...     iga_nn.load_surface("mesh.step")
+    ... except iga_nn.MeshError as error:
+    ...     print(str(error).partition(":")[0])
+    mesh.step
+    """
 
 
 def check_face_count(count: int, max_faces: int) -> None:

@@ -29,12 +29,39 @@ logger = logging.getLogger(__name__)
 class Surface:
     """A closed surface of genus 0, one component, wound outward, with its placement in the unit cube's space.
 
-    name: the input's stem. vertices: (n, 3), user's units. faces: (m, 3) vertex numbers. source: path as given, "" for
-    arrays. sha256: of the file's bytes, or of the arrays. notices: what was mended or is doubtful, one line each.
-    scale, center: to_unit(x) = scale * (x - center) + 1/2 gives volume 1 and puts the deepest interior point at
-    (1/2, 1/2, 1/2). unit_vertices: the vertices (n, 3) placed so and rounded to single precision, in which networks
-    train: the same surface in another unit or at another place then gives the same numbers, and with them the same map.
-    crossings: (k, 2) pairs of faces that intersect.
+    `load_surface`, `surface_from_arrays` and `sample` make surfaces.
+
+    Attributes
+    ----------
+    name : str
+        The input's stem.
+    vertices : (n, 3) array
+        In the user's units.
+    faces : (m, 3) array of int
+        Vertex numbers of the triangles.
+    source : str
+        The path as given, "" for arrays.
+    sha256 : str
+        Of the file's bytes, or of the arrays.
+    notices : tuple of str
+        What was mended or is doubtful, one line each.
+    scale : float
+    center : (3,) array
+        to_unit(x) = scale * (x - center) + 1/2 gives volume 1 and puts the deepest interior point at (1/2, 1/2, 1/2).
+    unit_vertices : (n, 3) array
+        The vertices placed so and rounded to single precision, in which networks train: the same surface in another
+        unit or at another place then gives the same numbers, and with them the same map.
+    crossings : (k, 2) array of int
+        Pairs of faces that intersect.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> cube = iga_nn.sample("cube")
+    >>> round(cube.volume, 12), [corner.tolist() for corner in cube.bbox]
+    (1.0, [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    >>> cube.to_unit(cube.center)
+    array([0.5, 0.5, 0.5])
     """
 
     name: str
@@ -97,9 +124,34 @@ class Surface:
 def load_surface(path: str | Path, *, component: int | None = None, max_faces: int = MAX_FACES) -> Surface:
     """Read a surface (.obj, .stl, .ply, .off) or the boundary of tetrahedra (.mesh, .msh, .vtu), each also as .gz.
 
-    component: which one to take where the file holds several, 0 the largest. max_faces: refuse more.
-    Raises MeshError (a ValueError) of one line for a file that cannot be read or is no closed surface of genus 0,
-    TypeError for a path that is none.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    component : int, optional
+        Which one to take where there are several, 0 the largest.
+    max_faces : int
+        Refuse more.
+
+    Returns
+    -------
+    Surface
+        Checked and repaired; its `notices` say what was mended.
+
+    Raises
+    ------
+    MeshError
+        A ValueError of one line for what cannot be read or is no closed surface of genus 0.
+    TypeError
+        For a path that is none.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from iga_nn.samples import write_obj
+    >>> write_obj(iga_nn.sample("ellipsoid"), "ellipsoid.obj")
+    >>> iga_nn.load_surface("ellipsoid.obj").faces.shape
+    (4996, 3)
     """
     if not isinstance(path, (str, Path)):
         raise TypeError(f"path must be a str or Path, got {path!r:.80}; for arrays there is surface_from_arrays")
@@ -122,9 +174,33 @@ def surface_from_arrays(
     component: int | None = None,
     max_faces: int = MAX_FACES,
 ) -> Surface:
-    """Make a surface of vertices (n, 3) and triangles (m, 3) of vertex numbers, with the checks of load_surface.
+    """Make a surface of arrays, with the checks of `load_surface`.
 
-    Raises MeshError (a ValueError) naming what is wrong with the arrays or the surface.
+    Parameters
+    ----------
+    vertices : (n, 3) array
+        In any unit.
+    faces : (m, 3) array of int
+        Vertex numbers of the triangles, counted from 0.
+    name : str
+        What messages and files call the surface.
+    component : int, optional
+        Which one to take where there are several, 0 the largest.
+    max_faces : int
+        Refuse more.
+
+    Raises
+    ------
+    MeshError
+        A ValueError that names what is wrong with the arrays or the surface.
+
+    Examples
+    --------
+    >>> from parameterize import surface_from_arrays
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> tetrahedron = surface_from_arrays(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> round(6 * tetrahedron.volume, 12)
+    1.0
     """
     try:
         points = np.array(vertices, dtype=np.float64)

@@ -19,14 +19,37 @@ class Elasticity(LawWithData):
 
     Each vector is given as three entries: formulas in x, y, z and X, Y, Z (as in `Poisson`), functions of three arrays
     x, y, z of equal shape, or fields on the same volume.
-    exact: the displacement u, where it is known. As formulas it gives force and boundary data, and the report's errors;
-        functions need them beside it, and leave the H1 seminorm out.
-    force: f, per volume; overrides what follows from `exact`.
-    displacement: values of u on the faces that are not in `traction`; default: `exact`, or zero.
-    traction: face name -> sigma n, n the outward unit normal; None in place of the vector: from `exact`.
-    young, poisson_ratio: E > 0 and -1 < nu < 1/2. `lame` converts from lambda and mu.
 
-    Raises ExpressionError for a formula that is refused, ValueError where data cannot be known or do not fit.
+    Parameters
+    ----------
+    exact : three entries, optional
+        The displacement u, where it is known. As formulas it gives force and boundary data, and the report's errors;
+        functions need them beside it, and leave the H1 seminorm out.
+    force : three entries, optional
+        f, per volume; overrides what follows from `exact`.
+    displacement : three entries, optional
+        Values of u on the faces that are not in `traction`; default: `exact`, or zero.
+    traction : dict of face name to three entries or None
+        sigma n, n the outward unit normal; None: from `exact`. One face at least is left to displacement.
+    young : float
+        E > 0.
+    poisson_ratio : float
+        -1 < nu < 1/2. `lame` converts from lambda and mu.
+
+    Raises
+    ------
+    ExpressionError
+        For a formula that is refused.
+    ValueError
+        Where data cannot be known or do not fit.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> body = iga_nn.Elasticity(exact=("x*y", "0", "z"), young=210.0, traction={"u1": None})
+    >>> iga_nn.solve(benchmark_volume(2), body).report.l2_relative < 1e-2
+    True
     """
 
     exact: Data | None = None
@@ -74,6 +97,6 @@ class Elasticity(LawWithData):
         return stress
 
     def symbol(self, wave: Array, x: Array) -> Array:
-        """Return the factor mu |k|^2 of shear waves, the least, for wave vectors k (3, ...)."""
+        """Return the factor mu (k . k) of shear waves, the least, for wave vectors k (3, ...)."""
         found: Array = self.constants[1] * (wave * wave).sum(axis=0)
         return found

@@ -22,9 +22,28 @@ class Form:
     (`forms.jets`), whose dimensions (...) are none: then the source of an exact solution and the estimate of the error
     follow. Use arithmetic, indices, `np.stack` and sin, cos, tan, exp, log, sqrt, tanh and abs.
 
-    components: c, of u. symmetric: whether conjugate gradients solve it; else GMRES does.
-    constant: whether the flux has neither u nor x in it, and there is no reaction: products are then faster, and `flux`
-        may get None for x.
+    Attributes
+    ----------
+    components : int
+        c, of u; 1 by default.
+    symmetric : bool
+        Whether conjugate gradients solve it; else GMRES does. True by default.
+    constant : bool
+        Whether the flux has neither u nor x in it, and there is no reaction: products are then faster, and `flux` may
+        get None for x. False by default.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> class Wind(iga_nn.Form):
+    ...     symmetric = False
+    ...     def flux(self, u, grad, x):  # u (1, ...), grad (1, 3, ...), x (3, ...)
+    ...         return 0.1 * grad
+    ...     def react(self, u, grad, x):
+    ...         return grad[:, 0]  # carried along x
+    >>> iga_nn.solve(benchmark_volume(2), iga_nn.Problem(Wind(), exact="x*y")).report.converged
+    True
     """
 
     components: int = 1

@@ -44,7 +44,17 @@ Evaluator = Callable[[Sequence[Jet]], Jet]  # of the six variables
 
 
 class ExpressionError(ValueError):
-    """A formula that is refused, or data that are not finite somewhere on the domain."""
+    """A formula that is refused, or data that are not finite somewhere on the domain.
+
+    Examples
+    --------
+    >>> import iga_nn, solve
+    >>> try:
+    ...     iga_nn.Poisson(exact="import os")
+    ... except solve.ExpressionError as error:
+    ...     print("refused")
+    refused
+    """
 
 
 @dataclass(frozen=True)

@@ -24,21 +24,44 @@ class Poisson(LawWithData):
     """-div(kappa grad u) + c u = f in the volume's own coordinates, with data on the images of the cube's six faces.
 
     Each entry is a formula in x, y, z and in X, Y, Z, the same scaled to volume 1 (`frame.UnitFrame`), a function of
-    three arrays x, y, z of equal shape, or a field on the same volume (`solution.field`).
-    exact: the solution, where it is known; DEFAULT_EXACT where neither it nor source nor boundary is given. As a
+    three arrays x, y, z of equal shape, or a field on the same volume (`solution.field`). Where no face and no reaction
+    fix the solution's constant, its mean is that of `exact`, or zero.
+
+    Parameters
+    ----------
+    exact : entry, optional
+        The solution, where it is known; "exp(X+Z)*sin(Y)" where neither it nor source nor boundary is given. As a
         formula it gives source and boundary data, and the report's errors; a function needs them beside it, and leaves
         the H1 seminorm out, for its derivatives are unknown.
-    source: f; overrides the one that follows from `exact`.
-    boundary: values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
-    kappa: a scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz or nine by rows; default 1.
-        Positive definite.
-    reaction: c, not negative; default 0.
-    neumann: face name ("u0", "u1", "v0", "v1", "w0", "w1") -> kappa grad u . n, n the outward unit normal.
-    robin: face name -> (alpha, g) of kappa grad u . n + alpha u = g; alpha not negative.
-        None in place of Neumann's data or of Robin's g: from `exact`.
+    source : entry, optional
+        f; overrides the one that follows from `exact`.
+    boundary : entry, optional
+        Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
+    kappa : entry, or six or nine of them, optional
+        A scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz or nine by rows; default 1. Positive
+        definite.
+    reaction : entry, optional
+        c, not negative; default 0.
+    neumann : dict of face name to entry or None
+        kappa grad u . n on the faces "u0", "u1", "v0", "v1", "w0", "w1", n the outward unit normal; None: from `exact`.
+    robin : dict of face name to (entry, entry or None)
+        (alpha, g) of kappa grad u . n + alpha u = g; alpha not negative; None for g: from `exact`.
 
-    Where no face and no reaction fix the solution's constant, its mean is that of `exact`, or zero.
-    Raises ExpressionError for a formula that is refused, ValueError where data cannot be known or do not fit.
+    Raises
+    ------
+    ExpressionError
+        For a formula that is refused.
+    ValueError
+        Where data cannot be known or do not fit.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> hot = iga_nn.Poisson(source="0", boundary="1", robin={"u1": ("2", "0")}, kappa="1+x*x")
+    >>> solution = iga_nn.solve(benchmark_volume(2), hot)
+    >>> bool(0 < solution([[1.0, 0.5, 0.5]])[0] < 1)  # cooled there
+    True
     """
 
     exact: Data | None = None

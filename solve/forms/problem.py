@@ -205,12 +205,42 @@ class Problem(BoundaryValueProblem):
     and X, Y, Z, a function of points x (3, ...) that returns (...), or a field (`solution.field`) on the same volume.
     A function or a field may also stand for all components: (c, ...).
 
-    form: the law. exact: the solution, where it is known; as formulas it gives the source and all data on faces.
-    source: f. boundary: values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
-    neumann: face name ("u0", ..., "w1") -> flux . n, n the outward unit normal; None: from `exact`.
-    robin: face name -> (alpha, g) of flux . n + alpha u = g; alpha one entry, not negative; None for g: from `exact`.
+    Parameters
+    ----------
+    form : Form
+        The law.
+    exact : datum, optional
+        The solution, where it is known; as formulas it gives the source and all data on faces.
+    source : datum, optional
+        f.
+    boundary : datum, optional
+        Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
+    neumann : dict of face name to datum or None
+        flux . n on "u0", ..., "w1", n the outward unit normal; None: from `exact`.
+    robin : dict of face name to (entry, datum or None)
+        (alpha, g) of flux . n + alpha u = g; alpha one entry, not negative; None for g: from `exact`.
 
-    Raises ExpressionError for a formula that is refused, ValueError where data cannot be known or do not fit.
+    Raises
+    ------
+    TypeError
+        For what is no instance of a subclass of `Form`.
+    ExpressionError
+        For a formula that is refused.
+    ValueError
+        Where data cannot be known or do not fit.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> class Decay(iga_nn.Form):
+    ...     def flux(self, u, grad, x):
+    ...         return grad
+    ...     def react(self, u, grad, x):
+    ...         return 5 * u
+    >>> problem = iga_nn.Problem(Decay(), exact="exp(X)", neumann={"u1": None})
+    >>> iga_nn.solve(benchmark_volume(2), problem, refine=1).report.l2_relative < 1e-3
+    True
     """
 
     form: Form
