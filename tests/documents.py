@@ -10,7 +10,7 @@ import iga_nn
 
 ROOT = Path(iga_nn.__file__).resolve().parents[1]
 README = ROOT / "README.md"
-PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [README, *sorted((ROOT / "docs").glob("*.md")), ROOT / "docs" / "api" / "index.md"]
 
 
 def blocks(page: Path, language: str) -> list[str]:

@@ -111,7 +111,7 @@ def test_wheel_holds_the_three_packages_and_their_data(wheel):
 def test_wheel_runs_in_an_environment_of_its_own(wheel, tmp_path):
     """Installed without its dependencies, which are those of this environment: nothing is downloaded."""
     venv.create(tmp_path / "env", with_pip=False)
-    (packages,) = (tmp_path / "env").glob("lib*/python3*/site-packages")
+    (packages,) = (tmp_path / "env").glob("lib/python3*/site-packages")
     (packages / "dependencies.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
     pip = [sys.executable, "-P", "-m", "pip", "--python", str(tmp_path / "env" / "bin" / "python")]
     install = [*pip, "install", "--no-deps", "--no-index", "--no-compile", str(wheel)]
