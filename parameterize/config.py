@@ -101,14 +101,14 @@ class SplineConfig:
     firm_rounds: int = 4  # after these the surface gives way at unproved spans
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most
-    usual_steps: tuple[int, ...] = (25, 20, 12, 10, 10, 10)  # of the rounds of most runs: tells the time left
+    usual_steps: tuple[int, ...] = (25, 25, 12, 10, 10, 10)  # of the rounds of most runs: tells the time left
     least_steps: int = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
     slides: int = 2  # of the boundary parameters after each step
     relaxations: int = 1  # sweeps over the triangles that these flipped
     last_slides: int = 20  # before the boundary map is made, and again after `last_sweeps`
     last_sweeps: int = 600  # over the triangles that the last slides flipped, at most
     first_gain: float = 4e-3  # the first round ends once a step lowers the energy by less than this share of it
-    gain: float = 1e-3  # likewise the later ones
+    gain: float = 5e-4  # likewise the later ones
     memory: int = 4  # differences of Newton steps from which the next place is guessed
     damping: float = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
     damping_growth: float = 3.0  # factor after each further one, and divisor after a full step

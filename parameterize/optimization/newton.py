@@ -300,11 +300,11 @@ def _descend(
         else:
             acceleration.add(start.control, found.control)
         ahead = _look_ahead(found, acceleration, energy)
+        gain = start.total - (ahead or found).total  # sliding may raise the energy of what is folded
         if ahead is None:
             energy.slide(found.control)
             ahead = replace(found, outer=energy.surface_part(found.control))
         point = ahead
-        gain = start.total - point.total
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
         total = max(number + 1, len(config.usual_steps)) * steps
