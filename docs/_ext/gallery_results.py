@@ -19,7 +19,7 @@ SAMPLES = 41  # a direction of a face: a page of some 150 kB
 FRAME = """
 .. raw:: html
 
-   <iframe class="scene" src="../scenes/{name}.html" title="Interactive view: {name}" loading="lazy"></iframe>
+   <iframe class="scene" src="../scenes/{name}.html#{shown}" title="Interactive view: {name}" loading="lazy"></iframe>
 """
 PICTURE = """
 .. image:: /../examples/pictures/{name}.png
@@ -32,7 +32,8 @@ def add_result(app: Sphinx, document: str, source: list[str]) -> None:
     folder, _, name = document.partition("/")
     if folder != "gallery" or name not in pictures(app):
         return
-    view = FRAME.format(name=name) if write_view(app, name) else ""
+    shown = write_view(app, name)
+    view = FRAME.format(name=name, shown=shown) if shown else ""
     before, code, after = source[0].partition("\n.. code-block:: Python\n")
     source[0] = f"{before}\n{view}{PICTURE.format(name=name)}{code}{after}"
 
@@ -50,19 +51,19 @@ def add_thumbnails(app: Sphinx) -> None:
             shutil.copy(picture, thumbnail)
 
 
-def write_view(app: Sphinx, name: str) -> bool:
-    """Write the interactive view of an example into the site; return whether it leaves a volume to be seen."""
+def write_view(app: Sphinx, name: str) -> str:
+    """Write the interactive view of an example into the site; return what it shows first, "" without a volume."""
     docs = Path(app.confdir)
     left = docs.parent / "examples" / "out" / name
     files = [file for file in (left / "volume.npz", docs / "kept" / f"{name}.npz") if file.exists()]
     if not files:
-        return False
+        return ""
     solved = left / "solution.npz"
     scene = scene_of(load_volume(files[0]), SplineField.load(solved) if solved.exists() else None, samples=SAMPLES)
     target = Path(app.outdir) / "scenes" / f"{name}.html"
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text(scene_page(scene, name.replace("_", " ")), encoding="utf-8")
-    return True
+    return "solution" if solved.exists() else "faces"
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
