@@ -189,7 +189,7 @@ def test_elasticity_on_a_saved_volume(in_folder, capsys):
     report = json.loads(Path("map/report.json").read_text())
     assert report["elasticity"]["exact"] == "x*y;sin(z);x" and report["elasticity"]["young"] == 200.0
     assert report["elasticity"]["rates"]["l2"][0] > 3.0
-    assert "2187 unknowns" in capsys.readouterr().out
+    assert "2,187 unknowns" in capsys.readouterr().out
     with np.load("map/solution.npz") as data:
         assert data["coefficients"].shape == (9, 9, 9, 3)
 
