@@ -20,6 +20,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "mathml",
     "gallery_results",
+    "short_types",
 ]
 exclude_patterns = ["_build", "gallery/*.ipynb", "sg_execution_times.rst", "gallery/sg_execution_times.rst"]
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
@@ -35,6 +36,7 @@ html_show_sourcelink = False
 
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Data", "IntArray", "Natural", "Robin", "Scalar")}
 python_maximum_signature_line_length = 90
 default_role = "code"  # single backticks in docstrings
 autodoc_preserve_defaults = True
