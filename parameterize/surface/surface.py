@@ -4,19 +4,26 @@ import hashlib
 import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, in_brackets
+from ..display import Shown
 from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
 from .geometry import signed_volume
 from .inside import deepest_point
 from .readers.file import RawMesh, read_mesh
+from .readers.objects import READERS, class_of, read_object
 from .self_intersection import SHOWN, crossing_faces, crossing_places, describe_crossings
 from .topology import check_genus, check_manifold, choose_component, slivers
 from .welding import weld_and_drop, wind_outward
+
+if TYPE_CHECKING:
+    import meshio
+    import pyvista
+    import trimesh
 
 __all__ = ["MAX_FACES", "MeshError", "Surface", "load_surface", "surface_from_arrays"]
 
@@ -26,7 +33,7 @@ logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Surface(Shown):
     """A closed surface of genus 0, one component, wound outward, with its placement in the unit cube's space.
 
     `load_surface`, `surface_from_arrays` and `sample` make surfaces.
@@ -121,13 +128,19 @@ class Surface:
             raise MeshError(f"{name}: {found}: pull the sheets apart there, or check without --strict")
 
 
-def load_surface(path: str | Path, *, component: int | None = None, max_faces: int = MAX_FACES) -> Surface:
-    """Read a surface (.obj, .stl, .ply, .off) or the boundary of tetrahedra (.mesh, .msh, .vtu), each also as .gz.
+def load_surface(
+    mesh: "str | Path | trimesh.Trimesh | pyvista.PolyData | meshio.Mesh",
+    *,
+    component: int | None = None,
+    max_faces: int = MAX_FACES,
+) -> Surface:
+    """Return the surface of a file or of a mesh of trimesh, pyvista or meshio, checked and repaired.
 
     Parameters
     ----------
-    path : str or Path
-        The file.
+    mesh : str or Path, or a trimesh.Trimesh, pyvista.PolyData or meshio.Mesh
+        The path of a surface (.obj, .stl, .ply, .off) or of tetrahedra (.mesh, .msh, .vtu), each also as .gz, or a mesh
+        in memory. The boundary of tetrahedra is taken.
     component : int, optional
         Which one to take where there are several, 0 the largest.
     max_faces : int
@@ -143,7 +156,7 @@ def load_surface(path: str | Path, *, component: int | None = None, max_faces: i
     MeshError
         A ValueError of one line for what cannot be read or is no closed surface of genus 0.
     TypeError
-        For a path that is none.
+        For an object of another class.
 
     Examples
     --------
@@ -152,14 +165,23 @@ def load_surface(path: str | Path, *, component: int | None = None, max_faces: i
     >>> write_obj(iga_nn.sample("ellipsoid"), "ellipsoid.obj")
     >>> iga_nn.load_surface("ellipsoid.obj").faces.shape
     (4996, 3)
+
+    >>> import trimesh
+    >>> iga_nn.load_surface(trimesh.creation.icosphere()).vertices.shape
+    (642, 3)
     """
-    if not isinstance(path, (str, Path)):
-        raise TypeError(f"path must be a str or Path, got {path!r:.80}; for arrays there is surface_from_arrays")
-    source = str(path)
+    kind = class_of(mesh)
+    if kind is None and not isinstance(mesh, (str, Path)):
+        known = ", ".join(READERS)
+        raise TypeError(f"mesh must be a path or one of {known}, got {mesh!r:.80}; for arrays: surface_from_arrays")
+    source = kind or str(mesh)
     try:
-        raw = read_mesh(Path(path), max_faces)
-        name = Path(path).name.split(".")[0] or Path(path).name
-        surface = _gate(raw, name, source, component, max_faces)
+        if kind is not None:
+            surface = _gate(read_object(mesh, kind, max_faces), "surface", "", component, max_faces)
+        else:
+            path = Path(source)
+            name = path.name.split(".")[0] or path.name
+            surface = _gate(read_mesh(path, max_faces), name, source, component, max_faces)
     except MeshError as error:
         raise MeshError(f"{source}: {error}") from None
     logger.debug("%s: %d vertices, %d faces", source, len(surface.vertices), len(surface.faces))

@@ -21,10 +21,14 @@ def read_by_meshio(data: bytes, suffix: str, read: Callable[[str], Any]) -> Cont
         copy = Path(folder, f"mesh{suffix}")
         copy.write_bytes(data)
         with library(suffix):
-            mesh = read(str(copy))
-            vertices = np.asarray(mesh.points, dtype=np.float64)
-            cells = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
+            vertices, cells = arrays_of(read(str(copy)))
     return from_cells(vertices, cells)
+
+
+def arrays_of(mesh: Any) -> tuple[Array, list[tuple[str, IntArray]]]:
+    """Return points and cells of a meshio.Mesh as `from_cells` takes them."""
+    cells = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
+    return np.asarray(mesh.points, dtype=np.float64), cells
 
 
 def from_cells(vertices: Array, cells: list[tuple[str, IntArray]]) -> Content:
@@ -47,7 +51,7 @@ def from_cells(vertices: Array, cells: list[tuple[str, IntArray]]) -> Content:
         return Content(vertices, tetrahedra_boundary(vertices, np.concatenate(tetrahedra)).tolist())
     polygons = [polygon for kind, rows in cells if kind in POLYGONS for polygon in rows.tolist()]
     if not polygons:
-        raise MeshError("no tetrahedra and no triangles in the file: export the volume or its surface")
+        raise MeshError("no tetrahedra and no triangles: export the volume or its surface")
     return Content(vertices, polygons)
 
 

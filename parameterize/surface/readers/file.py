@@ -37,7 +37,7 @@ FORMATS = tuple(READERS)
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """Triangles as a file gives them: vertices (n, 3), faces (m, 3), indices in range; sha256 of the file's bytes."""
+    """Triangles as they are given: vertices (n, 3), faces (m, 3), indices in range; sha256 of file or arrays."""
 
     vertices: Array
     faces: IntArray
@@ -62,15 +62,13 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     if not data.strip():
         raise MeshError("the file is empty: export it again")
     content = READERS[suffix](data, max_faces)
-    faces = _triangles(content, max_faces)
-    notices = [*(["unpacked from .gz"] if packed else []), *content.notices]
-    if len(faces) > len(content.polygons):
-        notices.append(f"{len(content.polygons)} polygons cut into {len(faces)} triangles")
-    return RawMesh(content.vertices, faces, hashlib.sha256(stored).hexdigest(), tuple(notices))
+    faces, notices = triangles_of(content, max_faces)
+    unpacked = ("unpacked from .gz",) * packed
+    return RawMesh(content.vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices)
 
 
-def _triangles(content: Content, max_faces: int) -> IntArray:
-    """Check vertices and polygons, and return the triangles (m, 3) that the polygons are cut into."""
+def triangles_of(content: Content, max_faces: int) -> tuple[IntArray, tuple[str, ...]]:
+    """Check vertices and polygons; return the triangles (m, 3) that the polygons are cut into, and all notices."""
     check_finite(content.vertices)
     corners = np.fromiter(chain.from_iterable(content.polygons), dtype=np.int64)
     check_indices(content.vertices, corners)
@@ -78,7 +76,10 @@ def _triangles(content: Content, max_faces: int) -> IntArray:
     if fewest < 3:
         raise MeshError(f"a face has {fewest} corners, expected at least 3; {DAMAGED}")
     check_face_count(len(corners) - 2 * len(content.polygons), max_faces)  # before the time is spent on them
-    return triangulate(content.vertices, content.polygons)
+    faces = triangulate(content.vertices, content.polygons)
+    if len(faces) == len(content.polygons):
+        return faces, content.notices
+    return faces, (*content.notices, f"{len(content.polygons)} polygons cut into {len(faces)} triangles")
 
 
 def _read_bytes(path: Path, limit: int) -> bytes:

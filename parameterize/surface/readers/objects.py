@@ -1,0 +1,61 @@
+"""Meshes in memory: objects of trimesh, pyvista and meshio, which are known without importing these libraries."""
+
+import hashlib
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..errors import MeshError
+from .cells import arrays_of, from_cells
+from .common import Content
+from .file import RawMesh, triangles_of
+
+
+def class_of(mesh: object) -> str | None:
+    """Return the class of a mesh that `read_object` takes, such as "trimesh.Trimesh"; None for any other object.
+
+    The class of an object that exists was loaded before, so looking it up loads nothing.
+    """
+    for name in READERS:
+        library, _, kind = name.partition(".")
+        known = getattr(sys.modules.get(library), kind, None)
+        if known is not None and isinstance(mesh, known):
+            return name
+    return None
+
+
+def read_object(mesh: Any, kind: str, max_faces: int) -> RawMesh:
+    """Return the triangles of a mesh of that class. Raises MeshError, without the class."""
+    try:
+        content = READERS[kind](mesh)
+    except (TypeError, ValueError) as error:  # rows of different lengths, texts in place of numbers
+        raise MeshError(" ".join(str(error).split())) from None
+    if not content.polygons:
+        raise MeshError("has no faces: give a closed surface")
+    faces, notices = triangles_of(content, max_faces)
+    digest = hashlib.sha256(content.vertices.tobytes() + faces.tobytes()).hexdigest()
+    return RawMesh(content.vertices, faces, digest, notices)
+
+
+def _read_trimesh(mesh: Any) -> Content:
+    return Content(np.array(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces).tolist())
+
+
+def _read_pyvista(mesh: Any) -> Content:
+    """Return the polygons; vertices and lines, which a PolyData may hold besides, are left out."""
+    if mesh.n_strips:
+        raise MeshError(f"holds {mesh.n_strips} triangle strips: give mesh.triangulate()")
+    return Content(np.array(mesh.points, dtype=np.float64), [row.tolist() for row in mesh.irregular_faces])
+
+
+def _read_meshio(mesh: Any) -> Content:
+    return from_cells(*arrays_of(mesh))
+
+
+READERS: dict[str, Callable[[Any], Content]] = {
+    "trimesh.Trimesh": _read_trimesh,
+    "pyvista.PolyData": _read_pyvista,
+    "meshio.Mesh": _read_meshio,
+}
