@@ -26,10 +26,11 @@ from .forms.poisson import Poisson
 from .forms.problem import Problem
 from .solution import Solution, SolveReport
 from .solver import check_problem, discretize, solve_problem
-from .study import ConvergenceRow, benchmark_volume, convergence, rates
+from .study import Convergence, ConvergenceRow, benchmark_volume, convergence, rates
 from .system import System, check_device
 
 __all__ = [
+    "Convergence",
     "ConvergenceError",
     "ConvergenceRow",
     "Elasticity",

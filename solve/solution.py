@@ -1,12 +1,19 @@
 """Solution: the spline that a solve returns, and SolveReport: its numbers."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from parameterize.display import Shown, above
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.errors import Errors
 from .field import SplineField
+from .forms.problem import BoundaryValueProblem
+
+if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.figure import Figure
 
 NORMS = {  # name in report.json -> name as shown
     "l2_relative": "relative L2",
@@ -96,8 +103,8 @@ class SolveReport:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(SplineField):
-    """The discrete solution: a spline of the parameters, the map it lives on, and the report.
+class Solution(SplineField, Shown):
+    """The discrete solution: a spline of the parameters, the map it lives on, the report, and the problem it solves.
 
     Attributes
     ----------
@@ -105,6 +112,8 @@ class Solution(SplineField):
         The map.
     report : SolveReport
         Unknowns, errors, iterations and seconds.
+    problem : Poisson, Elasticity or Problem
+        Whose solution it is.
 
     Examples
     --------
@@ -117,8 +126,25 @@ class Solution(SplineField):
 
     geometry: BSplineVolume
     report: SolveReport = field(kw_only=True)
+    problem: BoundaryValueProblem = field(kw_only=True)
 
     @property
     def field(self) -> SplineField:
         """The spline without the report: a datum for another problem on the same volume."""
         return SplineField(self.degrees, self.knots, self.coefficients, self.geometry)
+
+    def to_pyvista(self, samples: int | None = None) -> "pyvista.UnstructuredGrid":
+        """Return the volume as a grid of pyvista with the solution as point data `u`.
+
+        samples: None for exact Bezier cells; else the number of linear cells a span and direction, with the distortion
+        `arap`, `det J` and, where the exact solution is known, the `error`. Slice and clip these alone.
+        """
+        return above("io.vtk").grid(self.geometry, self, self.problem, samples)
+
+    def plot(self, what: str = "values", file: str | Path | None = None) -> "Figure":
+        """Return a figure of the solution, drawn off screen; report.html shows the same.
+
+        what: "values", or "error" where the problem has an exact solution. file: PNG to write the figure to, too.
+        Raises ValueError for another name or without an exact solution, RuntimeError where VTK cannot draw here.
+        """
+        return above("figures.plot").plot_solution(self, what, file)

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from parameterize.display import Shown
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
@@ -45,6 +46,13 @@ class ConvergenceRow:
         return ", ".join([str(self.report), *rates])
 
 
+class Convergence(list[ConvergenceRow], Shown):
+    """The levels of a study in the order they were solved; printed, a line a level."""
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self))
+
+
 def convergence(
     volume: BSplineVolume,
     problem: Poisson | Elasticity | Problem,
@@ -53,7 +61,7 @@ def convergence(
     *,
     certified: str | None = None,
     tolerance: float = 1e-13,
-) -> list[ConvergenceRow]:
+) -> Convergence:
     """Solve on each refinement level of one map; for smooth solutions the L2 rate tends to degree + 1.
 
     Parameters
@@ -93,7 +101,7 @@ def convergence(
     reports = [solve(refine=level).report for level in refine]
     found = rates(reports)
     l2, h1 = ([None, *found.get(name, [None] * len(reports))] for name in ("l2", "h1"))
-    return [ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports)]
+    return Convergence(ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports))
 
 
 def rates(reports: Sequence[SolveReport]) -> dict[str, list[float | None]]:

@@ -206,7 +206,8 @@ class System:
             meaningful=meaningful,
             residuals=result.residuals,
         )
-        return Solution(space.degrees, space.knots, self._spline(full).coefficients, volume, report=report)
+        spline = self._spline(full)
+        return Solution(space.degrees, space.knots, spline.coefficients, volume, report=report, problem=self.problem)
 
     def iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""

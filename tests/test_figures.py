@@ -114,6 +114,24 @@ def test_study_has_a_curve_a_degree(tmp_path):
         assert np.count_nonzero(np.abs(image - to_rgb(color)).max(axis=-1) < 0.02) > 100
 
 
+def test_a_study_draws_relative_errors_beside_absolute_ones():
+    volume, problem = benchmark_volume(2), solve.Poisson(exact="1000*exp(x)*y*z")
+    levels = solve.convergence(volume, problem, (0, 1))
+    figure = plotting.draw_study(None, {3: levels})
+    figure.draw_without_rendering()
+    for panel, name, relative in zip(figure.axes, ("l2", "h1_seminorm"), ("l2_relative", "h1_relative"), strict=True):
+        (absolute,) = panel.child_axes
+        drawn = panel.lines[0].get_ydata()
+        assert drawn == pytest.approx([getattr(row.report, relative) for row in levels])
+        assert (panel.get_ylabel(), absolute.get_ylabel()) == ("relative", "absolute")
+        norm = getattr(levels[1].report, name) / drawn[1]  # of the solution
+        assert absolute.get_ylim() == pytest.approx(norm * np.array(panel.get_ylim()))
+    other = solve.convergence(benchmark_volume(2, amplitude=0.0), problem, (0,))
+    assert plotting.draw_study(None, {2: other, 3: levels}).axes[0].child_axes == []  # two volumes, two norms
+    nothing = solve.convergence(volume, solve.Poisson(exact="0*x"), (0,))
+    assert plotting.draw_study(None, {3: nothing}).axes[0].get_ylabel() == "absolute"
+
+
 def test_plots_of_curves_are_also_written_as_pdf(in_folder, formula_training, monkeypatch):
     formula_training()
     monkeypatch.setattr(plotting, "can_draw", lambda: False)  # this is about curves

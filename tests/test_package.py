@@ -41,6 +41,8 @@ def test_version_and_help_load_no_numerics(option, tmp_path):
         "import iga_nn.cli.commands",
         "import iga_nn; iga_nn.sample; iga_nn.load_surface; iga_nn.preset; iga_nn.BSplineVolume",
         "import iga_nn; iga_nn.Poisson; iga_nn.solve; iga_nn.certify",
+        "import iga_nn, pathlib; pathlib.Path('a.obj').write_text('v 0 0 0')\ntry: iga_nn.load_surface('a.obj')\n"
+        "except iga_nn.MeshError: iga_nn.BSplineVolume.from_function(lambda u, v, w: (u, v, w), 4)",
     ],
 )
 def test_no_torch_until_training_starts_and_no_vtk_until_a_figure(use, tmp_path):
@@ -80,6 +82,13 @@ def test_imports_run_one_way():
     lint = Path(sys.executable).with_name("lint-imports")
     done = subprocess.run([lint, "--no-cache"], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_one_module_alone_looks_upwards():
+    """`import_module` is what the linter does not see."""
+    upwards = [file for name in ("parameterize", "solve") for file in (ROOT / name).rglob("*.py")]
+    using = {str(file.relative_to(ROOT)) for file in upwards if "import_module(" in file.read_text(encoding="utf-8")}
+    assert using == {"parameterize/__init__.py", "parameterize/display.py"}  # the first its own modules
 
 
 @pytest.fixture(scope="module")

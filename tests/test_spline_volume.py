@@ -157,3 +157,38 @@ def test_truncated_and_missing_files_are_refused(tmp_path):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(ValueError, match=r"volume\.npz: not a readable"):
         BSplineVolume.load(path)
+
+
+def test_a_function_of_the_degree_is_met_exactly():
+    def place(u, v, w):
+        return u + 0.2 * v**3 * w, v**2 + u * w, 2.0 * w**3
+
+    volume = BSplineVolume.from_function(place, (4, 6, 5))
+    x = points_inside()
+    np.testing.assert_allclose(volume(x), np.stack(place(*x.T), axis=-1), atol=1e-13)
+    assert volume.shape == (4, 6, 5) and volume.degrees == (3, 3, 3)
+
+
+def test_a_smooth_function_is_met_with_the_order_of_the_degree():
+    def place(u, v, w):
+        return u, v + 0.2 * np.sin(3.0 * u), 0.5 + 0.0 * w + w
+
+    x = points_inside()
+    errors = [np.abs(BSplineVolume.from_function(place, n)(x) - np.stack(place(*x.T), -1)).max() for n in (11, 19)]
+    assert errors[0] / errors[1] > 2.0**3.5  # spans of 1/8 and 1/16
+
+
+@pytest.mark.parametrize(
+    ("function", "how", "says"),
+    [
+        (lambda u, v, w: (u, v), {}, "must return three values, x, y and z; it returned 2"),
+        (lambda u, v, w: (u, v, np.log(w)), {}, "finite numbers"),
+        (lambda u, v, w: (u, v, u[0]), {"control_points": (4, 5, 6)}, "shape"),
+        (lambda u, v, w: (u, v, w), {"control_points": 3}, "degree 3 needs at least 4 control points, got 3"),
+        (lambda u, v, w: (u, v, "w"), {}, "values of function must be real numbers"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:divide by zero")
+def test_a_function_that_is_no_volume_is_refused(function, how, says):
+    with pytest.raises(ValueError, match=says):
+        BSplineVolume.from_function(function, **how)

@@ -1,4 +1,7 @@
-"""Draws figures of maps and solutions. All values are samples of the spline itself; VTK only draws them."""
+"""Draws figures of maps and solutions. All values are samples of the spline itself; VTK only draws them.
+
+Each function takes the file to write first, None for none, and returns the figure.
+"""
 
 from .curves import draw_history, draw_study
 from .map import draw_cut, draw_distortion, draw_faces, draw_folds, draw_lines, draw_meeting

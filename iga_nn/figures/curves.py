@@ -13,6 +13,8 @@ from .evaluate import FACE_COLORS
 from .style import blank, positive, save
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from solve import ConvergenceRow
 
 Study = Mapping[int, Sequence["ConvergenceRow"]]  # degree -> its levels, coarsest first
@@ -28,10 +30,11 @@ TERMS = {  # of the loss, as parameterize names them
     "star": "faces seen from inside",
     "surface": "spline's boundary",
 }
+SAME_NORM = 1e-3  # relative: norms of one solution on meshes of different sizes agree better
 STAGES = {"S(2)": "round cuboid S(2)", "S(1)": "sharper cuboid S(1)"}  # the other names need no explanation
 
 
-def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
+def draw_history(path: Path | None, history: dict[str, NDArray[Any]]) -> Figure:
     """Draw the loss and its unweighted terms over the steps, the folded samples below, and mark the stages."""
     terms = [name for name in history if name not in ("stage", "step", "loss", "folded")]
     steps = np.arange(len(history["loss"]))
@@ -55,15 +58,22 @@ def draw_history(path: Path, history: dict[str, NDArray[Any]]) -> None:
         label = {"textcoords": "offset points", "rotation": 35, "fontsize": 9}  # slanted: short stages lie close
         name = str(stages[start])
         upper.annotate(STAGES.get(name, name), (start, 1.0), (0, 3), xycoords=upper.get_xaxis_transform(), **label)
-    save(figure, path)
+    return save(figure, path)
 
 
-def draw_study(path: Path, study: Study) -> None:
-    """Draw L2 and H1 errors over the mesh size, a curve per degree, with the slopes of smooth solutions."""
+def draw_study(path: Path | None, study: Study) -> Figure:
+    """Draw L2 and H1 errors over the mesh size, a curve per degree, with the slopes of smooth solutions.
+
+    Relative errors are drawn where they are known, with an axis of the absolute ones on the right.
+    """
     figure, panels = blank(1, 2, (11, 5))
-    for panel, (title, name, lost) in zip(panels, (("L2", "l2", 0), ("H1 seminorm", "h1_seminorm", 1)), strict=True):
+    norms = (("L2", "l2", "l2_relative", 0), ("H1 seminorm", "h1_seminorm", "h1_relative", 1))
+    for panel, (title, absolute, relative, lost) in zip(panels, norms, strict=True):
+        reports = [level.report for levels in study.values() for level in levels]
+        is_relative = all(getattr(report, relative) is not None for report in reports)
         for (degree, levels), color in zip(study.items(), FACE_COLORS * 2, strict=False):
             sizes = np.array([level.report.elements for level in levels]) ** (-1.0 / 3.0)
+            name = relative if is_relative else absolute
             errors = positive(np.array([getattr(level.report, name) for level in levels]))
             panel.loglog(sizes, errors, "o-", color=color, label=f"degree {degree}")
             order = degree + 1 - lost
@@ -76,7 +86,22 @@ def draw_study(path: Path, study: Study) -> None:
         panel.minorticks_off()
         panel.set_xlabel("h, the edge of an element in the unit cube")
         panel.set_title(f"{title} error")
+        panel.set_ylabel("relative" if is_relative else "absolute")
+        if is_relative:
+            _add_absolute_axis(panel, [(getattr(r, absolute), getattr(r, relative)) for r in reports])
         panel.grid(alpha=0.3)
         panel.margins(x=0.12, y=0.08)
     panels[0].legend(frameon=False)
-    save(figure, path)
+    return save(figure, path)
+
+
+def _add_absolute_axis(panel: Any, errors: Sequence[tuple[float, float]]) -> None:
+    """Draw the absolute errors' axis on the right, where all relative errors are over the same norm of the solution.
+
+    errors: each absolute and relative; studies of several volumes have several norms, and no such axis.
+    """
+    norms = [absolute / relative for absolute, relative in errors if relative > 0.0]
+    if norms and max(norms) <= (1.0 + SAME_NORM) * min(norms):
+        norm = norms[-1]
+        axis = panel.secondary_yaxis("right", functions=(lambda y: norm * y, lambda y: y / norm))
+        axis.set_ylabel("absolute")

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array
 from parameterize.quality.quality import arap
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
+from solve.field import Points
 from solve.forms.frame import UnitFrame
 
 if TYPE_CHECKING:
     from solve import SplineField
-
-    from ..options import Equation
+    from solve.forms.problem import BoundaryValueProblem
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 
@@ -61,23 +61,22 @@ def solution_on(solution: SplineField, grid: Grid) -> Array:
     return values if values.ndim == 2 else np.asarray(np.linalg.norm(values, axis=-1))
 
 
-def error_at(found: Array, problem: Equation, points: Array) -> Array:
-    """Return |u - u_h| at points (..., 3). found: u_h there, (...), or vectors (..., 3)."""
-    exact, _ = problem.exact_at(np.moveaxis(points, -1, 0))
-    if found.ndim < points.ndim:
+def error_at(found: Array, problem: BoundaryValueProblem, x: Points) -> Array:
+    """Return |u - u_h| at points x (3, ...). found: u_h there, (...), or vectors (..., 3)."""
+    exact, _ = problem.exact_at(x)
+    if found.ndim < x.ndim:
         return np.abs(found - exact[0])
     return np.asarray(np.linalg.norm(found - np.moveaxis(exact, 0, -1), axis=-1))
 
 
 def sampled_error(
-    volume: BSplineVolume, solution: SplineField, problem: Equation, samples: int
+    volume: BSplineVolume, solution: SplineField, problem: BoundaryValueProblem, samples: int
 ) -> tuple[list[Array], list[Array]]:
     """Return points (samples, samples, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
     problem = problem.on(volume)
     grids = all_grids(samples)
-    points = [points_on(volume, grid) for grid in grids]
-    found = [_flat(solution.grid(*grid)) for grid in grids]
-    return points, [error_at(values, problem, where) for values, where in zip(found, points, strict=True)]
+    errors = [error_at(solution.grid(*grid), problem, Points.on(volume, *grid)) for grid in grids]
+    return [points_on(volume, grid) for grid in grids], [_flat(values) for values in errors]
 
 
 def face_labels() -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from .evaluate import SECTIONS, all_grids, distortions, face_window, points_on
 from .render import Patch, draw, plain_patch, view_of
 from .style import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, show_section
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 EVERY = 14  # samples between two parameter lines: a tenth of the cube
 DISTORTION = "tanh(√ARAP / 2), at volume 1"
 SHARES = ColorRange(0.0, 1.0)  # of the distortion
@@ -24,28 +28,28 @@ WINDOW = 0.15  # of the cube, on every side of a meeting place
 MEETING_COLORS = ("#4477aa", "#ee6677")
 
 
-def draw_faces(path: Path, volume: BSplineVolume, marks: Array | None = None) -> None:
+def draw_faces(path: Path | None, volume: BSplineVolume, marks: Array | None = None) -> Figure:
     """Draw the images of the six faces of the cube, each in its colour, from the front and from behind.
 
     marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    _draw_around(path, patches_of(volume, SAMPLES)[:6], "Images of the six faces of the unit cube", marks)
+    return _draw_around(path, patches_of(volume, SAMPLES)[:6], "Images of the six faces of the unit cube", marks)
 
 
-def draw_lines(path: Path, volume: BSplineVolume) -> None:
+def draw_lines(path: Path | None, volume: BSplineVolume) -> Figure:
     """Draw lines of constant parameters, a tenth apart, on the images of the six faces, from the front and behind."""
-    _draw_around(path, patches_of(volume, SAMPLES, EVERY)[:6], "Lines of constant u, v, w, a tenth apart")
+    return _draw_around(path, patches_of(volume, SAMPLES, EVERY)[:6], "Lines of constant u, v, w, a tenth apart")
 
 
-def _draw_around(path: Path, patches: list[Patch], title: str, marks: Array | None = None) -> None:
+def _draw_around(path: Path | None, patches: list[Patch], title: str, marks: Array | None = None) -> Figure:
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, patches, marks)
     name_faces(figure)
     figure.suptitle(title, fontsize=14)
-    save(figure, path)
+    return save(figure, path)
 
 
-def draw_cut(path: Path, volume: BSplineVolume) -> None:
+def draw_cut(path: Path | None, volume: BSplineVolume) -> Figure:
     """Draw the volume without one octant of the cube (the paper's Fig. 9): parameter lines, and the distortion.
 
     The octant and the view are those that show most of the cut.
@@ -62,10 +66,10 @@ def draw_cut(path: Path, volume: BSplineVolume) -> None:
     name_faces(figure)
     color_bar(figure, panels, SHARES, DISTORTION)
     figure.suptitle(f"Cut open: the octant {octant_label(octant)} is left out", fontsize=14)
-    save(figure, path)
+    return save(figure, path)
 
 
-def draw_distortion(path: Path, volume: BSplineVolume) -> None:
+def draw_distortion(path: Path | None, volume: BSplineVolume) -> Figure:
     """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2."""
     figure, (panels,) = panels_of(1, 3)
     grids = all_grids(SAMPLES)[6:]
@@ -73,18 +77,18 @@ def draw_distortion(path: Path, volume: BSplineVolume) -> None:
         show_section(panel, title, points_on(volume, grid), colors(values, SHARES))
     color_bar(figure, panels, SHARES, DISTORTION)
     figure.suptitle("Distortion on the mid-sections", fontsize=14)
-    save(figure, path)
+    return save(figure, path)
 
 
-def draw_folds(path: Path, volume: BSplineVolume, places: Array) -> None:
+def draw_folds(path: Path | None, volume: BSplineVolume, places: Array) -> Figure:
     """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J > 0 is not proved."""
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, _glass(volume), places)
     figure.suptitle(f"det J > 0 is not proved on {len(places)} spans: black balls", fontsize=14)
-    save(figure, path)
+    return save(figure, path)
 
 
-def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
+def draw_meeting(path: Path | None, volume: BSplineVolume, meeting: Meeting) -> Figure:
     """Draw the place where the boundary meets itself: on the whole boundary, and the two parts there from two sides."""
     mark = np.array([meeting.point])
     windows = [points_on(volume, face_window(parameter, WINDOW, SAMPLES)) for parameter in meeting.parameters]
@@ -95,7 +99,7 @@ def draw_meeting(path: Path, volume: BSplineVolume, meeting: Meeting) -> None:
     panels[0].set_title("whole boundary", fontsize=13)
     show_around(panels[1:], parts, mark)
     figure.suptitle("The boundary meets itself at the black ball; the two parts near it", fontsize=14)
-    save(figure, path)
+    return save(figure, path)
 
 
 def _glass(volume: BSplineVolume) -> list[Patch]:

@@ -14,12 +14,13 @@ from .render import Patch
 from .style import SAMPLES, color_bar, colors, panels_of, save, show_around, show_section
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from solve import Solution
+    from solve.forms.problem import BoundaryValueProblem
 
-    from ..options import Equation
 
-
-def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: Equation) -> None:
+def draw_error(path: Path | None, volume: BSplineVolume, solution: Solution, problem: BoundaryValueProblem) -> Figure:
     """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms."""
     points, errors = sampled_error(volume, solution, problem, SAMPLES)
     limits = error_range([errors])
@@ -31,12 +32,12 @@ def draw_error(path: Path, volume: BSplineVolume, solution: Solution, problem: E
         show_section(panel, title, where, colors(values, limits))
     color_bar(figure, rows, limits, r"$|u - u_h|$")
     figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
-    save(figure, path)
+    return save(figure, path)
 
 
 def draw_values(
-    path: Path, volume: BSplineVolume, solution: Solution, title: str, *, exaggerate: float | None = None
-) -> None:
+    path: Path | None, volume: BSplineVolume, solution: Solution, title: str, *, exaggerate: float | None = None
+) -> Figure:
     """Draw u_h, or the length of a vector u_h, on the boundary, from the front and from behind.
 
     exaggerate: draw the body displaced by that many times u_h, a vector.
@@ -51,7 +52,7 @@ def draw_values(
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, [Patch(p, colors(v, limits)) for p, v in zip(points, values, strict=True)])
     color_bar(figure, panels, limits, title)
-    save(figure, path)
+    return save(figure, path)
 
 
 def _write_numbers(panel: Any, solution: Solution) -> None:

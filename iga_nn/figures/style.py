@@ -24,9 +24,9 @@ PANEL = (900, 700)  # pixels of one view
 
 def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
     """Return a figure and its axes outside pyplot: it need not be closed and asks for no window system."""
-    from matplotlib.figure import Figure
+    from .picture import Picture
 
-    figure = Figure(figsize=inches, dpi=110, layout="constrained")
+    figure = Picture(figsize=inches, dpi=110, layout="constrained")
     return figure, figure.subplots(rows, columns, **grid)
 
 
@@ -95,7 +95,9 @@ def positive(values: NDArray[Any]) -> Array:
     return np.where(numbers > 0.0, numbers, np.nan)
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write the figure as PNG or PDF, by the ending of the path; atomic."""
-    with replacing(path) as temporary:
-        figure.savefig(temporary)
+def save(figure: Figure, path: Path | None) -> Figure:
+    """Write the figure as PNG or PDF, by the ending of the path, and return it; atomic. None: only return it."""
+    if path is not None:
+        with replacing(path) as temporary:
+            figure.savefig(temporary)
+    return figure

@@ -40,25 +40,25 @@ WEIGHTS_ALIKE = 1e-12  # relative
 def write_gismo(path: Path, spline: BSplineVolume | SplineField, *_: object) -> None:
     """Write a volume or a solution as G+Smo XML; what else is known of it has no place there."""
     splinepy = _splinepy()
-    patches = splinepy.Multipatch([_to_splinepy(spline)])
+    patches = splinepy.Multipatch([to_splinepy(spline)])
     patches.interfaces = np.full((1, 6), -1)  # no neighbours: splinepy cannot look for those of scalar splines
     splinepy.io.gismo.export(str(path), patches)
 
 
 def write_json(path: Path, spline: BSplineVolume | SplineField, *_: object) -> None:
     """Write a volume or a solution as splinepy's JSON; what else is known of it has no place there."""
-    _splinepy().io.json.export(str(path), [_to_splinepy(spline)])
+    _splinepy().io.json.export(str(path), [to_splinepy(spline)])
 
 
 def write_mfem(path: Path, volume: BSplineVolume, solution: SplineField | None = None, *_: object) -> None:
     """Write a volume as an MFEM NURBS mesh, on the knots of the solution where there is one."""
     shown = volume if solution is None else _on_knots_of(solution, volume)
-    _splinepy().io.mfem.export(str(path), _to_splinepy(shown).nurbs)
+    _splinepy().io.mfem.export(str(path), to_splinepy(shown).nurbs)
 
 
 def write_mfem_field(path: Path, field: SplineField) -> None:
     """Write a solution as an MFEM grid function on the mesh of a volume with the same degrees and knots."""
-    spline = _to_splinepy(field)
+    spline = to_splinepy(field)
     order, _ = _splinepy().io.mfem.dof_mapping(spline)
     values = np.asarray(spline.control_points)[order]  # (m, 1) or (m, 3)
     head = ["FiniteElementSpace", "FiniteElementCollection: NURBS", f"VDim: {values.shape[1]}", "Ordering: 1", ""]
@@ -89,7 +89,7 @@ def read(path: Path, kind: str) -> BSplineVolume:
     try:
         text = checked_text(path, kind)
         spline = _load(splinepy, text, kind)
-        return _from_splinepy(spline)
+        return from_splinepy(spline)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
@@ -105,7 +105,10 @@ def _load(splinepy: Any, text: str, kind: str) -> Any:
             raise ValueError(f"splinepy finds no spline in it ({one_line(error) or type(error).__name__})") from None
 
 
-def _from_splinepy(spline: Any) -> BSplineVolume:
+def from_splinepy(spline: Any) -> BSplineVolume:
+    """Return the volume of a trivariate B-spline of splinepy. Raises TypeError for no spline, ValueError for others."""
+    if not isinstance(spline, _splinepy().Spline):
+        raise TypeError(f"spline must be one of splinepy's, got {type(spline).__name__}")
     if spline.para_dim != 3 or spline.dim != 3:
         raise ValueError(f"maps {spline.para_dim} parameters to {spline.dim} coordinates; a volume maps 3 to 3")
     full = spline.nurbs  # of every kind of spline
@@ -127,12 +130,13 @@ def _splinepy() -> Any:
     try:
         import splinepy
     except ImportError:
-        raise InputError(f"this format is read and written through splinepy, which is missing: {INSTALL}") from None
+        raise InputError(f"splinepy is needed for this and is missing: {INSTALL}") from None
     logging.getLogger("splinepy").setLevel("ERROR")  # it warns that one patch has no neighbours
     return splinepy
 
 
-def _to_splinepy(spline: BSplineVolume | SplineField) -> Any:
+def to_splinepy(spline: BSplineVolume | SplineField) -> Any:
+    """Return a splinepy.BSpline of the same degrees, knots and coefficients. Raises InputError without splinepy."""
     net = spline.control_points if isinstance(spline, BSplineVolume) else spline.coefficients
     rows = net.transpose(2, 1, 0, *range(3, net.ndim)).reshape(np.prod(net.shape[:3]), -1)  # u fastest
     return _splinepy().BSpline(list(spline.degrees), [knots.tolist() for knots in spline.knots], rows)

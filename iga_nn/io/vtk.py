@@ -29,11 +29,14 @@ from parameterize.quality.quality import arap
 from parameterize.spline.bernstein import elevation, extraction
 from parameterize.spline.bspline import apply_along, divided_spans, insert_knots, sparse_rows
 from parameterize.spline.volume import BSplineVolume
+from solve.field import Points
 from solve.forms.frame import UnitFrame
 
 from ..figures.evaluate import error_at
 
 if TYPE_CHECKING:
+    import pyvista
+
     from solve.field import SplineField
 
     from ..options import Equation
@@ -44,6 +47,31 @@ BEZIER_HEXAHEDRON = 79
 
 def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None = None, *_: object) -> None:
     """Write the exact cells; a solution becomes the point data `u`."""
+    _write(path, _exact(volume, solution))
+
+
+def write_view(
+    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Equation | None = None
+) -> None:
+    """Write samples of the map, the solution and, where its problem has an exact solution, the error."""
+    _write(path, _sampled(volume, solution, problem, SAMPLES))
+
+
+def grid(
+    volume: BSplineVolume,
+    solution: SplineField | None = None,
+    problem: Equation | None = None,
+    samples: int | None = None,
+) -> pyvista.UnstructuredGrid:
+    """Return a volume, and a solution on it, as a grid of pyvista: exact cells, or `samples` linear ones a span."""
+    if samples is None:
+        return _exact(volume, solution)
+    if samples < 1:
+        raise ValueError(f"samples {samples}: must be 1 or larger, or None for exact Bezier cells")
+    return _sampled(volume, solution, problem, samples)
+
+
+def _exact(volume: BSplineVolume, solution: SplineField | None) -> pyvista.UnstructuredGrid:
     import pyvista
 
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
@@ -60,27 +88,26 @@ def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None
     if solution is not None:
         values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)
         grid.point_data["u"] = values.reshape(-1, *values.shape[3:])
-    _write(path, grid)
+    return grid
 
 
-def write_view(
-    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Equation | None = None
-) -> None:
-    """Write samples of the map, the solution and, where its problem has an exact solution, the error."""
+def _sampled(
+    volume: BSplineVolume, solution: SplineField | None, problem: Equation | None, samples: int
+) -> pyvista.UnstructuredGrid:
     import pyvista
 
-    u, v, w = (divided_spans(knots, SAMPLES) for knots in volume.knots)
-    points = volume.grid(u, v, w)  # (m_u, m_v, m_w, 3)
+    u, v, w = (divided_spans(knots, samples) for knots in volume.knots)
+    points = Points.on(volume, u, v, w)  # (3, m_u, m_v, m_w)
     jacobians = volume.grid_jacobian(u, v, w)
     fields = {"arap": arap(jacobians / UnitFrame.of(volume).length), "det J": np.linalg.det(jacobians)}
     if solution is not None:
         fields["u"] = solution.grid(u, v, w)
-        if problem is not None:
+        if problem is not None and problem.exact is not None:
             fields["error"] = error_at(fields["u"], problem.on(volume), points)
-    grid = pyvista.StructuredGrid(*np.moveaxis(points, -1, 0)).cast_to_unstructured_grid()
+    grid = pyvista.StructuredGrid(*np.asarray(points)).cast_to_unstructured_grid()
     for name, values in fields.items():
         grid.point_data[name] = values.reshape((-1, *values.shape[3:]), order="F")  # VTK counts the first index fastest
-    _write(path, grid)
+    return grid
 
 
 def _bernstein(

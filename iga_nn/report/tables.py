@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..levels import ESTIMATES, TITLES, number
@@ -23,6 +24,13 @@ def rows_of(study: Study) -> list[dict[str, Any]]:
             given |= {"degree": degree, "rate_l2": level.rate_l2, "rate_h1": level.rate_h1}
             found.append({name: given.get(name) for name in COLUMNS})
     return found
+
+
+def as_rows(levels: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Return the titles of the numbers that are known of some levels, then a row of texts a level; none for none."""
+    keys = [key for key in TITLES if any(level.get(key) is not None for level in levels)]
+    rows = [[number(key, level.get(key)) for key in keys] for level in levels]
+    return [[TITLES[key] for key in keys], *rows] if rows else []
 
 
 def as_csv(study: Study) -> str:

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
+from ..display import Shown
 from ..spline.bernstein import split
 from ..spline.volume import BSplineVolume
 from .determinant import CHUNK, DeterminantForm, corners_of
@@ -20,7 +21,7 @@ _TIGHT = 0.5  # a proved bound below this share of the least known value of det 
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(Shown):
     """What is known about the sign of det J.
 
     Attributes

@@ -11,6 +11,7 @@ from ..arrays import Array, in_brackets
 from ..certificate.boundary import BoundaryCheck
 from ..certificate.jacobian import Certificate
 from ..cube.boundary_map import BoundaryMap
+from ..display import Shown
 from ..spline.bspline import gauss_points
 from ..spline.volume import BSplineVolume
 from .distances import SAMPLES, Distances, SampledBoundary, to_boundary, to_mesh
@@ -39,7 +40,7 @@ class BothScales(Generic[Measure]):  # noqa: UP046 - the new syntax needs Python
 
 
 @dataclass(frozen=True)
-class QualityReport:
+class QualityReport(Shown):
     """The `parameterization` section of report.json.
 
     Each measure has `unit_volume`, the model brought to volume 1, and `as_given`, in the user's units.

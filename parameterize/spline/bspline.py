@@ -192,6 +192,14 @@ def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
     return np.moveaxis(flat.reshape(-1, *moved.shape[1:]), 0, axis)
 
 
+def interpolate_along(knots: Array, degree: int, values: Array, axis: int) -> Array:
+    """Return the coefficients along one axis of the spline that has `values` (..., n, ...) at the Greville points."""
+    from scipy.interpolate import make_interp_spline
+
+    moved = np.moveaxis(values, axis, 0)
+    return np.moveaxis(make_interp_spline(greville(knots, degree), moved, degree, knots).c, 0, axis)
+
+
 def evaluate_at(
     degrees: Sequence[int],
     knots: Sequence[Array],

@@ -1,24 +1,32 @@
 """BSplineVolume: a trivariate tensor-product B-spline F from the unit cube to space (paper, eq. 1)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array
+from ..display import Shown, above
 from ..files import load_arrays, save_arrays
 from .bspline import (
     apply_along,
     check_knots,
     evaluate_at,
     evaluate_grid,
+    greville,
     insert_knots,
+    interpolate_along,
     midpoints,
     open_uniform_knots,
     real_array,
 )
+
+if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.figure import Figure
 
 AXES = "uvw"
 FACE_NAMES = ("u0", "u1", "v0", "v1", "w0", "w1")
@@ -60,7 +68,7 @@ def load_spline(path: str | Path, content: str) -> tuple[tuple[int, int, int], K
 
 
 @dataclass(frozen=True, eq=False)
-class BSplineVolume:
+class BSplineVolume(Shown):
     """A trivariate B-spline.
 
     Parameters
@@ -116,6 +124,61 @@ class BSplineVolume:
         points = real_array(control_points, "control_points")
         knots = tuple(open_uniform_knots(n, degree) for n in points.shape[:3])
         return cls((degree, degree, degree), knots, points)  # type: ignore[arg-type]
+
+    @classmethod
+    def from_function(
+        cls, function: Callable[..., Any], control_points: int | Sequence[int] = 8, degree: int = 3
+    ) -> "BSplineVolume":
+        """Make the volume that equals x, y, z = function(u, v, w) at the Greville points, on equal spans.
+
+        function: takes three arrays of one shape, 0 to 1, and returns three: arrays of that shape, or numbers.
+        control_points: how many, one number or one a direction. A polynomial of that degree a direction is met exactly.
+        Raises ValueError where the values are not finite or not three, or the control points too few for the degree.
+        """
+        counts = np.broadcast_to(control_points, 3).tolist()
+        knots = tuple(open_uniform_knots(n, degree) for n in counts)
+        grid = np.meshgrid(*[greville(row, degree) for row in knots], indexing="ij")
+        values = function(*grid)
+        if len(values) != 3:
+            raise ValueError(f"function must return three values, x, y and z; it returned {len(values)}")
+        parts = [real_array(value, "values of function") for value in values]
+        if any(part.shape not in ((), tuple(counts)) for part in parts):
+            raise ValueError(f"function must return arrays of shape {tuple(counts)} or numbers")
+        net = np.stack([np.broadcast_to(part, counts) for part in parts], axis=-1)
+        if not np.all(np.isfinite(net)):
+            raise ValueError("function must return finite numbers for all u, v, w from 0 to 1")
+        for axis in range(3):
+            net = interpolate_along(knots[axis], degree, net, axis)
+        return cls((degree, degree, degree), knots, net)  # type: ignore[arg-type]
+
+    @classmethod
+    def from_splinepy(cls, spline: Any) -> "BSplineVolume":
+        """Make the volume of a spline of splinepy, its knots scaled to run from 0 to 1; the map stays.
+
+        Raises TypeError for another object, ValueError for a spline that is rational or does not map 3 parameters to 3
+        coordinates.
+        """
+        return above("io.splinepy").from_splinepy(spline)
+
+    def to_splinepy(self) -> Any:
+        """Return the same map as a splinepy.BSpline. Raises InputError where splinepy is missing."""
+        return above("io.splinepy").to_splinepy(self)
+
+    def to_pyvista(self, samples: int | None = None) -> "pyvista.UnstructuredGrid":
+        """Return the volume as a grid of pyvista: exact Bezier cells, or linear cells.
+
+        samples: None for the exact cells, one a knot span; else the number of linear cells a span and direction, with
+        the distortion `arap` and `det J` as point data. VTK's slices, clips and contours are right on these alone.
+        """
+        return above("io.vtk").grid(self, samples=samples)
+
+    def plot(self, what: str = "faces", file: str | Path | None = None) -> "Figure":
+        """Return a figure of the volume, drawn off screen; report.html shows the same.
+
+        what: "faces", "lines", "cut" or "distortion". file: PNG to write the figure to, too.
+        Raises ValueError for another name, RuntimeError where VTK cannot draw on this machine.
+        """
+        return above("figures.plot").plot_volume(self, what, file)
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -1,0 +1,117 @@
+"""Lays out what a notebook shows of a result: its facts as a table, without pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from functools import singledispatch
+from html import escape
+from typing import Any
+
+from parameterize.arrays import Array, in_brackets
+from parameterize.certificate.jacobian import Certificate
+from parameterize.quality.quality import BothScales, QualityReport
+from parameterize.spline.bspline import breakpoints
+from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.surface import Surface
+from solve.solution import Solution
+from solve.study import Convergence
+
+from . import document as reports
+from .tables import as_rows
+
+
+@singledispatch
+def as_html(result: object) -> str:
+    """Return the table of a surface, volume, certificate, quality, solution or convergence study as HTML."""
+    raise TypeError(f"there is no table of a {type(result).__name__}")
+
+
+@as_html.register
+def _surface(surface: Surface) -> str:
+    facts = [
+        ("vertices", f"{len(surface.vertices):,}"),
+        ("faces", f"{len(surface.faces):,}"),
+        ("volume", f"{surface.volume:.6g}"),
+        ("from, to", _ends(*surface.bbox)),
+        *(("notice", line) for line in surface.notices),
+    ]
+    return _table(f"Surface {surface.name}, accepted", facts)
+
+
+@as_html.register
+def _volume(volume: BSplineVolume) -> str:
+    net = volume.control_points.reshape(-1, 3)
+    facts = [
+        ("control points", _times(volume.shape)),
+        ("degrees", ", ".join(map(str, volume.degrees))),
+        ("knot spans", _times([len(breakpoints(row)) - 1 for row in volume.knots])),
+        ("lies within", _ends(net.min(axis=0), net.max(axis=0))),
+    ]
+    return _table("Spline volume", facts)
+
+
+@as_html.register
+def _certificate(certificate: Certificate) -> str:
+    facts = [("volume", f"{certificate.mean_det:.6g}")]
+    if certificate.verdict == "certified":
+        facts.append(("det J is at least", f"{certificate.lower_bound:.3g} of its mean"))
+    if len(certificate.unproved):
+        facts.append(("not proved", f"on {len(certificate.unproved)} knot spans"))
+    if certificate.witness is not None:
+        facts.append(("folded at u, v, w", in_brackets(certificate.witness)))
+    return _table(f"det J > 0: {certificate.verdict}", facts)
+
+
+@as_html.register
+def _quality(quality: QualityReport) -> str:
+    answer = reports.one_to_one({"parameterization": quality.as_dict()})
+    rows = [
+        ("ARAP distortion: mean, max", *_both(quality.arap)),
+        ("boundary at the mesh's vertices: rms, mean, max", *_both(quality.boundary)),
+        ("mesh to spline: rms, mean, max", *_both(quality.mesh_to_spline)),
+        ("spline to mesh: rms, mean, max", *_both(quality.spline_to_mesh)),
+    ]
+    title = f"det J > 0: {quality.certificate.verdict}; one-to-one: {answer}"
+    return _table(title, rows, head=("", "at volume 1", "as given"))
+
+
+@as_html.register
+def _solution(solution: Solution) -> str:
+    report = solution.report
+    head, *rows = as_rows([report.as_dict()])
+    title = "Solution" if report.converged else f"Solution, NOT CONVERGED (residual {report.residual:.1e})"
+    return _table(title, rows, head) + _list(report.notices)
+
+
+@as_html.register
+def _study(study: Convergence) -> str:
+    levels = [row.report.as_dict() | {"rate_l2": row.rate_l2, "rate_h1": row.rate_h1} for row in study]
+    head, *rows = as_rows(levels) or [[]]
+    notices = dict.fromkeys(line for row in study for line in row.report.notices)
+    return _table("Convergence", rows, head) + _list(notices)
+
+
+def _both(measure: BothScales[Any]) -> list[str]:
+    return [", ".join(f"{value:.4g}" for value in asdict(m).values()) for m in (measure.unit_volume, measure.as_given)]
+
+
+def _times(counts: Sequence[int]) -> str:
+    return " × ".join(map(str, counts))
+
+
+def _ends(low: Array, high: Array) -> str:
+    return f"{in_brackets(low)} to {in_brackets(high)}"
+
+
+def _table(title: str, rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
+    lines = [f"<table><caption>{escape(title)}</caption>"]
+    if head:
+        lines.append("<tr>" + "".join(f"<th>{escape(text)}</th>" for text in head) + "</tr>")
+    lines += ["<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows]
+    return "\n".join([*lines, "</table>"])
+
+
+def _list(texts: Iterable[str]) -> str:
+    items = "".join(f"<li>{escape(text)}</li>" for text in texts)
+    return f"<ul>{items}</ul>" if items else ""
