@@ -17,7 +17,8 @@ from matplotlib.figure import Figure
 
 import iga_nn
 
-COLUMNS = ("surface", "bijective", "arap", "boundary_rms", "l2", "seconds")
+ERRORS = ("l2_relative", "l2", "h1_relative", "h1_seminorm")
+COLUMNS = ("surface", "bijective", "arap", "boundary_rms", *ERRORS, "seconds")
 
 
 def row_of(name: str, folder: Path, mapping: iga_nn.MapOptions | None) -> dict[str, Any]:
@@ -33,7 +34,7 @@ def row_of(name: str, folder: Path, mapping: iga_nn.MapOptions | None) -> dict[s
         "bijective": quality["bijective"],
         "arap": quality["arap"]["unit_volume"]["mean"],
         "boundary_rms": quality["boundary"]["unit_volume"]["rms"],
-        "l2": report["poisson"]["levels"][-1]["l2_relative"],
+        **{name: report["poisson"]["levels"][-1][name] for name in ERRORS},
         "seconds": report["seconds"]["total"],
     }
 
@@ -41,7 +42,8 @@ def row_of(name: str, folder: Path, mapping: iga_nn.MapOptions | None) -> dict[s
 def draw(path: Path, rows: list[dict[str, Any]]) -> None:
     """Distortion, distance and error of each surface that was taken; bars of what is not certified are pale."""
     figure = Figure(figsize=(9, 3.2), dpi=110, layout="constrained")
-    titles = {"arap": "ARAP, unit volume", "boundary_rms": "boundary distance, unit volume", "l2": "relative L2 error"}
+    titles = {"arap": "ARAP, unit volume", "boundary_rms": "boundary distance, unit volume"}
+    titles |= {"l2_relative": "relative L2 error"}
     for axes, (column, title) in zip(figure.subplots(1, 3), titles.items(), strict=True):
         for row in rows:
             alpha = 1.0 if row["bijective"] == "certified" else 0.35

@@ -39,16 +39,18 @@ def main(files: tuple[str, ...] = (), out: str | Path = "out/compare", refine: i
         volumes = {"twisted cube": good, "inside pushed aside": disturbed(good)}
     figure = Figure(figsize=(6.4, 4.2), dpi=110, layout="constrained")
     axes = figure.subplots()
-    print(f"{'':24s} certificate  ARAP mean      max  iterations  L2 error")
+    print(f"{'':24s} certificate  ARAP mean      max  iterations  relative L2      L2  relative H1      H1")
     for name, volume in volumes.items():
         _, values, weights = arap_grid(volume)
         report = iga_nn.solve(volume, PROBLEM, refine=refine).report
         mean = float(np.sum(weights * values) / np.sum(weights))
-        numbers = f"{mean:9.4f}{values.max():9.3f}{report.iterations:12d}{report.l2:10.2e}"
+        errors = f"{report.l2_relative:13.2e}{report.l2:10.2e}{report.h1_relative:11.2e}{report.h1_seminorm:10.2e}"
+        numbers = f"{mean:9.4f}{values.max():9.3f}{report.iterations:12d}{errors}"
         print(f"{name:24s} {iga_nn.certify(volume).verdict:11s} {numbers}")
         order = np.argsort(values, axis=None)
         share = np.cumsum(weights.ravel()[order]) / np.sum(weights)
-        axes.plot(values.ravel()[order], share, label=f"{name}: mean {mean:.3f}, L2 error {report.l2:.1e}")
+        label = f"{name}: mean {mean:.3f}, relative L2 error {report.l2_relative:.1e}"
+        axes.plot(values.ravel()[order], share, label=label)
     axes.set(xscale="log", xlabel="ARAP distortion", ylabel="share of the cube below it", title="Two maps of one solid")
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, loc="upper left", fontsize=9)

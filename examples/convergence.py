@@ -43,18 +43,18 @@ def raise_degree(degrees: tuple[int, ...], halvings: int = 2) -> dict[str, Study
 
 
 def draw_orders(path: Path, orders: dict[str, Study]) -> None:
-    """L2 error over the number of unknowns, the degree beside each point."""
+    """Relative L2 error over the number of unknowns, the degree beside each point."""
     figure = Figure(figsize=(6.5, 5), dpi=110, layout="constrained")
     axes = figure.subplots()
     for (name, study), marker in zip(orders.items(), "os", strict=True):
         reports = [rows[0].report for rows in study.values()]
-        axes.loglog([r.dofs for r in reports], [r.l2 for r in reports], f"{marker}-", label=name)
+        axes.loglog([r.dofs for r in reports], [r.l2_relative for r in reports], f"{marker}-", label=name)
         for degree, report in zip(study, reports, strict=True):
-            axes.annotate(f"{degree}", (report.dofs, report.l2), (6, 4), textcoords="offset points")
+            axes.annotate(f"{degree}", (report.dofs, report.l2_relative), (6, 4), textcoords="offset points")
     axes.set_xticks([300, 1000, 3000], ["300", "1000", "3000"])
     axes.minorticks_off()
     axes.set_xlabel("unknowns")
-    axes.set_ylabel("L2 error")
+    axes.set_ylabel("relative L2 error")
     axes.set_title("Raising the degree (at the points) on a fixed mesh")
     axes.grid(alpha=0.3, which="both")
     axes.legend(frameon=False)

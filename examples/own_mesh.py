@@ -35,7 +35,8 @@ def main(
     report = iga_nn.run("poisson", mesh, folder, mapping=mapping, force=True).report
     print("certificate:", report["parameterization"]["bijective"])
     for level in report["poisson"]["levels"]:
-        print(f"{level['dofs']} unknowns, L2 error {level['l2']:.3e}")
+        relative = f"relative error {level['l2_relative']:.3e} in L2, {level['h1_relative']:.3e} in H1"
+        print(f"{level['dofs']} unknowns, {relative} ({level['l2']:.3e}, {level['h1_seminorm']:.3e} absolute)")
     print("open", folder / "report.html")
     return folder / "distortion.png"
 

@@ -62,6 +62,8 @@ def test_page_says_the_verdict_the_numbers_and_the_command(result):
     report = json.loads((result / "report.json").read_text())
     text = (result / "report.html").read_text(encoding="utf-8")
     finest = report["poisson"]["levels"][-1]
+    for norm, relative in (("l2", "Relative L2"), ("h1_seminorm", "Relative H1")):
+        assert re.search(rf"{relative} error</dt><dd>[\d.e-]+</dd><small>absolute {finest[norm]:.3e}</small>", text)
     for expected in (VERDICT, f"{finest['l2']:.3e}", f"{report['poisson']['rates']['l2'][0]:.2f}", "x*y*z"):
         assert expected in text
     assert text.index(VERDICT) < text.index("Convergence") < text.index("--exact")

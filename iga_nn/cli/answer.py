@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..levels import ESTIMATES, TITLES
+from ..levels import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..workflow.output_folder import Outcome
 from .exit_codes import DONE, NOT_CERTIFIED, NOT_SOLVED
 
-SHOWN_ERRORS = ("l2_relative", "l2", *ESTIMATES)
+SHOWN_ERRORS = (*EXACT_ERRORS, *ESTIMATES)
 
 
 def exit_code(report: reports.Report) -> int:

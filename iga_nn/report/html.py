@@ -15,16 +15,23 @@ from typing import TYPE_CHECKING, Any
 from parameterize.files import save_text
 
 from ..errors import one_line
-from ..levels import TITLES, capitalized, number
+from ..levels import TITLES, capitalized
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, SOLVED, figures_of
 from .document import Report
+from .tables import as_rows
 
 if TYPE_CHECKING:
     from .viewer import Scene
 
 log = logging.getLogger(__name__)
+
+ERRORS = (  # keys of a level: the absolute error, and the relative one that stands before it
+    ("l2", "l2_relative"),
+    ("h1_seminorm", "h1_relative"),
+    ("error_estimate", "error_estimate_relative"),
+)
 
 MEANINGS = {
     "certified": "det J > 0 is proved on the whole cube, rounding errors included.",
@@ -133,27 +140,24 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
         facts.append(("Boundary distance", f"{boundary['unit_volume']['rms']:.3g}", given))
     if levels := reports.solved(report).get("levels"):
         finest = levels[-1]
-        facts += [_error_fact(finest, key) for key in ("l2", "error_estimate") if finest.get(key) is not None]
+        facts += [_error_fact(finest, *keys) for keys in ERRORS if finest.get(keys[0]) is not None]
         facts.append(("Unknowns", f"{finest['dofs']:,}", f"{finest['iterations']} iterations"))
     points = " × ".join(map(str, quality["control_points"]))
     return [*facts, ("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"])))]
 
 
-def _error_fact(level: Report, key: str) -> tuple[str, str, str]:
+def _error_fact(level: Report, absolute: str, relative: str) -> tuple[str, str, str]:
     """Return the relative error with the absolute one as the remark; where the solution is zero, that alone."""
-    relative = level.get(f"{key}_relative")
-    if relative is None:
-        return capitalized(TITLES[key]), f"{level[key]:.3e}", "on the finest mesh"
-    return capitalized(TITLES[f"{key}_relative"]), f"{relative:.3e}", f"absolute {level[key]:.3e}"
+    if level.get(relative) is None:
+        return capitalized(TITLES[absolute]), f"{level[absolute]:.3e}", "on the finest mesh"
+    return capitalized(TITLES[relative]), f"{level[relative]:.3e}", f"absolute {level[absolute]:.3e}"
 
 
 def _levels(section: Report) -> list[list[str]]:
     """Return the table of levels: the titles of the numbers that are known, then a row a level."""
     levels = section.get("levels", [])
     rates = {f"rate_{norm}": [None, *values] for norm, values in section.get("rates", {}).items()}
-    rows = [level | {name: values[i] for name, values in rates.items()} for i, level in enumerate(levels)]
-    keys = [key for key in TITLES if any(row.get(key) is not None for row in rows)]
-    return [[TITLES[key] for key in keys], *([number(key, row.get(key)) for key in keys] for row in rows)] * bool(rows)
+    return as_rows([level | {name: values[i] for name, values in rates.items()} for i, level in enumerate(levels)])
 
 
 def _notices(report: Report) -> list[str]:
