@@ -86,6 +86,12 @@ FETCHED = """(async () => {
   const bytes = new Uint8Array(await (await fetch(link.href)).arrayBuffer());
   return btoa(String.fromCharCode(...bytes));
 })()"""
+CLICKED = """(() => {
+  const view = document.querySelector("iframe").contentDocument.getElementById("view");
+  const box = view.getBoundingClientRect();
+  const middle = {clientX: box.left + box.width / 2, clientY: box.top + box.height / 2, bubbles: true};
+  view.dispatchEvent(new MouseEvent("click", middle));
+})()"""
 REPORT = "document.querySelector('iframe')?.contentDocument?.body?.innerText"
 
 
@@ -102,6 +108,7 @@ async def walk(chromium, port, folder, capsys):
         await seen_by_another_tab(second)
         await trained(first, folder)
         await finished(first, folder)
+        await another_problem(first)
         await stopped(second)
         await first.click("cube.obj\nstopped")  # away from the report
         await first.sees("Resume continues")
@@ -163,6 +170,18 @@ async def finished(tab, folder):
     (folder / "volume.npz").write_bytes(base64.b64decode(await tab.value(FETCHED)))
     assert load_volume(folder / "volume.npz").shape == (6, 6, 6)
     await shows_faces(tab, folder / "done.png")
+
+
+async def another_problem(tab):
+    """A face clicked in the report's picture is chosen in the form; the problem is solved on the same volume."""
+    await tab.value(CLICKED)
+    await tab.until("document.querySelectorAll('form [type=checkbox]:checked').length === 1")
+    chosen = (await tab.value("document.querySelector('form [type=checkbox]:checked').name")).removeprefix("face ")
+    assert f"Face {chosen}: " in await tab.value(REPORT)
+    await tab.value("document.querySelector('form [name=kappa]').value = '1+X*X'")
+    await tab.click("Solve")
+    await tab.until(f"{REPORT}?.includes('iga-nn solve poisson')", PATIENCE)
+    assert f"--kappa '1+X*X' --neumann {chosen}\n" in await tab.value(REPORT)
 
 
 async def shows_faces(tab, path, seconds=30.0):

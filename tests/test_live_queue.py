@@ -80,6 +80,23 @@ def test_one_runs_at_a_time_and_the_others_wait_in_order(jobs, runs):
     assert {job.state for job in jobs} == {"done"} and jobs.before(second) == 0
 
 
+def test_a_problem_is_solved_on_a_finished_volume_and_again_on_the_same(tmp_path):
+    jobs = Jobs(tmp_path, resolve_path, lambda job: iter([End("done")]), lambda job: None)
+    first = accepted(jobs, "my cube.obj")
+    first.results.mkdir()
+    first.volume.write_bytes(b"volume")
+    jobs.start(first)
+    wait_for(first, "done")
+    second = jobs.solve(first, PoissonOptions(exact="x"))
+    wait_for(second, "done")
+    third = jobs.solve(second, PoissonOptions(exact="y"))
+    wait_for(third, "done")
+    assert [job.name for job in jobs] == ["my cube.obj", "my cube.npz", "my cube.npz"]
+    assert third.volume == third.path and third.path.read_bytes() == b"volume"
+    assert third.problem.exact == "y" and third.results != third.path
+    jobs.close()
+
+
 def test_a_run_is_told_step_by_step(jobs, runs):
     job = accepted(jobs)
     jobs.start(job)

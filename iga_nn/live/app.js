@@ -2,9 +2,26 @@
 // Files come in by dropping them anywhere on the page, or by choosing one; the server's answer is the job's number.
 
 async function post(address, body) {
-  const answer = await fetch(address, {method: "POST", body});
-  if (answer.ok) window.trame.state.set("shown", Number(await answer.text()));
+  const answer = await fetch(address, {method: "POST", body}), said = await answer.text();
+  if (answer.ok) window.trame.state.set("shown", Number(said));
+  return answer.ok ? "" : said;
 }
+
+// Sends the form of a problem; what the server says against it is shown in the form.
+async function solve(number, form) {
+  form.querySelector("[role=alert]").textContent = await post(`solve/${number}`, new URLSearchParams(new FormData(form)));
+}
+
+// A face clicked in the report's picture is chosen in the form, or no longer.
+window.addEventListener("message", (event) => {
+  const box = document.querySelector(`form input[name="face ${event.data?.face}"]`);
+  if (event.origin !== location.origin || !box) return;
+  box.closest("details").open = true;
+  box.click();
+});
+
+document.querySelector("meta[name=viewport]").content = "width=device-width, initial-scale=1";  // zooming is allowed
+window.paper = matchMedia("(prefers-color-scheme: dark)").matches ? [0.08, 0.1, 0.12] : [1, 1, 1];
 
 // A file over the limit is only announced, so that the server says the same as of any other refused one.
 function upload(file) {

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from parameterize.progress import Progress
 from parameterize.surface.surface import MeshError, Surface
 
 from ..errors import one_line
+from ..options import PoissonOptions
 from ..workflow.output_folder import default_folder
 from .worker import End, Message, Step
 
@@ -29,8 +31,9 @@ NAME_LENGTH = 80
 
 @dataclass(eq=False)
 class Job:
-    """Hold a surface's file in a folder of its own, and its state.
+    """Hold the file of a surface, or of a volume to solve on, in a folder of its own, and its state.
 
+    problem: what is solved on a volume; None for a surface, whose problem is that of the page's options.
     text: why it was refused or failed. mapped: where the training maps the surface's vertices, (n, 3) in the cube.
     losses: those of the training that were reported. log: the lines of the run.
     """
@@ -39,6 +42,7 @@ class Job:
     name: str
     folder: Path
     state: str = "checking"
+    problem: PoissonOptions | None = None
     text: str = ""
     surface: Surface | None = None
     progress: Progress | None = None
@@ -57,6 +61,11 @@ class Job:
     def results(self) -> Path:
         """Return the output folder of the run."""
         return self.folder / default_folder(self.name)
+
+    @property
+    def volume(self) -> Path:
+        """Return the path of the volume that was made, or that is solved on."""
+        return self.path if self.problem else self.results / "volume.npz"
 
 
 Check = Callable[[Path], Surface]
@@ -107,6 +116,14 @@ class Jobs:
     def check(self, job: Job) -> None:
         """Have the job's surface checked, after those before it."""
         self._checker.submit(self._check_now, job)
+
+    def solve(self, done: Job, problem: PoissonOptions) -> Job:
+        """Put a new job into the queue, which solves a problem on the volume of a finished one; return it."""
+        job = self.add(f"{default_folder(done.name)}.npz")
+        shutil.copyfile(done.volume, job.path)
+        job.problem, job.state = problem, "ready"
+        self.start(job)
+        return job
 
     def start(self, job: Job) -> None:
         """Put an accepted or a stopped job into the queue; any other stays as it is."""

@@ -24,11 +24,12 @@ from trame.widgets import client, vtk
 from parameterize.arrays import Array
 from parameterize.surface.surface import Surface
 
-from ..errors import one_line
+from ..errors import InputError, one_line
 from ..models import resolve
 from ..options import MapOptions, PoissonOptions
 from ..samples import SAMPLES, sample, write_obj
 from ..workflow.output_folder import has_checkpoint
+from . import form
 from . import worker as job_process
 from .queue import Job, Jobs
 from .state import CONTENT, MEGABYTE, colors, places, row, triangles
@@ -58,7 +59,7 @@ class Page:
         """Serve until interrupted; `say` is told the address."""
         server = self._server
         server.state.update({"jobs": [], "current": 0, "shown": 0, "trame__title": "iga-nn"})
-        server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES)})
+        server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES), **form.described()})
         server.state.client_only("shown")
         for name, act in {"start": self.jobs.start, "stop": self.jobs.stop}.items():
             server.trigger(name)(partial(self._act, act))
@@ -95,8 +96,8 @@ class Page:
         return resolve(str(path), **self._mapping.reading())
 
     def _run(self, job: Job) -> Iterator[Message]:
-        mapping = replace(self._mapping, resume=has_checkpoint(job.results))
-        return job_process.run(job.folder, job.name, mapping, self._poisson, job.stop)
+        mapping = None if job.problem else replace(self._mapping, resume=has_checkpoint(job.results))
+        return job_process.run(job.folder, job.name, mapping, job.problem or self._poisson, job.stop)
 
     def _act(self, act: Callable[[Job], None], number: int) -> None:
         if job := self.jobs.find(number):
@@ -139,6 +140,7 @@ class Page:
             [
                 web.post("/upload", self._upload),
                 web.post("/sample/{name}", self._sample),
+                web.post("/solve/{number}", self._solve),
                 web.post("/paraview/", self._session),
                 web.get("/files/{number}/{name}", self._file),
             ]
@@ -186,10 +188,24 @@ class Page:
         self.jobs.check(job)
         return web.Response(text=str(job.number))
 
+    async def _solve(self, request: web.Request) -> web.Response:
+        """Take the form of a problem, to be solved on a job's volume; answer with the new job's number."""
+        job = self._named(request)
+        if job is None or not (job.state == "done" and job.volume.is_file()):
+            raise web.HTTPNotFound
+        try:
+            problem = form.stated(await request.post(), self._poisson)
+        except InputError as error:
+            raise web.HTTPBadRequest(text=one_line(error)) from None
+        return web.Response(text=str((await asyncio.to_thread(self.jobs.solve, job, problem)).number))
+
+    def _named(self, request: web.Request) -> Job | None:
+        number = request.match_info["number"]
+        return self.jobs.find(int(number)) if number.isdecimal() else None
+
     async def _file(self, request: web.Request) -> web.FileResponse:
         """Give out a result of a job; only names in CONTENT are."""
-        number, name = request.match_info["number"], request.match_info["name"]
-        job = self.jobs.find(int(number)) if number.isdecimal() else None
+        job, name = self._named(request), request.match_info["name"]
         if job is None or name not in CONTENT or not (job.results / name).is_file():
             raise web.HTTPNotFound
         return web.FileResponse(job.results / name, headers={"Cache-Control": "no-store"})

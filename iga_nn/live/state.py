@@ -46,6 +46,7 @@ def row(job: Job, before: int) -> dict[str, Any]:
         "line": job.log[-1] if job.log else "",
         "resumable": has_checkpoint(job.results),
         "mapped": job.mapped is not None,
+        "solvable": job.state == "done" and job.volume.is_file(),
         "files": _files(job) if job.state in ("done", "failed", "stopped") else [],
     }
     if job.surface is not None:

@@ -49,8 +49,11 @@ class End:
 Message = Step | str | End  # a string is a line of the log
 
 
-def run(folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions, stop: Event) -> Iterator[Message]:
-    """Run the surface `name` in `folder`, which also takes the results; yield messages as they come, an End last."""
+def run(folder: Path, name: str, mapping: MapOptions | None, poisson: PoissonOptions, stop: Event) -> Iterator[Message]:
+    """Run the surface `name` in `folder`, which also takes the results; yield messages as they come, an End last.
+
+    mapping: None where the file is a volume, on which the problem is only solved.
+    """
     spawn = multiprocessing.get_context("spawn")  # a copy of a process with threads may hang
     receiver, sender = spawn.Pipe(duplex=False)
     halt = spawn.Event()
@@ -91,7 +94,7 @@ def _follow(
 
 
 def _work(
-    sender: Connection, halt: SharedEvent, folder: Path, name: str, mapping: MapOptions, poisson: PoissonOptions
+    sender: Connection, halt: SharedEvent, folder: Path, name: str, mapping: MapOptions | None, poisson: PoissonOptions
 ) -> None:
     """Run the job in the child process, in the job's folder: messages then name the file as the user does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C in the terminal
@@ -102,7 +105,10 @@ def _work(
         logger.setLevel(logging.INFO)
         logger.propagate = False
     try:
-        pipeline.run("poisson", name, mapping=mapping, poisson=poisson, progress=teller.step)
+        if mapping is None:
+            pipeline.solve_to(name, problem=poisson, force=True)  # over what a stopped solve left
+        else:
+            pipeline.run("poisson", name, mapping=mapping, poisson=poisson, progress=teller.step)
     except KeyboardInterrupt:
         sender.send(End("stopped"))
     except expected_errors() as error:

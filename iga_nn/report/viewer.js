@@ -27,9 +27,13 @@ in vec2 parameters;
 in float share;
 uniform sampler2D map;
 uniform vec3 plain;
-uniform bool mapped, lined;
+uniform bool mapped, lined, numbered;
 out vec4 color;
 void main() {
+  if (numbered) {  // one colour a face, to find out which one is at a pixel
+    color = vec4(plain, 1.0);
+    return;
+  }
   vec3 base = mapped ? texture(map, vec2(share, 0.5)).rgb : plain;
   base *= 0.5 + 0.5 * abs(normalize(facing).z);
   if (lined) {
@@ -39,6 +43,8 @@ void main() {
   }
   color = vec4(base, 1.0);
 }`;
+
+const CLICK = 4;  // pixels that the pointer may move while a face is clicked
 
 function bytes(text) {
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -118,7 +124,7 @@ function start(scene, canvas) {
   const extent = scene.high.map((value, axis) => value - scene.low[axis] || 1e-9);
   const places = new Uint16Array(bytes(scene.places).buffer);
   const corners = triangles(scene.samples);
-  const state = {view: scene.view, zoom: 1, shown: "faces", inside: false, lined: true};
+  const state = {view: scene.view, zoom: 1, shown: "faces", inside: false, lined: true, moved: 0};
 
   const attribute = (name, data, size, kind, normalized) => {
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
@@ -142,23 +148,35 @@ function start(scene, canvas) {
   gl.uniform1i(uniform("samples"), scene.samples);
   gl.enable(gl.DEPTH_TEST);
 
-  const draw = () => {
+  const draw = (numbered = false) => {
     const ratio = window.devicePixelRatio || 1;
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.clearColor(1, 1, 1, 1);
+    gl.clearColor(0, 0, 0, 0);  // the page's own background
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const fit = state.zoom * 0.96 * Math.min(canvas.width / scene.half[0], canvas.height / scene.half[1]);
     gl.uniform2f(uniform("scale"), fit / canvas.width, fit / canvas.height);
     gl.uniformMatrix3fv(uniform("turn"), true, state.view.flat());
     gl.uniform1i(uniform("mapped"), state.shown !== "faces");
     gl.uniform1i(uniform("lined"), state.lined);
+    gl.uniform1i(uniform("numbered"), numbered);
     const each = 6 * (scene.samples - 1) ** 2;
     for (let patch = state.inside ? 6 : 0; patch < (state.inside ? 9 : 6); patch++) {
-      gl.uniform3fv(uniform("plain"), patch < 6 ? rgb(scene.colors[patch]) : [0.72, 0.74, 0.78]);
+      const plain = patch < 6 ? rgb(scene.colors[patch]) : [0.72, 0.74, 0.78];
+      gl.uniform3fv(uniform("plain"), numbered ? [(patch + 1) / 10, 0, 0] : plain);
       gl.drawElements(gl.TRIANGLES, each, gl.UNSIGNED_INT, 4 * each * patch);
     }
+  };
+
+  // The number of the patch that is drawn at a place of the window, -1 for none.
+  const patchAt = (x, y) => {
+    const box = canvas.getBoundingClientRect(), pixel = new Uint8Array(4);
+    const place = [(x - box.left) / box.width * canvas.width, (box.bottom - y) / box.height * canvas.height];
+    draw(true);
+    gl.readPixels(...place.map(Math.floor), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    draw();
+    return Math.round(pixel[0] / 25.5) - 1;
   };
 
   const values = gl.createBuffer();
@@ -176,8 +194,18 @@ function start(scene, canvas) {
     draw();
   };
   controls(state, scene, canvas, show, draw);
-  new ResizeObserver(draw).observe(canvas);
+  canvas.addEventListener("click", (event) => {
+    const face = state.moved > CLICK ? -1 : patchAt(event.clientX, event.clientY);
+    if (face >= 0 && face < 6) pick(scene.labels[face]);
+  });
+  new ResizeObserver(() => draw()).observe(canvas);
   show(location.hash.slice(1));
+}
+
+// Names the face that was clicked, and tells the page that shows this one in a frame.
+function pick(label) {
+  document.getElementById("picked").textContent = `Face ${label}`;
+  if (window.parent !== window) window.parent.postMessage({face: label.slice(0, 2)}, "*");
 }
 
 // What the colours mean: a swatch a face, or the colour bar with its ends and title.
@@ -227,9 +255,14 @@ function controls(state, scene, canvas, show, draw) {
     event.preventDefault();
     keys[event.key]();
   });
-  canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    state.moved = 0;
+  });
   canvas.addEventListener("pointermove", (event) => {
-    if (event.buttons) turn(event.movementX * 0.01, event.movementY * 0.01);
+    if (!event.buttons) return;
+    state.moved += Math.abs(event.movementX) + Math.abs(event.movementY);
+    turn(event.movementX * 0.01, event.movementY * 0.01);
   });
   canvas.addEventListener("dblclick", reset);
   canvas.addEventListener("wheel", (event) => {

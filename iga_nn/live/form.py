@@ -1,0 +1,58 @@
+"""Reads the form in which the live page asks for the data of Poisson's equation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from parameterize.spline.volume import FACE_NAMES
+
+from ..errors import InputError
+from ..figures.evaluate import FACE_COLORS, face_labels
+from ..options import PoissonOptions
+
+FIELDS = (  # of PoissonOptions, what each is called on the page, and what holds where it is left empty
+    ("kappa", "Coefficient κ, one formula or six: xx,xy,xz,yy,yz,zz", "1"),
+    ("reaction", "Reaction c", "0"),
+    ("exact", "Exact solution u, from which all that is left empty follows", "none; without a source exp(X+Z)*sin(Y)"),
+    ("source", "Source f", "that of the exact solution"),
+    ("boundary", "Values of u on the faces", "those of the exact solution, or 0"),
+)
+EXCHANGE = "exchange"  # the other kind of data of a face is "flux"
+
+
+def described() -> dict[str, Any]:
+    """Return what the page lists: the fields, and the faces with their colours."""
+    faces = zip(FACE_NAMES, face_labels(), FACE_COLORS, strict=True)
+    return {
+        "fields": [dict(zip(("name", "title", "empty"), field, strict=True)) for field in FIELDS],
+        "faces": [{"name": name, "label": label, "color": color} for name, label, color in faces],
+    }
+
+
+def stated(form: Mapping[str, Any], options: PoissonOptions) -> PoissonOptions:
+    """Return the options with the data that a form states; its empty fields are left out.
+
+    form: the fields of FIELDS; for a face u0 that has data of its own `face u0`, with `kind u0` ("flux" or "exchange"),
+    `alpha u0` and `data u0`. Raises InputError for data that cannot be solved with.
+    """
+
+    def text(name: str) -> str:
+        return str(form.get(name, "")).strip()
+
+    neumann, robin = [], []
+    for face in FACE_NAMES:
+        if not text(f"face {face}"):
+            continue
+        data = text(f"data {face}")
+        if text(f"kind {face}") != EXCHANGE:
+            neumann.append(f"{face}={data}" if data else face)
+        elif alpha := text(f"alpha {face}"):
+            robin.append(f"{face}={alpha}:{data}" if data else f"{face}={alpha}")
+        else:
+            raise InputError(f"face {face}: give α, the coefficient of the exchange")
+    given: dict[str, Any] = {name: text(name) or None for name, _, _ in FIELDS}
+    found = replace(options, **given, neumann=tuple(neumann), robin=tuple(robin))
+    found.problem()
+    return found

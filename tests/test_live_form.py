@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import pytest
+
+from iga_nn.errors import InputError
+from iga_nn.live.form import described, stated
+from iga_nn.options import PoissonOptions
+
+KEPT = PoissonOptions(exact="x", refine=(0,))
+
+
+def test_an_empty_form_is_the_default_problem_on_the_pages_own_meshes():
+    assert stated({"exact": "", "face u0": ""}, KEPT) == PoissonOptions(refine=(0,))
+
+
+def test_a_form_states_coefficient_source_and_data_of_faces():
+    form = {"kappa": " 1+x*x ", "source": "1", "boundary": "y", "reaction": "2"}
+    form |= {"face u1": "on", "kind u1": "flux", "data u1": "x*y"}
+    form |= {"face w0": "on", "kind w0": "exchange", "alpha w0": "3", "data w0": "z"}
+    form |= {"kind v0": "flux", "data v0": "its box is not checked"}
+    found = stated(form, KEPT)
+    assert (found.kappa, found.source, found.boundary, found.reaction) == ("1+x*x", "1", "y", "2")
+    assert found.exact is None and found.refine == (0,)
+    assert (found.neumann, found.robin) == (("u1=x*y",), ("w0=3:z",))
+
+
+def test_empty_data_of_a_face_follow_from_the_exact_solution():
+    form = {"exact": "x*y", "face u1": "on", "face v0": "on", "kind v0": "exchange", "alpha v0": "2"}
+    found = stated(form, KEPT)
+    assert (found.neumann, found.robin) == (("u1",), ("v0=2",))
+
+
+@pytest.mark.parametrize(
+    ("form", "says"),
+    [
+        ({"kappa": "import os"}, "kappa"),
+        ({"source": "1", "face u0": "on"}, "u0"),
+        ({"face u0": "on", "kind u0": "exchange"}, "face u0: give α"),
+    ],
+)
+def test_data_that_cannot_be_solved_with_are_refused_by_name(form, says):
+    with pytest.raises(InputError, match=says):
+        stated(form, KEPT)
+
+
+def test_the_form_lists_the_options_of_a_problem_and_the_faces():
+    known = described()
+    assert {field["name"] for field in known["fields"]} <= set(PoissonOptions.__dataclass_fields__)
+    assert [face["name"] for face in known["faces"]] == ["u0", "u1", "v0", "v1", "w0", "w1"]
