@@ -47,7 +47,15 @@ class ConvergenceRow:
 
 
 class Convergence(list[ConvergenceRow], Shown):
-    """The levels of a study in the order they were solved; printed, a line a level."""
+    """The levels of a study in the order they were solved: a list of rows, printed a line a level.
+
+    Examples
+    --------
+    >>> from solve import Poisson, benchmark_volume, convergence
+    >>> study = convergence(benchmark_volume(2), Poisson(exact="x*y*z"), refine=range(2))
+    >>> len(study), [row.report.dofs for row in study]
+    (2, [125, 343])
+    """
 
     def __str__(self) -> str:
         return "\n".join(map(str, self))
@@ -81,8 +89,8 @@ def convergence(
 
     Returns
     -------
-    list of ConvergenceRow
-        One a level.
+    Convergence
+        A list of ConvergenceRow, one a level.
 
     Raises
     ------

@@ -18,7 +18,8 @@ def test_every_path_exists():
     )
     named = {first or second for first, second in paths}
     assert len(named) > 25
-    assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
+    missing = [path for path in sorted(named) if not (ROOT / path).exists()]
+    assert [path for path in missing if not path.startswith("docs/_build/")] == []  # `make docs` builds it
 
 
 def test_every_floor_is_one_of_the_linter():
