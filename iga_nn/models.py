@@ -15,6 +15,7 @@ from .new_file import check_new, save_new
 from .samples import SAMPLES, obj_text, sample
 
 DATA_FOLDER = "IGA_NN_DATA"
+SET = "g1"  # names a set of models
 RAW = "https://raw.githubusercontent.com"
 TIMEOUT = 60.0  # seconds
 
@@ -82,13 +83,18 @@ def fetch_all(name: str, out: str | Path | None = None, *, force: bool = False) 
 
     Raises as `fetch` does, and where `out` is given for the whole set.
     """
-    if name != "g1":
+    if name != SET:
         yield fetch(name, out, force=force)
         return
     if out is not None:
-        raise InputError("g1: is a set of models, each written to NAME.obj: leave --out out")
-    for model in sorted(name for name in MODELS if "/G1/" in MODELS[name].path):
+        raise InputError(f"{SET}: is a set of models, each written to NAME.obj: leave --out out")
+    for model in in_set():
         yield fetch(model, force=force)
+
+
+def in_set() -> list[str]:
+    """Return the names of the models of the set G1, in alphabetical order."""
+    return sorted(name for name in MODELS if "/G1/" in MODELS[name].path)
 
 
 def fetch(name: str, out: str | Path | None = None, *, force: bool = False) -> Path:

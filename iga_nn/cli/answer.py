@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..levels import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..workflow.output_folder import Outcome
-from .exit_codes import DONE, NOT_CERTIFIED, NOT_SOLVED
+from .exit_codes import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED
+
+if TYPE_CHECKING:
+    from ..batch.table import Batch
 
 SHOWN_ERRORS = (*EXACT_ERRORS, *ESTIMATES)
 
@@ -19,6 +22,16 @@ def exit_code(report: reports.Report) -> int:
     if not reports.is_certified(report):
         return NOT_CERTIFIED
     return DONE if reports.is_converged(report) and reports.is_meaningful(report) else NOT_SOLVED
+
+
+def batch_exit_code(batch: Batch) -> int:
+    """Return the exit code of a batch: that of its worst surface."""
+    counts = batch.counts
+    if counts.keys() & {"refused", "failed", "waiting"}:
+        return BAD_INPUT
+    if "not certified" in counts:
+        return NOT_CERTIFIED
+    return NOT_SOLVED if "not solved" in counts else DONE
 
 
 def verdict_as_json(outcome: Outcome) -> str:

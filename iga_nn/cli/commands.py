@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
+from ..batch.options import WorkerOptions
 from ..errors import InputError, expected_errors, input_errors, one_line
 from ..options import (
     PROBLEMS,
@@ -27,7 +28,7 @@ from ..options import (
 )
 from ..version import __version__
 from .exit_codes import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
-from .progress import shown_progress
+from .progress import shown_batch, shown_progress
 
 if TYPE_CHECKING:
     from ..workflow.output_folder import Outcome
@@ -83,13 +84,14 @@ class OutputOptions:
 OutputFlags = Annotated[OutputOptions, Parameter(name="*")]  # each field of the options is a flag
 SurfaceFlags = Annotated[SurfaceOptions, Parameter(name="*")]
 MapFlags = Annotated[MapOptions, Parameter(name="*")]
+WorkerFlags = Annotated[WorkerOptions, Parameter(name="*")]
 PoissonFlags = Annotated[PoissonOptions, Parameter(name="*")]
 ElasticityFlags = Annotated[ElasticityOptions, Parameter(name="*")]
 StudyFlags = Annotated[StudyOptions, Parameter(name="*")]
 ElasticityStudyFlags = Annotated[ElasticityStudyOptions, Parameter(name="*")]
 
 OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
-SURFACE, POISSON, ELASTICITY = SurfaceOptions(), PoissonOptions(), ElasticityOptions()
+WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
 
 
 @run_app.command(name="poisson")
@@ -119,6 +121,36 @@ def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: Problem
         known = output.folder | {problem.section: problem}
         outcome = pipeline.run(problem.section, mesh, mapping=mapping, progress=progress, **known)
     return _finish(outcome, output)
+
+
+@app.command(name="batch")
+def run_many(
+    *surfaces: str,
+    output: OutputFlags = OUTPUT,
+    workers: WorkerFlags = WORKERS,
+    mapping: MapFlags = MAP,
+    poisson: PoissonFlags = POISSON,
+) -> int:
+    """Run many surfaces in worker processes, each into its own folder in --out, with one table of them all.
+
+    batch.csv, batch.json and batch.html are written anew after every surface. The same command again skips what is
+    finished, goes on from checkpoints and tries failures once more.
+
+    Args:
+        surfaces: files, folders, patterns in quotes, names of samples and models, or g1 for the set G1.
+    """
+    from ..batch.run import run_batch
+    from ..report import document as reports
+    from .answer import batch_exit_code
+
+    if output.out is None:
+        raise InputError("batch needs a folder for its results: name it with --out")
+    with shown_batch(output.quiet) as progress:
+        given = output.folder | {"mapping": mapping, "poisson": poisson, "workers": workers}
+        batch = run_batch(surfaces, progress=progress, **given)
+    words = f"{batch.summary}\nresults in {batch.folder}"
+    _print(reports.as_json(batch.as_dict()) if output.as_json else words)
+    return batch_exit_code(batch)
 
 
 @app.command(name="parameterize")

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import base64
 import logging
+from collections.abc import Mapping
 from html import escape
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,17 +89,21 @@ def scene_page(scene: Scene, title: str) -> str:
 
 
 def _render(template: str, **content: Any) -> str:
-    """Return a template of this folder with its content, which is escaped, and with the style and the viewer."""
+    """Return a template of this folder with its content, and with the style and the viewer."""
+    here = files(__package__)
+    return filled(__package__, template, {"style": here / "page.css", "script": here / "viewer.js"}, **content)
+
+
+def filled(package: str, template: str, inserted: Mapping[str, Traversable], **content: Any) -> str:
+    """Return a package's template with its content, which is escaped, and with files of ours, which stay as they are."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    here = files(__package__)
-    own = {"style": "page.css", "script": "viewer.js"}  # inserted as they are
     environment = Environment(
-        loader=PackageLoader(__package__, ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+        loader=PackageLoader(package, ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    inserted = {name: Markup((here / file).read_text(encoding="utf-8")) for name, file in own.items()}  # noqa: S704
-    return environment.get_template(template).render(inserted, **content)
+    own = {name: Markup(file.read_text(encoding="utf-8")) for name, file in inserted.items()}  # noqa: S704
+    return environment.get_template(template).render(own, **content)
 
 
 def _heading(report: Report) -> str:

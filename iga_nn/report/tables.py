@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..levels import ESTIMATES, TITLES, number
@@ -35,10 +35,15 @@ def as_rows(levels: Sequence[Mapping[str, Any]]) -> list[list[str]]:
 
 def as_csv(study: Study) -> str:
     """Return the study as comma-separated values with all digits; the first row holds the names."""
+    return csv_text(COLUMNS, rows_of(study))
+
+
+def csv_text(columns: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> str:
+    """Return rows as comma-separated values with all digits; the first row holds the names, and None stays empty."""
     stream = io.StringIO()
-    writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
+    writer = csv.DictWriter(stream, list(columns), lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows_of(study))
+    writer.writerows(rows)
     return stream.getvalue()
 
 

@@ -17,7 +17,7 @@ from parameterize.files import unfinished
 
 from ..errors import InputError, one_line
 from ..report import document as reports
-from ..report.artifacts import Part, files_of
+from ..report.artifacts import REPORT, Part, files_of
 
 log = logging.getLogger(__name__)
 
@@ -119,13 +119,13 @@ def open_folder(
         raise InputError("out is empty: name a folder")
     folder = Path(out) if out is not None else default_folder(source)
     is_new = not folder.exists()
-    with _writable(folder):
+    with writable(folder):
         folder.mkdir(parents=True, exist_ok=True)
     try:
-        with _locked(folder):
+        with locked(folder):
             finished = _finished_result(folder, force, resume)
             if not finished:
-                with _writable(folder):
+                with writable(folder):
                     TemporaryFile(dir=folder).close()
             yield RunFolder(folder, vector, finished)
     except KeyboardInterrupt:
@@ -150,7 +150,7 @@ def _finished_result(folder: Path, force: bool, resume: bool) -> Outcome | None:
 
 
 @contextmanager
-def _writable(folder: Path) -> Iterator[None]:
+def writable(folder: Path) -> Iterator[None]:
     """Turn an OSError of the block into an InputError with the remedy."""
     try:
         yield
@@ -159,7 +159,7 @@ def _writable(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
     """Lock the folder against other runs, where the system has locks. Raises InputError where another run holds it.
 
     The lock is on the folder itself: a lock file would stay in it among the results.
@@ -169,7 +169,7 @@ def _locked(folder: Path) -> Iterator[None]:
     except ImportError:
         yield
         return
-    with _writable(folder):
+    with writable(folder):
         handle = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):  # a file system without locks
@@ -180,6 +180,17 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def forget(folder: Path) -> None:
+    """Let the next run start anew: remove the report that marks a result as finished, and the checkpoint.
+
+    Raises InputError where another run uses the folder, or where it cannot be written.
+    """
+    if folder.is_dir():
+        with locked(folder), writable(folder):
+            (folder / REPORT).unlink(missing_ok=True)
+            shutil.rmtree(folder / CHECKPOINT, ignore_errors=True)
 
 
 def has_checkpoint(folder: Path) -> bool:

@@ -92,20 +92,39 @@ def run(
     mapping, options = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
     if others := [name for name, value in given.items() if value is not None]:
         raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
-    equation, spline = options.problem(), mapping.config().spline
-    blank = BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree)
-    unknowns = check_size(blank, max(options.refine), options.degree, equation.form.components)
+    equation, unknowns = checked(mapping, options)
     command = command_line(f"run {problem}", mesh, mapping, options, out=out)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
-            if problem not in state.finished.report:
-                path = state.folder / "volume.npz"
-                hint = f"`iga-nn solve {problem} {path}` solves on it"
-                raise InputError(f"{state.folder}: holds a finished volume; {hint}")
-            return _finished_by(command, state.finished, vector)
+            return _finished_by(command, state.finished, vector, problem)
         volume = map_surface(state, mesh, mapping, progress, command, equation, unknowns).volume
         solution = solve_levels(state, volume, equation, options)
         return _finish(state, volume, solution, equation)
+
+
+def checked(mapping: MapOptions, options: ProblemOptions) -> tuple[Equation, int]:
+    """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
+    equation, spline = options.problem(), mapping.config().spline
+    blank = BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree)
+    return equation, check_size(blank, max(options.refine), options.degree, equation.form.components)
+
+
+def finished_run(
+    mesh: str | Path, out: str | Path, mapping: MapOptions, options: ProblemOptions | None, *, vector: bool = False
+) -> Outcome | None:
+    """Return the finished result of that run in its folder, None where there is none.
+
+    options: those of the problem, None for `parameterize_to`. Raises InputError where another command made the result,
+    or where files of it are gone.
+    """
+    report = reports.read(Path(out))
+    if report is None or not reports.is_finished(report):
+        return None
+    finished = Outcome(Path(out), report)
+    if options is None:
+        return _finished_by(command_line("parameterize", mesh, mapping, out=out), finished, vector)
+    command = command_line(f"run {options.section}", mesh, mapping, options, out=out)
+    return _finished_by(command, finished, vector, options.section)
 
 
 def parameterize_to(
@@ -197,9 +216,15 @@ def study_to(
         return _finish(state, loaded), tables.as_table(study)
 
 
-def _finished_by(command: str, finished: Outcome, vector: bool) -> Outcome:
-    """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone."""
+def _finished_by(command: str, finished: Outcome, vector: bool, problem: str | None = None) -> Outcome:
+    """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone.
+
+    problem: the one that the run is to solve, None where it solves none.
+    """
     folder, made_by = finished.folder, finished.report.get("command", "")
+    if problem is not None and problem not in finished.report:
+        path = folder / "volume.npz"
+        raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {problem} {path}` solves on it")
     if not gives_the_same(made_by, command):
         raise InputError(f"{folder}: holds the result of `{made_by}`; --force replaces it, --out names another folder")
     wanted = ["volume.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))

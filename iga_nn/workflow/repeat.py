@@ -28,7 +28,10 @@ def command_line(command: str, source: str | Path, *options: Any, **given: Any) 
 
 
 def gives_the_same(one: str, other: str) -> bool:
-    """Return whether two such lines give the same result: they differ at most in the output folder."""
+    """Return whether two such lines give the same result.
+
+    They differ at most in the output folder, and in how they name the same file.
+    """
     return _without_folder(one) == _without_folder(other)
 
 
@@ -37,7 +40,15 @@ def _without_folder(line: str) -> list[str]:
     if "--out" in words:
         at = words.index("--out")
         del words[at : at + 2]
-    return words
+    return [_as_path(word) for word in words]
+
+
+def _as_path(word: str) -> str:
+    """Return the absolute path where the word names something that is there, else the word itself."""
+    try:
+        return str(Path(word).resolve(strict=True))
+    except (OSError, RuntimeError, ValueError):  # most words are options and formulas
+        return word
 
 
 def _words(name: str, value: Any) -> list[str]:

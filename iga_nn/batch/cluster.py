@@ -1,0 +1,195 @@
+"""Lets dask compute the surfaces of a batch: worker processes of this machine, or those of a scheduler."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from multiprocessing import resource_tracker
+from tempfile import TemporaryDirectory
+from uuid import uuid4
+
+import dask.config
+from dask.utils import format_bytes, parse_bytes
+from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, wait
+
+from ..errors import InputError, one_line
+from .options import WorkerOptions
+from .task import LESS_MEMORY, Ended, Task, compute, stop
+
+log = logging.getLogger(__name__)
+
+POLL = 0.5  # seconds between two looks at what has ended
+PATIENCE = 10.0  # seconds until a scheduler must have answered
+GRACE = 3.0  # seconds that interrupted surfaces have to keep a checkpoint
+SMALLEST = 1 << 29  # bytes: the libraries alone take nearly as much
+MEMORY_TOPIC = "worker-restart-memory"  # dask tells here which workers were ended for their memory
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+SILENT = "CRITICAL"
+CONFIG = {
+    "distributed.worker.memory.target": False,  # what a worker holds is no data of dask's that it could write to disk,
+    "distributed.worker.memory.spill": False,  # and a worker that pauses would wait for ever for it to shrink
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.profile.enabled": False,
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+}
+
+Told = Callable[[int, str, float], None]  # number of a surface, its stage, the share of its work that is done
+
+
+@contextmanager
+def connected(options: WorkerOptions, most: int) -> Iterator[Client]:
+    """Yield a client of the workers; those of this machine end with the block, and their files go with them.
+
+    most: the number of surfaces, more workers are not started. Raises InputError where the scheduler does not answer.
+    """
+    with ExitStack() as stack:
+        if options.scheduler is not None:
+            try:
+                client = Client(options.scheduler, timeout=PATIENCE)
+            except (OSError, ValueError, TypeError) as error:
+                raise InputError(f"{options.scheduler}: no dask scheduler answers there ({one_line(error)})") from None
+        else:
+            client = Client(stack.enter_context(_local(options, most)))
+        yield stack.enter_context(client)
+
+
+@contextmanager
+def _local(options: WorkerOptions, most: int) -> Iterator[LocalCluster]:
+    """Start worker processes on this machine.
+
+    They listen on free ports of 127.0.0.1, without a dashboard, and ignore Ctrl-C: they are told to stop.
+    """
+    threads = dict.fromkeys(THREAD_VARIABLES, str(options.threads_per_worker))
+    with ExitStack() as stack:
+        stack.enter_context(_environment(threads))
+        stack.enter_context(dask.config.set(CONFIG))
+        scratch = stack.enter_context(TemporaryDirectory(prefix="iga-nn-", ignore_cleanup_errors=True))
+        with _interrupts_held():
+            cluster = LocalCluster(
+                n_workers=min(options.workers, most),
+                threads_per_worker=1,  # surfaces at a time
+                memory_limit=memory_limit(options),
+                local_directory=scratch,
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False, "allowed_failures": 0},
+                silence_logs=SILENT,
+            )
+        yield stack.enter_context(cluster)
+
+
+def memory_limit(options: WorkerOptions) -> int:
+    """Return the bytes that a worker may take, 0 for any number. Raises InputError."""
+    text = options.memory_limit
+    try:
+        limit = int(parse_bytes(text))
+    except (ValueError, OverflowError):
+        raise InputError(f"memory limit {text!r}: write a number with its unit, such as 4GiB") from None
+    if limit < 0 or 0 < limit < SMALLEST:
+        raise InputError(f"memory limit {text}: must be at least {format_bytes(SMALLEST)}, or 0 for none")
+    return limit
+
+
+@contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    """Set variables that workers inherit, and leave the environment as it was: dask adds some of its own to it."""
+    before = dict(os.environ)
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back; threads and processes started in the block, and those that they start, never see it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # it would let Ctrl-C through again where it started in the block
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def computed(
+    client: Client, tasks: Sequence[Task], options: WorkerOptions, tell: Told
+) -> Generator[tuple[int, Ended], None, None]:
+    """Yield the number of each task and how it ended, as they end; one that failed is tried again before that.
+
+    A surface is handed out once a worker is free for it: one behind another would be lost with that other's worker.
+    Where the caller ends early, surfaces keep a checkpoint.
+    """
+    batch = f"iga-nn-{uuid4().hex}"
+    client.subscribe_topic(batch, lambda event: tell(event[1]["number"], event[1]["stage"], event[1]["share"]))
+    waiting, tries = list(range(len(tasks))), [0] * len(tasks)
+    running: dict[Future, int] = {}
+    try:
+        while waiting or running:
+            free = max(0, sum(client.nthreads().values()) - len(running))
+            for number in waiting[:free]:
+                running[client.submit(compute, tasks[number], number, batch, pure=False)] = number
+            del waiting[:free]
+            for future in _first_ended(list(running)):
+                number, how = running.pop(future), _ended(client, future)
+                if how.state == "failed" and tries[number] < options.retries:
+                    tries[number] += 1
+                    waiting.append(number)
+                    log.info("%s: %s; trying again", tasks[number].mesh, how.line)
+                else:
+                    yield number, how
+    except (OSError, CancelledError) as error:
+        where = options.scheduler or "the workers of this machine"
+        raise InputError(f"{where}: the connection is lost ({one_line(error)}); the same command goes on") from None
+    finally:
+        if running:
+            _stop(client, batch, list(running))
+
+
+def _first_ended(futures: list[Future]) -> list[Future]:
+    """Wait a moment for futures to end, and return those that have."""
+    if not futures:  # no worker has come yet
+        time.sleep(POLL)
+        return []
+    with suppress(TimeoutError):
+        wait(futures, timeout=POLL, return_when="FIRST_COMPLETED")
+    return [future for future in futures if future.done()]
+
+
+def _ended(client: Client, future: Future) -> Ended:
+    """Return how a task ended, also where it raised an error or lost its workers."""
+    error = future.exception()
+    if error is None:
+        return future.result()
+    if isinstance(error, KilledWorker):
+        if _ran_out_of_memory(client, error.last_worker.address):
+            return Ended("failed", f"out of memory: its worker took more than its limit; {LESS_MEMORY}")
+        return Ended("failed", "its worker process was lost; the same command goes on from its checkpoint")
+    return Ended("failed", f"internal error, please report it: {type(error).__name__}: {one_line(error)}")
+
+
+def _ran_out_of_memory(client: Client, worker: str) -> bool:
+    """Return whether that worker was ended for its memory; the scheduler may hear of it after the worker is gone."""
+    until = time.monotonic() + 2.0
+    while time.monotonic() < until:
+        if any(event["worker"] == worker for _, event in client.get_events(MEMORY_TOPIC)):
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def _stop(client: Client, batch: str, futures: list[Future]) -> None:
+    """Ask the workers to end what they compute of a batch, and wait a moment until they have."""
+    with suppress(Exception):  # workers or the scheduler may be gone: their surfaces have earlier checkpoints
+        client.run(stop, batch, on_error="ignore")
+        wait(futures, timeout=GRACE)
+    with suppress(Exception):
+        client.cancel(futures)

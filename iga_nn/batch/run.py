@@ -1,0 +1,163 @@
+"""Carries a batch from the surfaces to the table: skips what is finished, computes the rest, keeps what is known."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from parameterize.files import save_text
+
+from ..errors import InputError, expected_errors, one_line
+from ..options import MapOptions, PoissonOptions
+from ..report import document as reports
+from ..workflow import pipeline
+from ..workflow.cost_estimate import available_memory_mb
+from ..workflow.output_folder import forget, locked, writable
+from .options import WorkerOptions
+from .page import page
+from .surfaces import Entry, entries_of
+from .table import Batch, Row
+from .task import Ended, Task
+
+log = logging.getLogger(__name__)
+
+INSTALL = "pip install 'iga-nn[batch]'"
+
+
+@dataclass(frozen=True)
+class Running:
+    """Say how far a surface is. share: of its work that is done."""
+
+    name: str
+    stage: str
+    share: float
+
+
+Progress = Callable[[Batch, Sequence[Running]], None]
+
+
+def run_batch(
+    surfaces: Sequence[str | Path],
+    out: str | Path,
+    *,
+    mapping: MapOptions | None = None,
+    poisson: PoissonOptions | None = None,
+    workers: WorkerOptions | None = None,
+    force: bool = False,
+    vector: bool = False,
+    progress: Progress | None = None,
+) -> Batch:
+    """Parameterize many surfaces and solve Poisson's equation on them, each in a folder of its own; return the table.
+
+    surfaces: files, folders, patterns, names of samples and models, or g1. out: the folder of the batch; batch.csv,
+    batch.json and batch.html are in it, written anew after every surface. A surface that is finished with the same
+    options is skipped, one that has a checkpoint goes on from there, and failures are tried again; with `force` all
+    start anew. vector: write plots of curves as PDF, too. progress: is told after every change.
+    Raises InputError for options that cannot be run, a folder that cannot be written, and where dask is missing;
+    surfaces that are refused or fail have rows that say why. An interruption leaves folders that the same call resumes.
+    """
+    mapping, options = mapping or MapOptions(), poisson or PoissonOptions()
+    pipeline.checked(mapping, options)
+    if out == "":
+        raise InputError("out is empty: name a folder")
+    entries = entries_of([str(surface) for surface in surfaces], Path(out))
+    corners = None if mapping.corners is None else mapping.corners.absolute()
+    common = replace(mapping, corners=corners, resume=True)
+    tasks = [Task(entry.mesh, entry.folder, common, options, vector) for entry in entries]
+    return run_tasks(Path(out), entries, tasks, workers or WorkerOptions(), force=force, progress=progress)
+
+
+def run_tasks(
+    out: Path,
+    entries: Sequence[Entry],
+    tasks: Sequence[Task],
+    workers: WorkerOptions,
+    *,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Batch:
+    """Compute tasks, one for each entry, as `run_batch` does; their options may differ."""
+    workers.check()
+    with writable(out):
+        out.mkdir(parents=True, exist_ok=True)
+    with locked(out):
+        batch = Batch(out, tuple(_found(entry, task, force) for entry, task in zip(entries, tasks, strict=True)))
+        if "waiting" in batch.counts:
+            return _computed(batch, tasks, workers, progress or (lambda *_: None))
+        _write(batch)
+        return batch
+
+
+def _found(entry: Entry, task: Task, force: bool) -> Row:
+    """Return the row of a surface as its folder is: finished, refused because of what is in it, or still to compute."""
+    row = Row(entry)
+    try:
+        if force:
+            forget(entry.folder)
+            return row
+        finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.options, vector=task.vector)
+    except expected_errors() as error:
+        return row.ended(Ended("refused", one_line(error)))
+    return row if finished is None else row.ended(Ended("done", report=finished.report))
+
+
+def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progress: Progress) -> Batch:
+    """Return the batch once the surfaces that wait are computed; write it after each."""
+    try:
+        from . import cluster
+    except ModuleNotFoundError as error:
+        package = (error.name or "dask").partition(".")[0]
+        raise InputError(f"a batch needs {package}, which is not installed: {INSTALL}") from None
+    waiting = [number for number, row in enumerate(batch.rows) if row.state == "waiting"]
+    running: dict[int, Running] = {}
+
+    def show() -> None:
+        present = [known for number, known in sorted(running.items()) if batch.rows[number].state == "waiting"]
+        progress(batch, present)
+
+    def tell(at: int, stage: str, share: float) -> None:
+        number = waiting[at]
+        before = running[number].share if number in running else 0.0  # a surface may start anew with another cube
+        running[number] = Running(batch.rows[number].entry.name, stage, max(share, before))
+        show()
+
+    try:
+        _warn_of_memory(workers, cluster.memory_limit(workers), len(waiting))
+        _write(batch)
+        show()
+        with (
+            cluster.connected(workers, len(waiting)) as client,
+            closing(cluster.computed(client, [tasks[number] for number in waiting], workers, tell)) as ended,
+        ):
+            for at, how in ended:
+                row = batch.rows[waiting[at]].ended(how)
+                batch = batch.with_row(waiting[at], row)
+                _write(batch)
+                log.log(logging.INFO if row.state == "certified" else logging.WARNING, "%s", row.told())
+                show()
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted; {batch.summary}; the same command goes on") from None
+    return batch
+
+
+def _warn_of_memory(workers: WorkerOptions, limit: int, surfaces: int) -> None:
+    """Warn where the workers of this machine may take more memory than is free."""
+    free, count = available_memory_mb(), min(workers.workers, surfaces)
+    if workers.scheduler is None and free is not None and count * limit / 1e6 > free:
+        log.warning(
+            "%d workers may take %.1f GB of memory, %.1f GB are free: lower --workers or --memory-limit, or free some",
+            count,
+            count * limit / 1e9,
+            free / 1e3,
+        )
+
+
+def _write(batch: Batch) -> None:
+    """Write the three files of the batch anew, each in one go. Raises InputError."""
+    content = {"json": reports.as_json(batch.as_dict()) + "\n", "csv": batch.as_csv(), "html": page(batch)}
+    with writable(batch.folder):
+        for ending, text in content.items():
+            save_text(batch.folder / f"batch.{ending}", text)

@@ -1,0 +1,120 @@
+"""Turns what the user names (files, folders, patterns, samples, models, g1) into surfaces with a folder each."""
+
+from __future__ import annotations
+
+import glob
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from parameterize.surface.readers.file import FORMATS
+
+from ..errors import InputError
+from ..models import MODELS, SET, in_set
+from ..samples import SAMPLES
+from ..workflow.output_folder import default_folder
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Hold one surface of a batch.
+
+    name: as the user knows it. mesh: its absolute path, or the name of a sample or a model. folder: of its results.
+    """
+
+    name: str
+    mesh: str
+    folder: Path
+
+
+def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
+    """Return the surfaces that are named, each once, in the order they are named, with different folders in `out`.
+
+    Files are known by their absolute paths: a worker with another current folder finds them, too. Raises InputError
+    where nothing is named, and where a folder or a pattern holds no surface.
+    """
+    found: dict[str, str] = {}  # mesh -> name
+    for given in surfaces:
+        for name in _names_in(given):
+            found.setdefault(_mesh_of(name), name)
+    if not found:
+        raise InputError("no surface is named: give files, folders, patterns in quotes, samples or models")
+    folders = distinct_folders(list(found))
+    return [
+        Entry(printable(name), mesh, out.absolute() / folder)
+        for (mesh, name), folder in zip(found.items(), folders, strict=True)
+    ]
+
+
+def _names_in(given: str) -> Iterator[str]:
+    """Yield the files or names that one argument stands for. Raises InputError where it stands for none."""
+    path = Path(given)
+    if path.is_file() or given in SAMPLES or given in MODELS or not given:
+        yield given
+    elif given == SET:
+        yield from in_set()
+    elif path.is_dir():
+        files = sorted(file for file in path.iterdir() if file.is_file() and _is_surface(file))
+        if not files:
+            raise InputError(f"{given}: this folder holds no surface; their names end in {' '.join(FORMATS)}")
+        yield from map(str, files)
+    elif glob.has_magic(given):
+        matches = glob.glob(given, recursive=True)  # noqa: PTH207 - a Path takes no absolute pattern
+        files = sorted(file for file in map(Path, matches) if file.is_file())
+        if not files:
+            raise InputError(f"{given}: no file matches this pattern")
+        yield from map(str, files)
+    else:
+        yield given  # the run refuses it, and the others go on
+
+
+def _is_surface(file: Path) -> bool:
+    name = file.name.lower().removesuffix(".gz")
+    return name.endswith(FORMATS) and not name.startswith(".")
+
+
+def _mesh_of(name: str) -> str:
+    return str(Path(name).resolve()) if Path(name).is_file() else name
+
+
+def distinct_folders(meshes: Sequence[str]) -> list[str]:
+    """Return a folder's name for each of some different surfaces.
+
+    It is the surface's stem, as `run` has it. Where several have the same, all of these take the file's name instead,
+    then with the folder it is in before it, and so on up the path; a number tells apart what is left.
+    """
+    choices = [_folder_names(mesh) for mesh in meshes]
+    level = [0] * len(meshes)
+    while True:
+        names = [choice[at] for choice, at in zip(choices, level, strict=True)]
+        count = Counter(name.casefold() for name in names)  # some file systems do not tell A from a
+        longer = [i for i, name in enumerate(names) if count[name.casefold()] > 1 and level[i] + 1 < len(choices[i])]
+        if not longer:
+            return _numbered(names)
+        for i in longer:
+            level[i] += 1
+
+
+def _folder_names(mesh: str) -> list[str]:
+    """Return names for a surface's folder, from the shortest to the one with the whole path in it."""
+    path = Path(mesh)
+    above = [part for part in path.parts[:-1] if part != path.anchor]
+    return [str(default_folder(mesh)), *("_".join([*above[start:], path.name]) for start in range(len(above), -1, -1))]
+
+
+def _numbered(names: Sequence[str]) -> list[str]:
+    """Return the names with a number behind those that an earlier one has taken."""
+    taken: dict[str, str] = {}
+    for name in names:
+        number, free = 1, name
+        while free.casefold() in taken:
+            number += 1
+            free = f"{name}-{number}"
+        taken[free.casefold()] = free
+    return list(taken.values())
+
+
+def printable(text: str) -> str:
+    """Return the text as every terminal and file takes it: names of files need not be valid UTF-8."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")

@@ -1,0 +1,120 @@
+"""Keeps the table of a batch, one row a surface, and puts it into words, CSV and JSON."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from ..report import document as reports
+from ..report.tables import csv_text
+from ..version import __version__
+from .surfaces import Entry, printable
+from .task import Ended
+
+SCHEMA = 1
+
+State = Literal["certified", "not certified", "not solved", "refused", "failed", "waiting"]
+STATES: tuple[State, ...] = ("certified", "not certified", "not solved", "refused", "failed", "waiting")
+FIGURES = {  # columns of batch.csv: their titles on the page
+    "bijective": "det J > 0",
+    "one_to_one": "one-to-one",
+    "arap_mean": "ARAP mean",
+    "arap_max": "ARAP max",
+    "boundary_rms": "boundary rms",
+    "dofs": "unknowns",
+    "l2_relative": "relative L2 error",
+    "error_estimate_relative": "estimated L2 error",
+    "iterations": "iterations",
+    "seconds": "seconds",
+}
+COLUMNS = ("surface", "folder", "state", *FIGURES, "line")
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """Hold what is known of one surface. line: why it was refused or failed."""
+
+    entry: Entry
+    state: State = "waiting"
+    line: str = ""
+    report: reports.Report | None = None
+
+    def ended(self, how: Ended) -> Row:
+        """Return the row of the surface once its task has ended."""
+        if how.report is not None:
+            return replace(self, state=_verdict(how.report), line="", report=how.report)
+        state: State = "refused" if how.state == "refused" else "failed" if how.state == "failed" else "waiting"
+        return replace(self, state=state, line=printable(how.line.replace(self.entry.mesh, self.entry.name)))
+
+    def verdict(self) -> dict[str, Any]:
+        """Return what decides whether the result is used, as `iga-nn run --json` prints it; empty without a result."""
+        return reports.verdict(self.report, self.entry.folder) if self.report is not None else {}
+
+    def figures(self) -> dict[str, Any]:
+        """Return the numbers of the page, at volume 1 and on the finest mesh; what is not known is None."""
+        known = self.verdict()
+        known |= (known.get("levels") or [{}])[-1]
+        for key, value in known.get("arap", {}).get("unit_volume", {}).items():
+            known[f"arap_{key}"] = value
+        known["boundary_rms"] = known.get("boundary_rms", {}).get("unit_volume")
+        return {name: known.get(name) for name in FIGURES}
+
+    def told(self) -> str:
+        """Return the row as a line of the terminal."""
+        figures = self.figures()
+        facts: list[str] = [self.state, *filter(None, [self.line])]
+        if self.report is not None:
+            facts += [f"ARAP mean {figures['arap_mean']:.3f}", f"{figures['seconds']:.0f} s"]
+        return f"{self.entry.name}: {', '.join(facts)}"
+
+
+def _verdict(report: reports.Report) -> State:
+    if not reports.is_certified(report):
+        return "not certified"
+    return "certified" if reports.is_converged(report) and reports.is_meaningful(report) else "not solved"
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Hold all rows of a batch and the folder of its results, in the order the surfaces were named."""
+
+    folder: Path
+    rows: tuple[Row, ...]
+
+    @property
+    def counts(self) -> dict[State, int]:
+        """Return how many surfaces are in which state, without those that no surface is in."""
+        found = Counter(row.state for row in self.rows)
+        return {state: found[state] for state in STATES if found[state]}
+
+    @property
+    def summary(self) -> str:
+        """Return the counts in one line."""
+        counts = ", ".join(f"{count} {state}" for state, count in self.counts.items())
+        return f"{len(self.rows)} surface{'s' * (len(self.rows) != 1)}: {counts}"
+
+    def with_row(self, number: int, row: Row) -> Batch:
+        """Return the batch with another row in that place."""
+        return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of batch.json: a surface's name, folder, state and line, and its verdict."""
+        rows = [
+            {"surface": row.entry.name, "state": row.state, "line": row.line}
+            | row.verdict()
+            | {"folder": printable(row.entry.folder.name)}
+            for row in self.rows
+        ]
+        return {"schema": SCHEMA, "iga-nn": __version__, "counts": self.counts, "surfaces": rows}
+
+    def as_csv(self) -> str:
+        """Return batch.csv, with all digits."""
+        rows = (
+            {"surface": row.entry.name, "folder": printable(row.entry.folder.name), "state": row.state}
+            | row.figures()
+            | {"line": row.line}
+            for row in self.rows
+        )
+        return csv_text(COLUMNS, rows)

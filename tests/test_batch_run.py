@@ -1,0 +1,135 @@
+"""Batches with worker processes: interrupted, killed, out of memory, and run again."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from mesh_files import CUBE, TRIANGLES, obj
+from small_run import small_surface
+
+HERE = Path(__file__).resolve().parent
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+PATIENCE = 900.0  # seconds, on a busy machine
+
+
+class Command:
+    """`iga-nn batch` in a process group of its own, as a terminal starts it, in a folder with the surfaces."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        scratch = folder / "scratch"
+        scratch.mkdir(exist_ok=True)
+        environment = os.environ | {
+            "PYTHONPATH": os.pathsep.join((str(HERE.parent), str(HERE))),
+            "DASK_DISTRIBUTED__WORKER__PRELOAD": str(HERE / "batch_worker.py"),
+            "TMPDIR": str(scratch),
+        }
+        command = [sys.executable, "-P", "-m", "iga_nn", "batch", *arguments, "--refine", "0", "--out", "out"]
+        self.out, self.err = folder / "stdout", folder / "stderr"
+        with self.out.open("w") as out, self.err.open("w") as err:
+            self.process = subprocess.Popen(
+                command, cwd=folder, env=environment, stdout=out, stderr=err, start_new_session=True
+            )
+        self.scratch = scratch
+
+    def wait_for(self, file: Path) -> str:
+        """The content of a file that a worker writes."""
+        end = time.monotonic() + PATIENCE
+        while not (file.exists() and file.read_text()):
+            assert self.process.poll() is None and time.monotonic() < end, self.err.read_text()
+            time.sleep(0.05)
+        return file.read_text()
+
+    def ended(self) -> int:
+        """The exit code, once the command and all processes it started have ended and left no files."""
+        code = self.process.wait(PATIENCE)
+        end = time.monotonic() + PATIENCE
+        while _is_group(self.process.pid):
+            assert time.monotonic() < end, "processes are left"
+            time.sleep(0.05)
+        assert list(self.scratch.iterdir()) == []
+        assert "Traceback" not in self.err.read_text(), self.err.read_text()
+        return code
+
+
+def _is_group(number: int) -> bool:
+    """Whether a process of that group is left."""
+    try:
+        os.killpg(number, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def table(folder: Path) -> dict[str, dict[str, str]]:
+    with (folder / "out" / "batch.csv").open(newline="") as stream:
+        rows = {Path(row["surface"]).stem: row for row in csv.DictReader(stream)}
+    known = json.loads((folder / "out" / "batch.json").read_text())
+    assert [row["state"] for row in known["surfaces"]] == [row["state"] for row in rows.values()]
+    assert (folder / "out" / "batch.html").read_text().count("<tr>") == 1 + len(rows)
+    return rows
+
+
+def states(folder: Path) -> dict[str, str]:
+    return {name: row["state"] for name, row in table(folder).items()}
+
+
+FINISHED = ("certified", "not certified")  # so short a training need not be certified
+
+
+def test_a_batch_survives_what_happens_to_it(tmp_path):
+    """Interrupted, a worker killed, out of memory, a refused surface; then the failures alone are run again."""
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    surface = small_surface()
+    for name in ("plain", "held"):
+        (parts / f"{name}.obj").write_text(obj(surface.vertices, surface.faces))
+    hold, pid, first = (parts / f"held.{ending}" for ending in ("hold", "pid", "first"))
+    hold.touch()
+
+    interrupted = Command(tmp_path, "parts")
+    interrupted.wait_for(pid)
+    interrupted.wait_for(tmp_path / "out" / "plain" / "report.html")
+    os.killpg(interrupted.process.pid, signal.SIGINT)
+    assert interrupted.ended() == 130
+    last = interrupted.err.read_text().splitlines()[-1]
+    assert last.startswith("iga-nn: interrupted; 2 surfaces: ") and "the same command goes on" in last
+    assert (tmp_path / "out" / "held" / "checkpoint" / "training.safetensors").exists()
+    assert states(tmp_path)["held"] == "waiting"
+
+    pid.unlink()
+    first.unlink()
+    (parts / "hungry.obj").write_text(obj())
+    (parts / "open.obj").write_text(obj(CUBE, TRIANGLES[1:]))
+    written = (tmp_path / "out" / "plain" / "volume.npz").stat().st_mtime_ns
+    killed = Command(tmp_path, "parts", "--memory-limit", "1.5GiB")
+    victim = int(killed.wait_for(pid))
+    assert first.read_text().startswith("corners")  # from the checkpoint of the interrupted command
+    first.unlink()
+    hold.unlink()
+    os.kill(victim, signal.SIGKILL)
+    assert killed.ended() == 2
+    rows = table(tmp_path)
+    assert rows["plain"]["state"] in FINISHED and rows["held"]["state"] == rows["plain"]["state"]
+    assert first.read_text().startswith("corners")  # and from that of the killed worker
+    same = [(tmp_path / "out" / name / "volume.npz").read_bytes() for name in ("plain", "held")]
+    assert same[0] == same[1]
+    assert (tmp_path / "out" / "plain" / "volume.npz").stat().st_mtime_ns == written
+    assert rows["hungry"]["state"] == "failed" and "out of memory" in rows["hungry"]["line"]
+    assert rows["open"]["state"] == "refused" and rows["open"]["line"].startswith("parts/open.obj: ")
+
+    (parts / "hungry.obj").rename(parts / "modest.obj")
+    (parts / "open.obj").write_text(obj())
+    again = Command(tmp_path, "parts", "--json", "--quiet")
+    assert again.ended() in (0, 3)
+    known = json.loads(again.out.read_text())
+    assert {row["state"] for row in known["surfaces"]} <= set(FINISHED)
+    assert sorted(row["folder"] for row in known["surfaces"]) == ["held", "modest", "open", "plain"]
+    assert {path.name for path in tmp_path.iterdir()} == {"parts", "out", "scratch", "stdout", "stderr"}
