@@ -44,6 +44,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "parameterize": "parameterize.run",
     "preset": "parameterize.config",
     "run": "iga_nn.workflow.pipeline",
+    "run_batch": "iga_nn.batch.run",
     "sample": "iga_nn.samples",
     "solve": "solve:solve_problem",
 }

@@ -99,6 +99,24 @@ def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a batch compute its surfaces one after the other in this process, where a training can be replaced."""
+    from contextlib import nullcontext
+    from types import SimpleNamespace
+
+    from iga_nn.batch import cluster
+
+    def computed(client: Any, tasks: Any, options: Any, tell: Any, work: Any = cluster.compute) -> Any:
+        for number, task in enumerate(tasks):
+            yield number, work(task, number, "batch")
+
+    worker = SimpleNamespace(log_event=lambda topic, message: None)
+    monkeypatch.setattr("distributed.get_worker", lambda: worker)
+    monkeypatch.setattr(cluster, "connected", lambda *_: nullcontext())
+    monkeypatch.setattr(cluster, "computed", computed)
+
+
+@pytest.fixture
 def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let VTK draw a tenth of the pixels: without a graphics card they are what a figure costs."""
     for module in ("map", "style"):

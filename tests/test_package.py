@@ -14,7 +14,7 @@ import pytest
 import iga_nn
 
 NUMERICS = ("numpy", "scipy", "numba", "igl", "torch", "matplotlib", "vtk", "pyvista", "trimesh", "meshio")
-HEAVY = ("torch", "vtk", "vtkmodules", "pyvista", "trame", "aiohttp")
+HEAVY = ("torch", "vtk", "vtkmodules", "pyvista", "trame", "aiohttp", "dask", "distributed")
 ROOT = Path(iga_nn.__file__).resolve().parents[1]
 
 

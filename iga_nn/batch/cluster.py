@@ -18,7 +18,7 @@ from distributed import CancelledError, Client, Future, KilledWorker, LocalClust
 
 from ..errors import InputError, one_line
 from .options import WorkerOptions
-from .task import LESS_MEMORY, Ended, Task, compute, stop
+from .task import LESS_MEMORY, Ended, Task, Work, compute, stop
 
 log = logging.getLogger(__name__)
 
@@ -121,7 +121,7 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def computed(
-    client: Client, tasks: Sequence[Task], options: WorkerOptions, tell: Told
+    client: Client, tasks: Sequence[Task], options: WorkerOptions, tell: Told, work: Work = compute
 ) -> Generator[tuple[int, Ended], None, None]:
     """Yield the number of each task and how it ended, as they end; one that failed is tried again before that.
 
@@ -136,7 +136,7 @@ def computed(
         while waiting or running:
             free = max(0, sum(client.nthreads().values()) - len(running))
             for number in waiting[:free]:
-                running[client.submit(compute, tasks[number], number, batch, pure=False)] = number
+                running[client.submit(work, tasks[number], number, batch, pure=False)] = number
             del waiting[:free]
             for future in _first_ended(list(running)):
                 number, how = running.pop(future), _ended(client, future)

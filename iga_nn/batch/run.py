@@ -20,7 +20,7 @@ from .options import WorkerOptions
 from .page import page
 from .surfaces import Entry, entries_of
 from .table import Batch, Row
-from .task import Ended, Task
+from .task import Ended, Task, Work, compute
 
 log = logging.getLogger(__name__)
 
@@ -78,15 +78,19 @@ def run_tasks(
     *,
     force: bool = False,
     progress: Progress | None = None,
+    work: Work = compute,
 ) -> Batch:
-    """Compute tasks, one for each entry, as `run_batch` does; their options may differ."""
+    """Compute tasks, one for each entry, as `run_batch` does; their options may differ.
+
+    work: a function of a module that the workers can import; it calls `compute` with its arguments.
+    """
     workers.check()
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
     with locked(out):
         batch = Batch(out, tuple(_found(entry, task, force) for entry, task in zip(entries, tasks, strict=True)))
         if "waiting" in batch.counts:
-            return _computed(batch, tasks, workers, progress or (lambda *_: None))
+            return _computed(batch, tasks, workers, progress or (lambda *_: None), work)
         _write(batch)
         return batch
 
@@ -104,7 +108,7 @@ def _found(entry: Entry, task: Task, force: bool) -> Row:
     return row if finished is None else row.ended(Ended("done", report=finished.report))
 
 
-def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progress: Progress) -> Batch:
+def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progress: Progress, work: Work) -> Batch:
     """Return the batch once the surfaces that wait are computed; write it after each."""
     try:
         from . import cluster
@@ -130,7 +134,7 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
         show()
         with (
             cluster.connected(workers, len(waiting)) as client,
-            closing(cluster.computed(client, [tasks[number] for number in waiting], workers, tell)) as ended,
+            closing(cluster.computed(client, [tasks[number] for number in waiting], workers, tell, work)) as ended,
         ):
             for at, how in ended:
                 row = batch.rows[waiting[at]].ended(how)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import time
 import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -47,27 +49,44 @@ class Ended:
     report: Report | None = None
 
 
+Work = Callable[[Task, int, str], Ended]
+
+
 def compute(task: Task, number: int, batch: str) -> Ended:
     """Compute a surface from its checkpoint, where there is one, into its folder.
 
     number: of the surface in the batch, for the steps that are told. Nothing is raised; the traceback of an internal
     error is printed here, since only this process knows it.
     """
-    for logger in map(logging.getLogger, LOGGERS):  # its warnings are in the report; the terminal shows one line of it
-        logger.addHandler(logging.NullHandler())
-        logger.propagate = False
     teller = _Teller(task, number, batch)
+    with _silent():
+        try:
+            return Ended("done", report=_run(task, teller.step))
+        except KeyboardInterrupt:
+            return Ended("stopped")
+        except expected_errors() as error:
+            return Ended("refused", one_line(error))
+        except Exception as error:
+            if isinstance(error, MemoryError) or "can't allocate memory" in str(error):  # the latter is torch's
+                return Ended("failed", f"out of memory: {LESS_MEMORY}")
+            traceback.print_exc()
+            return Ended("failed", f"internal error, please report it: {type(error).__name__}: {one_line(error)}")
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep the log of a run, whose warnings are in its report, off the terminal: a surface has one line there."""
+    handler, loggers = logging.NullHandler(), [logging.getLogger(name) for name in LOGGERS]
+    before = [logger.propagate for logger in loggers]
+    for logger in loggers:
+        logger.addHandler(handler)
+        logger.propagate = False
     try:
-        return Ended("done", report=_run(task, teller.step))
-    except KeyboardInterrupt:
-        return Ended("stopped")
-    except expected_errors() as error:
-        return Ended("refused", one_line(error))
-    except Exception as error:
-        if isinstance(error, MemoryError) or "can't allocate memory" in str(error):  # the latter is torch's
-            return Ended("failed", f"out of memory: {LESS_MEMORY}")
-        traceback.print_exc()
-        return Ended("failed", f"internal error, please report it: {type(error).__name__}: {one_line(error)}")
+        yield
+    finally:
+        for logger, propagate in zip(loggers, before, strict=True):
+            logger.removeHandler(handler)
+            logger.propagate = propagate
 
 
 def _run(task: Task, progress: Any) -> Report:
