@@ -54,7 +54,7 @@ class Command:
         while _is_group(self.process.pid):
             assert time.monotonic() < end, "processes are left"
             time.sleep(0.05)
-        assert list(self.scratch.iterdir()) == []
+        assert not [path for path in self.scratch.iterdir() if "torch" not in path.name]  # torch keeps a cache
         assert "Traceback" not in self.err.read_text(), self.err.read_text()
         return code
 

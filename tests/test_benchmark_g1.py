@@ -2,19 +2,21 @@ from __future__ import annotations
 
 import csv
 import io
-import sys
+import os
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+import dask
 import pytest
-from conftest import formula_parameterization
 from example_files import cells, load
-from shapes import rounded_cube
+from mesh_files import obj
+from small_run import small_surface
 
 import iga_nn
+import solve
 from iga_nn.options import MapOptions
 from iga_nn.samples import write_obj
-from parameterize.surface.surface import surface_from_arrays
 
 g1 = load("benchmarks/g1")
 
@@ -125,8 +127,8 @@ def test_models_that_are_not_there_have_their_rows(tmp_path, capsys):
 
 def test_models_are_looked_for_in_the_folder_of_the_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("IGA_NN_DATA", str(tmp_path))
-    chosen, child = g1._options(["--out", str(tmp_path / "out"), "--only", "pig", "conch"])
-    assert chosen.models == tmp_path and chosen.names == ("conch", "pig") and child is None
+    chosen = g1._options(["--out", str(tmp_path / "out"), "--only", "pig", "conch"])
+    assert chosen.models == tmp_path and chosen.names == ("conch", "pig")
     (tmp_path / "pig.mesh").touch()
     (tmp_path / "santa4.obj").touch()
     assert g1._file("pig", tmp_path).name == "pig.mesh"
@@ -144,85 +146,79 @@ def test_bad_arguments_are_one_line(tmp_path, capsys):
     assert "--preset" in error_of(capsys, *here, "--preset", "slow")
     assert "nowhere: no such folder" in error_of(capsys, "--models", "nowhere")
     (tmp_path / "file").touch()
-    assert "file: cannot be written" in error_of(capsys, *here, "--out", str(tmp_path / "file"))
-
-
-@pytest.fixture(scope="module")
-def given_by_formula():
-    return formula_parameterization()
+    assert g1.main([*here, "--out", str(tmp_path / "file")]) == 2
+    assert "file: cannot be written" in capsys.readouterr().err
 
 
 @pytest.fixture
-def formula(given_by_formula, tmp_path, monkeypatch):
-    """A duck whose parameterization is given by formula, in this process."""
-    write_obj(iga_nn.sample("cube"), tmp_path / "duck.obj")
-    monkeypatch.setattr(iga_nn, "parameterize", lambda *_, **__: given_by_formula)
-    return options(tmp_path, mapping=MapOptions(device="cpu", steps_factor=0.001))
+def formula(formula_training, in_this_process, in_folder):
+    """Arguments for a duck whose map is given by formula, in this process."""
+    formula_training()
+    write_obj(iga_nn.sample("cube"), "duck.obj")
+    return ["--models", ".", "--out", "out", "--only", "duck", "--steps-factor", "0.001"]
 
 
-def test_a_row_holds_what_was_measured(formula):
-    row = g1.run_model("duck", formula)
-    assert row.status == "done" and row.verdict == "certified" and None not in vars(row).values()
-    assert row.flipped_triangles == 0 and row.seconds_train == 1.0 and row.boundary_rms_as_given < 1e-12
-    assert row.arap_mean == row.arap_mean_unit_volume
-    assert row.seconds_in_t_cal == row.seconds / row.t_cal
-    assert row.l2_refine_1 < row.l2_refine_0 < 1e-2
+def test_a_row_holds_what_was_measured_and_is_kept(formula, capsys):
+    assert g1.main(formula) == 0
+    row = table(Path("out"))["duck"]
+    assert row["status"] == "done" and row["verdict"] == "certified" and "" not in row.values()
+    assert row["flipped_triangles"] == "0" and row["seconds_train"] == "1.0"
+    assert float(row["boundary_rms_as_given"]) < 1e-12
+    assert float(row["seconds"]) == pytest.approx(2.1)  # train, fit, optimize, certify
+    assert float(row["seconds_in_t_cal"]) == float(row["seconds"]) / float(row["t_cal"])
+    assert float(row["l2_refine_1"]) < float(row["l2_refine_0"]) < 1e-2
+    assert "duck: done, certified, ARAP mean " in capsys.readouterr().out
+    written = Path("out/duck/volume.npz").stat().st_mtime_ns
+    assert g1.main(formula) == 0 and table(Path("out"))["duck"] == row
+    assert Path("out/duck/volume.npz").stat().st_mtime_ns == written
 
 
-def test_after_an_error_the_figures_known_before_stay(formula, monkeypatch, capsys):
-    def fail(*_, **__):
-        raise RuntimeError("no memory\nleft")
-
-    monkeypatch.setattr(iga_nn, "solve", fail)
-    row = g1.run_model("duck", formula)
-    assert row.status == "no memory left" and row.verdict == "certified" and row.l2_refine_0 is None
-    assert "Traceback" in capsys.readouterr().err
+def test_what_went_on_from_a_checkpoint_has_no_time(formula):
+    checkpoint = Path("out/duck/checkpoint/training.safetensors")
+    checkpoint.parent.mkdir(parents=True)
+    checkpoint.touch()
+    assert g1.main(formula) == 0
+    row = table(Path("out"))["duck"]
+    assert row["verdict"] == "certified" and row["seconds"] == row["t_cal"] == row["seconds_train"] == ""
 
 
 def test_a_solve_that_does_not_converge_is_a_status(formula, monkeypatch):
-    def solve(*arguments, **given):
-        from solve import solve_problem
-
-        return solve_problem(*arguments, **given, max_iterations=1)
-
-    monkeypatch.setattr(iga_nn, "solve", solve)
-    row = g1.run_model("duck", formula)
-    assert "did not converge" in row.status and row.iterations_refine_0 == 1
+    monkeypatch.setattr(solve, "solve_problem", partial(solve.solve_problem, max_iterations=1))
+    assert g1.main(formula) == 1
+    row = table(Path("out"))["duck"]
+    assert "did not converge" in row["status"] and row["iterations_refine_0"] == "1"
 
 
-def test_a_process_that_dies_is_a_row(formula, monkeypatch):
-    monkeypatch.setattr(g1, "_command", lambda *_: [sys.executable, "-c", "import os; os.abort()"])
-    (row,) = g1._results(replace(formula, names=("duck",)))
-    assert row == g1.Row("duck", "its process ended with code -6, without a result")
+def test_a_failure_is_a_row(formula, formula_training, capsys):
+    formula_training(error=RuntimeError("no idea\nwhy"))
+    assert g1.main(formula) == 1
+    row = table(Path("out"))["duck"]
+    assert row["status"] == "internal error, please report it: RuntimeError: no idea why" and row["verdict"] == ""
+    assert "Traceback" in capsys.readouterr().err
 
 
+def test_an_interruption_keeps_the_rows(formula, formula_training, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr("iga_nn.batch.cluster.computed", interrupted)
+    assert g1.main(formula) == 130
+    assert "Not finished yet: duck." in Path("out/g1.md").read_text()
+    assert capsys.readouterr().err == "g1.py: interrupted; 1 surface: 1 waiting; the same command goes on\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_models_run_in_processes_of_their_own(tmp_path):
-    write_obj(surface_from_arrays(*rounded_cube(200, power=5.0)), tmp_path / "duck.obj")
+    surface = small_surface()
+    (tmp_path / "duck.obj").write_text(obj(surface.vertices, surface.faces))
     (tmp_path / "pig.obj").write_text("no surface\n")
-    quick = ["--steps-factor", "0.003", "--control-points", "6", "--jobs", str(g1.processes.cores())]
-    arguments = ["--models", str(tmp_path), "--out", str(tmp_path), "--only", "pig", "duck", *quick]
-    assert g1.main(arguments) == 1
-    found = table(tmp_path)
+    arguments = ["--models", str(tmp_path), "--out", str(tmp_path / "out"), "--only", "pig", "duck"]
+    with dask.config.set({"distributed.worker.preload": [str(Path(__file__).with_name("batch_worker.py"))]}):
+        assert g1.main([*arguments, "--steps-factor", "0.003"]) == 1
+    found = table(tmp_path / "out")
     assert list(found) == ["duck", "pig"]
     assert "pig.obj" in found["pig"]["status"] and found["pig"]["verdict"] == ""
-    assert found["duck"]["verdict"] in ("certified", "folded", "undecided") and found["duck"]["threads"] == "1"
+    assert found["duck"]["verdict"] in ("certified", "folded", "undecided")
+    assert int(found["duck"]["threads"]) == g1.processes.cores()
     assert float(found["duck"]["seconds"]) > 0.0 and float(found["duck"]["t_cal"]) > 0.0
-
-
-@pytest.mark.parametrize(
-    ("error", "code", "said"),
-    [
-        (KeyboardInterrupt(), 130, "bench: interrupted after 2 rows; they stay\n"),
-        (OSError(28, "No space left on device", "g1.csv"), 2, "bench: g1.csv: No space left on device\n"),
-    ],
-)
-def test_rows_before_an_interruption_are_kept(error, code, said, capsys):
-    kept = []
-
-    def rows():
-        yield from (1, 2)
-        raise error
-
-    found = g1.processes.collect("bench", rows(), lambda rows: kept.append(list(rows)), str, "they stay")
-    assert found == ([1, 2], code) and kept == [[1], [1, 2]]
-    assert capsys.readouterr() == ("1\n2\n", said)

@@ -2,20 +2,18 @@ from __future__ import annotations
 
 import csv
 import io
-import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from example_files import cells, load, shown
+from example_files import cells, load
 
-from iga_nn import sample
 from iga_nn.options import MapOptions
 
 stress = load("benchmarks/stress")
-shapes = stress.hard_shape.__globals__
+shapes = stress.compute_shape.__globals__
+stress_shape = shapes["hard_shape"]
 
 ROW = stress.Row(
     7,
@@ -42,7 +40,7 @@ def options(folder, **given):
 
 @pytest.mark.parametrize("number", range(10))
 def test_each_kind_is_a_sound_surface(number):
-    surface = stress.hard_shape(number)
+    surface = stress_shape(number)
     assert surface.name == f"{number:03d}-{stress.KINDS[number]}"
     assert len(surface.crossings) == 0 and 1500 <= len(surface.faces) <= 3000
 
@@ -57,10 +55,10 @@ def test_equal_numbers_are_equal_shapes_and_others_are_not():
     assert points(kind).shape != points(kind + 10).shape
 
 
-def test_kinds_take_turns():
+def test_kinds_take_turns(tmp_path):
     kinds = [stress.kind_of(number) for number in range(40)]
     assert {kinds.count(kind) for kind in stress.KINDS} == {4}
-    chosen, _ = stress._options(["--count", "16", "--kinds", "thin", "long", "--out", "/tmp"])
+    chosen = stress._options(["--count", "16", "--kinds", "thin", "long", "--out", str(tmp_path)])
     assert chosen.numbers == (3, 5, 13, 15)
 
 
@@ -92,38 +90,42 @@ def test_the_table_gives_shares_by_kind_and_lists_what_failed(tmp_path):
     assert "no measurement" in stress.as_text([ROW], quick)
 
 
-def test_finished_rows_are_not_run_again(tmp_path, monkeypatch):
-    chosen = options(tmp_path, numbers=(7, 8))
-    (tmp_path / "rows").mkdir()
-    chosen.row_file(7).write_text(json.dumps(vars(replace(ROW, settings=chosen.settings))))
-    chosen.row_file(8).write_text(json.dumps(vars(replace(ROW, number=8, settings="others"))))
-    monkeypatch.setattr(stress, "_command", lambda *_: [sys.executable, "-c", "import os; os.abort()"])
-    done, lost = stress.results(chosen)
-    assert done.number == 7 and done.certified
-    assert lost.number == 8 and lost.error == "its process ended with code -6, without a result"
-    assert json.loads(chosen.row_file(8).read_text())["settings"] == "others"  # a killed one is tried again
+@pytest.fixture
+def formula(formula_training, in_this_process, in_folder):
+    """Arguments for one surface that is made and then given a map by formula, in this process."""
+    formula_training()
+    return ["--count", "6", "--kinds", "bumpy", "--steps-factor", "0.001", "--out", "out"]
 
 
-def test_a_surface_end_to_end_and_not_twice(tmp_path, capsys):
-    arguments = ["--count", "6", "--kinds", "bumpy", "--out", str(tmp_path)]
-    arguments += ["--steps-factor", "0.003", "--control-points", "5"]
-    assert stress.main(arguments) == 0
-    (row,) = csv.DictReader(io.StringIO((tmp_path / "stress.csv").read_text()))
-    assert row["number"] == "0" and row["kind"] == "bumpy"
-    assert row["verdict"] in ("certified", "folded", "undecided") and float(row["t_cal"]) > 0.0
-    assert (tmp_path / "000-bumpy.obj").exists() == (
-        row["verdict"] != "certified" or row["boundary_injective"] == "False"
-    )
-    written = (tmp_path / "rows" / "000.json").stat().st_mtime_ns
-    assert stress.main(arguments) == 0
-    assert (tmp_path / "rows" / "000.json").stat().st_mtime_ns == written
-    assert "000-bumpy" in capsys.readouterr().out
+def rows(folder="out"):
+    return list(csv.DictReader(io.StringIO(Path(folder, "stress.csv").read_text())))
 
 
-def test_the_picture_shows_the_surface_and_the_places(tmp_path):
-    surface = sample("bean")
-    stress.draw(surface, surface.vertices[:3], tmp_path / "bean.png")
-    assert shown(tmp_path / "bean.png")
+def test_a_surface_end_to_end_and_not_twice(formula, capsys):
+    assert stress.main(formula) == 0
+    (row,) = rows()
+    assert row["number"] == "0" and row["kind"] == "bumpy" and row["verdict"] == "certified" and row["error"] == ""
+    assert int(row["faces"]) == len(stress_shape(0).faces) and float(row["t_cal"]) > 0.0
+    assert float(row["seconds"]) == pytest.approx(2.1)
+    assert Path("out/surfaces/000-bumpy.obj").is_file() and Path("out/000-bumpy/report.html").is_file()
+    written = Path("out/000-bumpy/volume.npz").stat().st_mtime_ns
+    assert stress.main(formula) == 0 and rows() == [row]
+    assert Path("out/000-bumpy/volume.npz").stat().st_mtime_ns == written
+    assert "000-bumpy: certified" in capsys.readouterr().out
+
+
+def test_a_result_of_other_settings_is_left_alone(formula):
+    assert stress.main(formula) == 0
+    assert stress.main([*formula, "--control-points", "20"]) == 0
+    (row,) = rows()
+    assert row["verdict"] == "" and "holds the result of" in row["error"]
+
+
+def test_a_shape_that_cannot_be_made_is_a_row(formula, monkeypatch):
+    monkeypatch.setitem(shapes, "TRIES", 0)
+    assert stress.main(formula) == 0
+    (row,) = rows()
+    assert row["error"] == "000-bumpy: intersects itself even after 0 tries"
 
 
 def test_bad_arguments_are_one_line(tmp_path, capsys):

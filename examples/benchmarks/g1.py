@@ -3,32 +3,33 @@
     python examples/benchmarks/g1.py --jobs 2
     python examples/benchmarks/g1.py --models DIR --only bunny duck --out out/g1
 
-Writes g1.csv (every figure) and g1.md, anew after each model. Every model has a process of its own with cores // jobs
-threads, on the CPU also where there is a GPU. Right before a run the same process measures t_cal, the wall seconds of
-1e12 floating-point operations: seconds / t_cal compares between machines. A model that cannot be run keeps its
-row, which says why; the paper's santa4 is not public, its row waits for santa4.obj.
+Runs the models as `iga-nn batch` does: each has a folder with its report, and the same command skips what is finished
+and goes on from checkpoints. Writes g1.csv (every figure) and g1.md, anew after each model; copy them to results/ when
+they are to be kept. A worker has cores // jobs threads, on the CPU also where there is a GPU. Right before a run it
+measures t_cal, the wall seconds of 1e12 floating-point operations: seconds / t_cal compares between machines. A model
+that cannot be run keeps its row, which says why; the paper's santa4 is not public, its row waits for santa4.obj.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import time
-import traceback
-from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any, Literal
 
 import processes
 
-import iga_nn
-from iga_nn.errors import InputError, one_line
+from iga_nn.batch.options import WorkerOptions
+from iga_nn.batch.table import Batch
+from iga_nn.batch.table import Row as Known
+from iga_nn.batch.task import Task
+from iga_nn.errors import InputError
 from iga_nn.models import DATA_FOLDER
-from iga_nn.options import MapOptions
+from iga_nn.options import MapOptions, PoissonOptions
 from iga_nn.report import document as reports
+from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.files import save_text
 from solve.forms.poisson import DEFAULT_EXACT
 
@@ -74,7 +75,8 @@ class Row:
     """What is known of one model, the columns of g1.csv; distances between spline and mesh at the scale it came in.
 
     status: "done", or in one line why figures are missing or not to be trusted.
-    seconds: wall, of the parameterization alone; t_cal: wall seconds of 1e12 operations on the same threads.
+    seconds: wall, of the parameterization alone; t_cal: wall seconds of 1e12 operations on the same threads. Both are
+    unknown where the run was interrupted and went on.
     """
 
     model: str
@@ -140,33 +142,44 @@ class Options:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the models and write the tables; 0 done, 1 a row has a failure, 2 bad arguments, 130 interrupted."""
-    options, child = _options(argv)
-    if child:
-        return processes.answer(lambda: run_model(child, options))
-    remains = f"they are in {options.out / 'g1.csv'}"
-    found = _results(options)
-    rows, failed = processes.collect("g1.py", found, lambda rows: write_tables(rows, options), _told, remains)
-    if failed:
-        return failed
-    print(f"{summary(rows)}\n{options.out / 'g1.md'}")
-    return int(any(row.status not in (DONE, ABSENT) for row in rows))
+    options = _options(argv)
+    absent = [Row(name, why) for name in options.names if (why := _absence(name, options.models))]
+    tasks = _tasks(options, leave_out=[row.model for row in absent])
+    found: list[Row] = []
+
+    def keep(batch: Batch) -> None:
+        found[:] = absent + [row_of(known) for known in batch.rows if known.state != "waiting"]
+        write_tables(found, options)
+
+    workers = WorkerOptions(workers=options.jobs, threads_per_worker=options.threads, memory_limit="0")
+    if code := processes.run("g1.py", options.out, tasks, workers, keep):
+        return code
+    print(*map(_told, found), summary(found), options.out / "g1.md", sep="\n")
+    return int(any(row.status not in (DONE, ABSENT) for row in found))
 
 
 def _told(row: Row) -> str:
-    if row.arap_mean is None or row.seconds is None:
+    if row.arap_mean is None:
         return f"{row.model}: {row.status}"
-    return f"{row.model}: {row.status}, {row.verdict}, ARAP mean {row.arap_mean:.3f}, {row.seconds:.0f} s"
+    seconds = "" if row.seconds is None else f", {row.seconds:.0f} s"
+    return f"{row.model}: {row.status}, {row.verdict}, ARAP mean {row.arap_mean:.3f}{seconds}"
 
 
 # Arguments
 
 
-def _options(argv: list[str] | None) -> tuple[Options, str | None]:
-    """The options, and the one model to run in this process, where it is a child."""
+def _options(argv: list[str] | None) -> Options:
     parser = _parser()
     given = parser.parse_args(argv)
     unknown = [name for name in given.only if name not in PAPER]
-    mapping = MapOptions(given.preset, given.seed, "cpu", given.control_points, steps_factor=given.steps_factor)
+    mapping = MapOptions(
+        preset=given.preset,
+        seed=given.seed,
+        device="cpu",
+        control_points=given.control_points,
+        steps_factor=given.steps_factor,
+        resume=True,
+    )
     if unknown:
         parser.error(f"--only {' '.join(unknown)}: no such model; the models are {', '.join(PAPER)}")
     if given.jobs < 1:
@@ -175,14 +188,10 @@ def _options(argv: list[str] | None) -> tuple[Options, str | None]:
         parser.error(f"{given.models}: no such folder; name the models' with --models or {DATA_FOLDER}")
     try:
         mapping.config()
-        given.out.mkdir(parents=True, exist_ok=True)
-        TemporaryFile(dir=given.out).close()  # before hours of work, not after
     except InputError as error:
         parser.error(str(error))
-    except OSError as error:
-        parser.error(f"{given.out}: cannot be written ({error.strerror}); --out names another folder")
     names = tuple(name for name in PAPER if name in (given.only or PAPER))
-    return Options(given.models, names, mapping, given.jobs, given.out), given.child
+    return Options(given.models, names, mapping, given.jobs, given.out)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -190,7 +199,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="g1.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     models = Path(os.environ.get(DATA_FOLDER) or REPOSITORY.parent / "shared" / "models")
-    results = Path(__file__).resolve().parent / "results"
+    results = Path("out/g1")
     parser.add_argument("--models", type=Path, default=models, help=f"folder of NAME.obj (default: {models})")
     parser.add_argument("--jobs", type=int, default=1, help="models at a time (default: 1)")
     parser.add_argument("--preset", default="fast", choices=("fast", "paper"))
@@ -198,39 +207,27 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--only", nargs="+", default=[], metavar="NAME", help="these alone, and no others in the tables"
     )
-    parser.add_argument("--out", type=Path, default=results, help=f"folder of the tables (default: {results})")
+    parser.add_argument("--out", type=Path, default=results, help=f"folder of the results (default: {results})")
     parser.add_argument("--steps-factor", type=float, default=1.0, help="shorten every stage, for a quick look")
     parser.add_argument("--control-points", type=int, default=30, help="per direction (default: 30)")
-    parser.add_argument("--child", help=argparse.SUPPRESS)
     return parser
 
 
-# Processes, one a model
+# Models
 
 
-def _command(name: str, options: Options) -> list[str]:
-    mapping = options.mapping
-    values = {
-        "child": name,
-        "models": options.models,
-        "jobs": options.jobs,
-        "preset": mapping.preset,
-        "seed": mapping.seed,
-        "out": options.out,
-        "steps-factor": mapping.steps_factor,
-        "control-points": mapping.control_points,
+def _tasks(options: Options, leave_out: Sequence[str]) -> dict[str, Task]:
+    """The runs, by model."""
+    return {
+        name: Task(
+            str(_file(name, options.models).absolute()),
+            (options.out / name).absolute(),
+            options.mapping,
+            PoissonOptions(exact=PAPER_EXACT.get(name, DEFAULT_EXACT)),
+        )
+        for name in options.names
+        if name not in leave_out
     }
-    return processes.script(__file__, values)
-
-
-def _results(options: Options) -> Generator[Row, None, None]:
-    """Each model's row as soon as it is known; processes still running end with this generator."""
-    absent = {name: why for name in options.names if (why := _absence(name, options.models))}
-    yield from (Row(name, why) for name, why in absent.items())
-    commands = {name: _command(name, options) for name in options.names if name not in absent}
-    with closing(processes.in_processes(commands, options.threads, options.jobs)) as running:
-        for ended in running:
-            yield Row(ended.name, ended.failure) if ended.result is None else Row(**ended.result)
 
 
 def _file(name: str, folder: Path) -> Path:
@@ -247,57 +244,33 @@ def _absence(name: str, folder: Path) -> str | None:
     return ABSENT if name == "santa4" else f"{path}: not found; there, `iga-nn fetch {name}` gets it"
 
 
-# One model
-
-
-def run_model(name: str, options: Options) -> Row:
-    """All figures of one model; after an error those known before it, and its message as the status."""
-    row = Row(name)
-    try:
-        surface = iga_nn.load_surface(_file(name, options.models))
-        run = iga_nn.parameterize  # loads torch
-        t_cal, threads = processes.calibrate(min(1.0, options.mapping.steps_factor))
-        start = time.perf_counter()
-        result = run(surface, options.mapping.config(), seed=options.mapping.seed, device=options.mapping.device)
-        seconds = time.perf_counter() - start
-        row = replace(row, seconds=seconds, threads=threads, t_cal=t_cal, seconds_in_t_cal=seconds / t_cal)
-        row = replace(row, **_figures(result))
-        return replace(row, **_solved(result, PAPER_EXACT.get(name, DEFAULT_EXACT)))
-    except Exception as error:
-        if not isinstance(error, iga_nn.MeshError):
-            traceback.print_exc()
-        return replace(row, status=one_line(error) or type(error).__name__)
-
-
-def _figures(result: iga_nn.Parameterization) -> dict[str, Any]:
-    """Quality, foldings and seconds of the stages, by column."""
-    quality = result.quality
+def row_of(known: Known) -> Row:
+    """All figures of one model, from its folder; why there are none as the status."""
+    if known.report is None:
+        return Row(known.entry.name, known.line)
+    report, times = known.report, processes.times_of(known)
+    quality, levels = report["parameterization"], report["poisson"]["levels"]
     found: dict[str, Any] = {
-        "verdict": quality.certificate.verdict,
-        "det_lower_bound": quality.as_dict()["det_lower_bound"],
-        "flipped_triangles": len(result.boundary.flipped()),
+        "verdict": quality["bijective"],
+        "det_lower_bound": quality["det_lower_bound"],
+        "flipped_triangles": len(BoundaryMap.load(known.entry.folder / "boundary.npz").flipped()),
+        "exact": report["poisson"]["exact"],
     }
     for scale in ("unit_volume", "as_given"):
-        arap = getattr(quality.arap, scale)
-        found |= {f"arap_mean_{scale}": arap.mean, f"arap_max_{scale}": arap.max}
-        found[f"boundary_rms_{scale}"] = getattr(quality.boundary, scale).rms
+        arap = quality["arap"][scale]
+        found |= {f"arap_mean_{scale}": arap["mean"], f"arap_max_{scale}": arap["max"]}
+        found[f"boundary_rms_{scale}"] = quality["boundary"][scale]["rms"]
     for name in ("spline_to_mesh", "mesh_to_spline"):
-        distances = getattr(quality, name).as_given
-        found |= {f"{name}_rms": distances.rms, f"{name}_max": distances.max}
-    return found | {f"seconds_{stage}": result.seconds[stage] for stage in ("train", "fit", "optimize", "certify")}
-
-
-def _solved(result: iga_nn.Parameterization, exact: str) -> dict[str, Any]:
-    """L2 errors and iterations of the two levels, by column; a status where the solver did not converge."""
-    problem = iga_nn.Poisson(exact=exact)
-    found: dict[str, Any] = {"exact": exact}
-    for level in (0, 1):
-        report = iga_nn.solve(result.volume, problem, refine=level, certified=result.certificate.verdict).report
-        found |= {f"l2_relative_refine_{level}": report.l2_relative, f"l2_refine_{level}": report.l2}
-        found[f"iterations_refine_{level}"] = report.iterations
-        if not report.converged:
+        distances = quality["surface_distance"][name]["as_given"]
+        found |= {f"{name}_rms": distances["rms"], f"{name}_max": distances["max"]}
+    for level, solved in enumerate(levels):
+        found |= {f"l2_relative_refine_{level}": solved["l2_relative"], f"l2_refine_{level}": solved["l2"]}
+        found[f"iterations_refine_{level}"] = solved["iterations"]
+        if not solved["converged"]:
             found["status"] = f"the solver did not converge at refine {level}"
-    return found
+    if times:
+        found["seconds_in_t_cal"] = times["seconds"] / times["t_cal"]
+    return Row(known.entry.name, **found, **times)
 
 
 # Tables
@@ -435,5 +408,4 @@ def _machine(options: Options) -> str:
 
 
 if __name__ == "__main__":
-    processes.end_children_on_term()
     raise SystemExit(main())

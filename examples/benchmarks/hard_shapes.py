@@ -8,14 +8,17 @@ itself, or parts have grown together, the same shape is made anew, milder.
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import igl
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
+from processes import compute_measured
 from scipy.spatial.transform import Rotation
 
-from iga_nn.samples import GOLDEN_ANGLE, ball, outward_hull
+from iga_nn.batch.task import Ended, Task
+from iga_nn.samples import GOLDEN_ANGLE, ball, outward_hull, write_obj
 from parameterize.surface.self_intersection import crossing_faces
 from parameterize.surface.surface import MeshError, Surface, surface_from_arrays
 
@@ -40,6 +43,17 @@ def hard_shape(number: int) -> Surface:
             return surface_from_arrays(vertices, faces, name)
         severity *= MILDER
     raise MeshError(f"{name}: intersects itself even after {TRIES} tries")
+
+
+def compute_shape(task: Task, number: int, batch: str) -> Ended:
+    """Make the surface that `task.mesh` names, NNN-kind.obj, where it is not there; then compute it, measured."""
+    mesh = Path(task.mesh)
+    try:
+        if not mesh.is_file():
+            write_obj(hard_shape(int(mesh.stem.partition("-")[0])), mesh)
+    except MeshError as error:
+        return Ended("refused", str(error))
+    return compute_measured(task, number, batch)
 
 
 def kind_of(number: int) -> str:

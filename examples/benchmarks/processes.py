@@ -1,31 +1,30 @@
-"""What the benchmarks share: a process of its own for every row, arguments refused in one line, tables."""
+"""What the benchmarks share: surfaces measured in worker processes, arguments refused in one line, tables."""
 
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import json
 import os
 import platform
-import signal
-import subprocess
 import sys
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-from contextlib import closing
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from tempfile import TemporaryFile
-from typing import IO, Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
-from iga_nn.errors import one_line
-from iga_nn.report.document import plain
+from iga_nn.batch.options import WorkerOptions
+from iga_nn.batch.run import Running, run_tasks
+from iga_nn.batch.surfaces import Entry
+from iga_nn.batch.table import Batch, Row
+from iga_nn.batch.task import Ended, Task, compute
+from iga_nn.errors import InputError
+from iga_nn.report.tables import csv_text as as_csv  # noqa: F401 - the benchmarks take it from here
+from iga_nn.workflow.output_folder import has_checkpoint
+from parameterize.files import save_text
 
 BAD_INPUT, INTERRUPTED = 2, 130
-POLL = 0.2  # seconds
-Row = TypeVar("Row")
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+CALIBRATION = "calibration.json"  # in the folder of a surface
+STAGES = ("train", "fit", "optimize", "certify")
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -41,114 +40,66 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-@dataclass(frozen=True)
-class Ended:
-    """A process that has ended. result: the JSON object of the last line it printed; None where there is none."""
-
-    name: str
-    code: int
-    result: dict[str, Any] | None
-
-    @property
-    def failure(self) -> str:
-        """In words."""
-        return f"its process ended with code {self.code}, without a result"
+# Surfaces in worker processes
 
 
-def in_processes(commands: Mapping[str, Sequence[str]], threads: int, jobs: int) -> Generator[Ended, None, None]:
-    """Run each command in a process, `jobs` at a time; yield as they end. Those still running end with this."""
-    waiting = list(commands)
-    running: list[_Child] = []
+def compute_measured(task: Task, number: int, batch: str) -> Ended:
+    """Compute a surface right after measuring t_cal; what goes on from a checkpoint has no time of its own."""
+    share, resumed = min(1.0, task.mapping.steps_factor), has_checkpoint(task.folder)
+    t_cal, threads = calibrate(share)
+    ended = compute(task, number, batch)
+    if ended.report is not None:
+        known = {"t_cal": t_cal, "threads": threads, "resumed": resumed}
+        save_text(task.folder / CALIBRATION, json.dumps(known) + "\n")
+    return ended
+
+
+def times_of(row: Row) -> dict[str, Any]:
+    """Seconds of the parameterization, in all and by stage, t_cal and threads; empty where they were not measured."""
+    file = row.entry.folder / CALIBRATION
+    if row.report is None or not file.is_file():
+        return {}
+    known = json.loads(file.read_text(encoding="utf-8"))
+    if known.pop("resumed"):
+        return {}
+    seconds = {f"seconds_{stage}": row.report["seconds"][stage] for stage in STAGES}
+    return known | seconds | {"seconds": sum(seconds.values())}
+
+
+def run(
+    prog: str,
+    out: Path,
+    tasks: dict[str, Task],
+    workers: WorkerOptions,
+    keep: Callable[[Batch], None],
+    work: Callable[[Task, int, str], Ended] = compute_measured,
+) -> int:
+    """Compute the tasks, by name, as a batch; keep the rows after each that ends, and return an exit code.
+
+    It is 0, 130 where the batch was interrupted, and 2 where the folder cannot be written.
+    """
+    ended = -1
+
+    def show(batch: Batch, _: Sequence[Running]) -> None:
+        nonlocal ended
+        waiting = batch.counts.get("waiting", 0)
+        if waiting != ended:
+            keep(batch)
+            ended = waiting
+
+    entries = [Entry(name, task.mesh, task.folder) for name, task in tasks.items()]
     try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                name = waiting.pop(0)
-                running.append(_Child.start(name, commands[name], threads))
-            for child in [child for child in running if child.process.poll() is not None]:
-                running.remove(child)
-                yield child.ended()
-            time.sleep(POLL)
-    finally:
-        for child in running:
-            child.stop()
-
-
-@dataclass(frozen=True)
-class _Child:
-    name: str
-    process: subprocess.Popen[bytes]
-    output: IO[bytes]
-
-    @classmethod
-    def start(cls, name: str, command: Sequence[str], threads: int) -> _Child:
-        output = TemporaryFile()  # noqa: SIM115 - a pipe could fill up; closed with the row
-        environment = os.environ | dict.fromkeys(THREAD_VARIABLES, str(threads))
-        return cls(name, subprocess.Popen(command, stdout=output, env=environment), output)
-
-    def ended(self) -> Ended:
-        with self.output:
-            self.output.seek(0)
-            lines = self.output.read().splitlines()
-        succeeded = self.process.returncode == 0 and lines
-        return Ended(self.name, self.process.returncode, json.loads(lines[-1]) if succeeded else None)
-
-    def stop(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        self.output.close()
-
-
-def script(file: str, options: Mapping[str, Any]) -> list[str]:
-    """The command that runs a script with these options."""
-    return [sys.executable, str(Path(file).resolve()), *(f"--{name}={value}" for name, value in options.items())]
-
-
-def end_children_on_term() -> None:
-    """Leave by an exception where this process is asked to end, so that in_processes ends its children."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-
-
-def answer(find: Callable[[], Any]) -> int:
-    """In a child: print a row, a dataclass, as the last line. Interrupted it is silent, its parent has the say."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    print(json.dumps(plain(asdict(find()))))
+        keep(run_tasks(out, entries, list(tasks.values()), workers, progress=show, work=work))
+    except KeyboardInterrupt as error:
+        print(f"{prog}: {error or 'interrupted'}", file=sys.stderr)
+        return INTERRUPTED
+    except InputError as error:
+        print(f"{prog}: {error}", file=sys.stderr)
+        return BAD_INPUT
     return 0
 
 
-def collect(
-    prog: str,
-    found: Generator[Row, None, None],
-    keep: Callable[[list[Row]], None],
-    told: Callable[[Row], str],
-    remains: str,
-) -> tuple[list[Row], int]:
-    """Keep all rows so far and tell the new one, as they come; return them with an exit code.
-
-    remains: what an interrupted run leaves. The code is 0, 130 interrupted, 2 where the disk is full.
-    """
-    rows: list[Row] = []
-    try:
-        with closing(found):
-            for row in found:
-                rows.append(row)
-                keep(rows)
-                print(told(row), flush=True)
-    except KeyboardInterrupt:
-        print(f"{prog}: interrupted after {len(rows)} rows; {remains}", file=sys.stderr)
-        return rows, INTERRUPTED
-    except OSError as error:
-        print(f"{prog}: {one_line(error)}", file=sys.stderr)
-        return rows, BAD_INPUT
-    return rows, 0
-
-
-def as_csv(columns: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> str:
-    """Every figure with all its digits; empty where there is none."""
-    text = io.StringIO()
-    table = csv.DictWriter(text, list(columns), lineterminator="\n")
-    table.writeheader()
-    table.writerows(rows)
-    return text.getvalue()
+# Tables
 
 
 def as_markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

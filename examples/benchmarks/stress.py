@@ -3,37 +3,30 @@
     python examples/benchmarks/stress.py --count 40
     python examples/benchmarks/stress.py --kinds thin flat --out out/stress
 
-Every surface has a process of its own with one thread. A finished surface has its row in rows/, and is not run again:
-the same command goes on after an interruption. stress.csv and stress.md are written anew after each; of a surface that
-is not certified the mesh and a picture are kept, too. t_cal: wall seconds of 1e12 float32 operations, right before.
+Runs the surfaces as `iga-nn batch` does, with one thread each: the same command skips what is finished and goes on from
+checkpoints. stress.csv and stress.md are written anew after each; a surface's mesh is in surfaces/, and report.html in
+its folder shows where it is not certified. t_cal: wall seconds of 1e12 float32 operations, right before.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import time
-import traceback
-from collections.abc import Generator, Sequence
-from contextlib import closing
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from statistics import median
 
-import numpy as np
 import processes
-from hard_shapes import KINDS, hard_shape, kind_of
+from hard_shapes import KINDS, compute_shape, kind_of
 
-import iga_nn
-from iga_nn.errors import InputError, one_line
-from iga_nn.figures.render import can_draw, widest_view
+from iga_nn.batch.options import WorkerOptions
+from iga_nn.batch.table import Batch
+from iga_nn.batch.table import Row as Known
+from iga_nn.batch.task import Task
+from iga_nn.errors import InputError
 from iga_nn.options import MapOptions
 from iga_nn.report import document as reports
-from iga_nn.report.advice import span_places
-from iga_nn.samples import write_obj
-from parameterize.arrays import Array
-from parameterize.files import replacing, save_text
-from parameterize.surface.surface import Surface
+from parameterize.files import save_text
 
 SETTINGS = "{0.preset}, seed {0.seed}, {0.control_points} control points, steps times {0.steps_factor:g}"
 LOOKS = {  # what a reader should picture
@@ -48,7 +41,6 @@ LOOKS = {  # what a reader should picture
     "flap": "a body with thin wings that lie along it",
     "folded": "a sheet folded once or twice, its layers close together",
 }
-PICTURE = 700, 520  # pixels
 
 
 @dataclass(frozen=True)
@@ -96,48 +88,48 @@ class Options:
         """Rows of other settings do not count."""
         return SETTINGS.format(self.mapping)
 
-    def row_file(self, number: int) -> Path:
-        """Where a finished surface's row is."""
-        return self.out / "rows" / f"{number:03d}.json"
-
 
 def main(argv: list[str] | None = None) -> int:
     """Run the surfaces and write the tables; 0 done, 2 bad arguments, 130 interrupted."""
-    options, child = _options(argv)
-    if child is not None:
-        return processes.answer(lambda: run_surface(child, options))
-    remains = "the same command goes on"
-    found = results(options)
-    rows, failed = processes.collect("stress.py", found, lambda rows: write_tables(rows, options), _told, remains)
-    if failed:
-        return failed
-    print(f"{summary(rows)}\n{options.out / 'stress.md'}")
+    options = _options(argv)
+    found: list[Row] = []
+
+    def keep(batch: Batch) -> None:
+        found[:] = [row_of(known, options) for known in batch.rows if known.state != "waiting"]
+        write_tables(found, options)
+
+    workers = WorkerOptions(workers=options.jobs, memory_limit="0")
+    if code := processes.run("stress.py", options.out, _tasks(options), workers, keep, compute_shape):
+        return code
+    print(*map(_told, found), summary(found), options.out / "stress.md", sep="\n")
     return 0
 
 
 def _told(row: Row) -> str:
-    if row.seconds is None or row.arap_mean is None:
+    if row.arap_mean is None:
         return f"{row.name}: {row.error}"
-    return f"{row.name}: {row.verdict}, ARAP mean {row.arap_mean:.2f}, {row.seconds:.0f} s"
+    seconds = "" if row.seconds is None else f", {row.seconds:.0f} s"
+    return f"{row.name}: {row.verdict}, ARAP mean {row.arap_mean:.2f}{seconds}"
 
 
-def _options(argv: list[str] | None) -> tuple[Options, int | None]:
-    """The options, and the one surface to run in this process, where it is a child."""
+def _options(argv: list[str] | None) -> Options:
     parser = _parser()
     given = parser.parse_args(argv)
-    mapping = MapOptions(device="cpu", control_points=given.control_points, steps_factor=given.steps_factor)
+    mapping = MapOptions(
+        device="cpu", control_points=given.control_points, steps_factor=given.steps_factor, resume=True
+    )
     for name in ("count", "jobs"):
         if getattr(given, name) < 1:
             parser.error(f"--{name} {getattr(given, name)}: must be at least 1")
     try:
         mapping.config()
-        (given.out / "rows").mkdir(parents=True, exist_ok=True)
+        (given.out / "surfaces").mkdir(parents=True, exist_ok=True)
     except InputError as error:
         parser.error(str(error))
     except OSError as error:
         parser.error(f"{given.out}: cannot be written ({error.strerror}); --out names another folder")
     numbers = tuple(number for number in range(given.count) if kind_of(number) in given.kinds)
-    return Options(numbers, mapping, given.jobs, given.out), given.child
+    return Options(numbers, mapping, given.jobs, given.out)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -150,107 +142,41 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, default=Path("out/stress"), help="folder (default: out/stress)")
     parser.add_argument("--steps-factor", type=float, default=1.0, help="shorten every stage, for a quick look")
     parser.add_argument("--control-points", type=int, default=30, help="per direction (default: 30)")
-    parser.add_argument("--child", type=int, help=argparse.SUPPRESS)
     return parser
 
 
-# Surfaces, each in a process
+# Surfaces
 
 
-def results(options: Options) -> Generator[Row, None, None]:
-    """Each surface's row: those finished before, then the others as soon as they are known."""
-    known = {number: row for number in options.numbers if (row := _finished(number, options))}
-    yield from known.values()
-    commands = {str(number): _command(number, options) for number in options.numbers if number not in known}
-    with closing(processes.in_processes(commands, 1, options.jobs)) as running:
-        for ended in running:
-            number = int(ended.name)
-            if ended.result is None:  # killed: tried again the next time
-                yield Row(number, kind_of(number), options.settings, error=ended.failure)
-            else:
-                save_text(options.row_file(number), json.dumps(ended.result) + "\n")
-                yield Row(**ended.result)
+def _tasks(options: Options) -> dict[str, Task]:
+    """The runs, by the surface's name; its worker makes the mesh."""
+    out = options.out.absolute()
+    names = [f"{number:03d}-{kind_of(number)}" for number in options.numbers]
+    return {name: Task(str(out / "surfaces" / f"{name}.obj"), out / name, options.mapping, None) for name in names}
 
 
-def _finished(number: int, options: Options) -> Row | None:
-    """The row of an earlier run with the same settings."""
-    file = options.row_file(number)
-    if not file.is_file():
-        return None
-    row = Row(**json.loads(file.read_text(encoding="utf-8")))
-    return row if row.settings == options.settings else None
-
-
-def _command(number: int, options: Options) -> list[str]:
-    mapping = options.mapping
-    values = {
-        "child": number,
-        "out": options.out,
-        "steps-factor": mapping.steps_factor,
-        "control-points": mapping.control_points,
-    }
-    return processes.script(__file__, values)
-
-
-def run_surface(number: int, options: Options) -> Row:
-    """All figures of one surface; after an error its message. Where it is not certified, mesh and picture are kept."""
-    row = Row(number, kind_of(number), options.settings)
-    surface, places = None, np.empty((0, 3))
-    try:
-        surface = hard_shape(number)
-        row = replace(row, faces=len(surface.faces))
-        run = iga_nn.parameterize  # loads torch
-        t_cal, _ = processes.calibrate(min(1.0, options.mapping.steps_factor), threads=1)
-        start = time.perf_counter()
-        result = run(surface, options.mapping.config(), seed=options.mapping.seed, device="cpu")
-        row = replace(row, seconds=time.perf_counter() - start, t_cal=t_cal)
-        places = span_places(result.volume, result.certificate.unproved)
-        row = replace(row, **_figures(result))
-    except Exception as error:
-        traceback.print_exc()
-        row = replace(row, error=one_line(error) or type(error).__name__)
-    if surface is not None and not row.certified:
-        write_obj(surface, options.out / f"{row.name}.obj")
-        draw(surface, places, options.out / f"{row.name}.png")
-    return row
-
-
-def _figures(result: iga_nn.Parameterization) -> dict[str, object]:
-    """By column."""
-    found, quality = result.quality.as_dict(), result.quality
-    return {
-        "verdict": found["bijective"],
-        "boundary_injective": found["boundary_injective"],
-        "det_lower_bound": found["det_lower_bound"],
-        "unproved": len(result.certificate.unproved),
-        "arap_mean": quality.arap.unit_volume.mean,
-        "arap_max": quality.arap.unit_volume.max,
-        "boundary_rms": quality.boundary.unit_volume.rms,
-        "spline_to_mesh_max": quality.spline_to_mesh.unit_volume.max,
-    }
-
-
-def draw(surface: Surface, places: Array, path: Path) -> None:
-    """The mesh from the front and from behind, places (k, 3) as red balls; nothing where nothing can be drawn."""
-    if not can_draw():
-        return
-    import pyvista
-
-    plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=[2 * PICTURE[0], PICTURE[1]])
-    mesh = pyvista.PolyData.from_regular_faces(surface.vertices, surface.faces)
-    middle = surface.vertices.mean(axis=0)
-    view = widest_view(surface.vertices, tilt=0.45)
-    for panel, direction in enumerate((view, view.turned())):
-        plotter.subplot(0, panel)
-        plotter.set_background("white")
-        plotter.add_mesh(mesh, color="tan", show_edges=True, edge_color="grey", opacity=0.6 if len(places) else 1.0)
-        if len(places):
-            plotter.add_points(places, color="red", point_size=9, render_points_as_spheres=True)
-        plotter.camera_position = [middle + direction.towards, middle, direction.up]
-        plotter.reset_camera()
-    with replacing(path) as temporary:
-        plotter.screenshot(temporary)
-    plotter.close()
+def row_of(known: Known, options: Options) -> Row:
+    """All figures of one surface, from its folder; why there are none as the error."""
+    number, kind = known.entry.name.split("-")
+    if known.report is None:
+        return Row(int(number), kind, options.settings, error=known.line)
+    quality, times = known.report["parameterization"], processes.times_of(known)
+    return Row(
+        int(number),
+        kind,
+        options.settings,
+        faces=known.report["input"]["faces"],
+        verdict=quality["bijective"],
+        boundary_injective=quality["boundary_injective"],
+        det_lower_bound=quality["det_lower_bound"],
+        unproved=quality.get("unproved", {}).get("spans", 0),
+        arap_mean=quality["arap"]["unit_volume"]["mean"],
+        arap_max=quality["arap"]["unit_volume"]["max"],
+        boundary_rms=quality["boundary"]["unit_volume"]["rms"],
+        spline_to_mesh_max=quality["surface_distance"]["spline_to_mesh"]["unit_volume"]["max"],
+        seconds=times.get("seconds"),
+        t_cal=times.get("t_cal"),
+    )
 
 
 # Tables
@@ -280,7 +206,7 @@ def as_text(rows: Sequence[Row], options: Options) -> str:
     ]
     if failed:
         parts += [
-            "Not certified; mesh and picture, the places in red, are kept under the surface's name:",
+            "Not certified; report.html in the surface's folder shows the places:",
             processes.as_markdown(FAILED_HEAD, [_failed_cells(row) for row in failed]),
         ]
     if missing := len(options.numbers) - len(rows):
@@ -337,5 +263,4 @@ def _failed_cells(row: Row) -> list[str]:
 
 
 if __name__ == "__main__":
-    processes.end_children_on_term()
     raise SystemExit(main())

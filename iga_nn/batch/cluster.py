@@ -67,8 +67,8 @@ def _local(options: WorkerOptions, most: int) -> Iterator[LocalCluster]:
     threads = dict.fromkeys(THREAD_VARIABLES, str(options.threads_per_worker))
     with ExitStack() as stack:
         stack.enter_context(_environment(threads))
-        stack.enter_context(dask.config.set(CONFIG))
         scratch = stack.enter_context(TemporaryDirectory(prefix="iga-nn-", ignore_cleanup_errors=True))
+        stack.enter_context(dask.config.set(CONFIG | {"temporary-directory": scratch}))
         with _interrupts_held():
             cluster = LocalCluster(
                 n_workers=min(options.workers, most),
