@@ -71,6 +71,8 @@ def test_text_replaces_what_was_there(tmp_path):
     save_text(path, "{}")
     save_text(path, "conch \N{LATIN SMALL LETTER SHARP S}")
     assert path.read_text(encoding="utf-8") == "conch ß"
+    save_text(path, "latin\udce9")
+    assert path.read_text(encoding="utf-8") == "latin\\udce9"
     assert [p.name for p in tmp_path.iterdir()] == ["report.json"]
 
 

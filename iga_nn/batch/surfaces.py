@@ -34,16 +34,16 @@ def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
     Files are known by their absolute paths: a worker with another current folder finds them, too. Raises InputError
     where nothing is named, and where a folder or a pattern holds no surface.
     """
-    found: dict[str, str] = {}  # mesh -> name
+    found: dict[str, str] = {}  # what tells surfaces apart -> name
     for given in surfaces:
         for name in _names_in(given):
-            found.setdefault(_mesh_of(name), name)
+            found.setdefault(str(Path(name).resolve()) if Path(name).is_file() else name, name)
     if not found:
         raise InputError("no surface is named: give files, folders, patterns in quotes, samples or models")
-    folders = distinct_folders(list(found))
+    meshes = [str(Path(name).absolute()) if Path(name).is_file() else name for name in found.values()]
     return [
         Entry(printable(name), mesh, out.absolute() / folder)
-        for (mesh, name), folder in zip(found.items(), folders, strict=True)
+        for name, mesh, folder in zip(found.values(), meshes, distinct_folders(meshes), strict=True)
     ]
 
 
@@ -72,10 +72,6 @@ def _names_in(given: str) -> Iterator[str]:
 def _is_surface(file: Path) -> bool:
     name = file.name.lower().removesuffix(".gz")
     return name.endswith(FORMATS) and not name.startswith(".")
-
-
-def _mesh_of(name: str) -> str:
-    return str(Path(name).resolve()) if Path(name).is_file() else name
 
 
 def distinct_folders(meshes: Sequence[str]) -> list[str]:
