@@ -1,7 +1,7 @@
 """What every worker of a test's batch loads before it computes: trainings of about a second, without figures.
 
-The surface's name says what happens to it. `hungry` takes memory until its worker is ended; `held` waits in the middle,
-the first time and after each `release`, and says where with a file beside it.
+The surface's name says what happens to it. `hungry` takes memory until its worker is ended. `held` waits in the middle
+of the training while there is a file held.hold, and writes its process into held.pid. NAME.began is the first step.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from small_run import tiny_config
 
 from iga_nn.batch import task as batch_task
 from iga_nn.options import MapOptions
+from iga_nn.workflow import pipeline
 from iga_nn.workflow.output_folder import RunFolder
 
 HOLD = "corners"  # the stage, after some checkpoints
@@ -26,12 +27,13 @@ def followed_run(compute, task, progress):
     if mesh.stem == "hungry":
         taken = []
         while True:
-            taken.append(bytearray(b"x" * (16 << 20)))
+            taken += [bytearray(b"x" * (16 << 20))] * (len(taken) < 150)  # more than the limit, less than all there is
+            time.sleep(0.02)
     steps = []
 
     def followed(now):
         steps.append(f"{now.stage} {now.step}")
-        mesh.with_suffix(".first").write_text(steps[0])
+        mesh.with_suffix(".began").write_text(steps[0])
         progress(now)
         if mesh.stem == "held" and now.stage == HOLD and mesh.with_suffix(".hold").exists():
             mesh.with_suffix(".pid").write_text(str(os.getpid()))
@@ -46,3 +48,4 @@ if isinstance(batch_task._run, FunctionType):  # dask loads this file more than 
     batch_task._run = partial(followed_run, batch_task._run)
     MapOptions.config = lambda _: tiny_config()
     RunFolder.draw = lambda *_, **__: None
+    pipeline.scene_of = lambda *_: None

@@ -89,14 +89,14 @@ def test_a_batch_survives_what_happens_to_it(tmp_path):
     parts = tmp_path / "parts"
     parts.mkdir()
     surface = small_surface()
-    for name in ("plain", "held"):
+    for name in ("first", "held"):
         (parts / f"{name}.obj").write_text(obj(surface.vertices, surface.faces))
-    hold, pid, first = (parts / f"held.{ending}" for ending in ("hold", "pid", "first"))
+    hold, pid, began = (parts / f"held.{ending}" for ending in ("hold", "pid", "began"))
     hold.touch()
 
-    interrupted = Command(tmp_path, "parts")
+    interrupted = Command(tmp_path, "parts", "--workers", "1")
     interrupted.wait_for(pid)
-    interrupted.wait_for(tmp_path / "out" / "plain" / "report.html")
+    interrupted.wait_for(tmp_path / "out" / "first" / "report.html")
     os.killpg(interrupted.process.pid, signal.SIGINT)
     assert interrupted.ended() == 130
     last = interrupted.err.read_text().splitlines()[-1]
@@ -105,31 +105,31 @@ def test_a_batch_survives_what_happens_to_it(tmp_path):
     assert states(tmp_path)["held"] == "waiting"
 
     pid.unlink()
-    first.unlink()
+    began.unlink()
     (parts / "hungry.obj").write_text(obj())
     (parts / "open.obj").write_text(obj(CUBE, TRIANGLES[1:]))
-    written = (tmp_path / "out" / "plain" / "volume.npz").stat().st_mtime_ns
+    written = (tmp_path / "out" / "first" / "volume.npz").stat().st_mtime_ns
     killed = Command(tmp_path, "parts", "--memory-limit", "1.5GiB")
     victim = int(killed.wait_for(pid))
-    assert first.read_text().startswith("corners")  # from the checkpoint of the interrupted command
-    first.unlink()
-    hold.unlink()
+    assert began.read_text().startswith("corners")  # from the checkpoint of the interrupted command
+    began.unlink()
     os.kill(victim, signal.SIGKILL)
+    hold.unlink()
     assert killed.ended() == 2
     rows = table(tmp_path)
-    assert rows["plain"]["state"] in FINISHED and rows["held"]["state"] == rows["plain"]["state"]
-    assert first.read_text().startswith("corners")  # and from that of the killed worker
-    same = [(tmp_path / "out" / name / "volume.npz").read_bytes() for name in ("plain", "held")]
+    assert rows["first"]["state"] in FINISHED and rows["held"]["state"] == rows["first"]["state"]
+    assert began.read_text().startswith("corners")  # and from that of the killed worker
+    same = [(tmp_path / "out" / name / "volume.npz").read_bytes() for name in ("first", "held")]
     assert same[0] == same[1]
-    assert (tmp_path / "out" / "plain" / "volume.npz").stat().st_mtime_ns == written
+    assert (tmp_path / "out" / "first" / "volume.npz").stat().st_mtime_ns == written
     assert rows["hungry"]["state"] == "failed" and "out of memory" in rows["hungry"]["line"]
     assert rows["open"]["state"] == "refused" and rows["open"]["line"].startswith("parts/open.obj: ")
 
     (parts / "hungry.obj").rename(parts / "modest.obj")
     (parts / "open.obj").write_text(obj())
-    again = Command(tmp_path, "parts", "--json", "--quiet")
+    again = Command(tmp_path, "parts", "--workers", "1", "--json", "--quiet")
     assert again.ended() in (0, 3)
     known = json.loads(again.out.read_text())
     assert {row["state"] for row in known["surfaces"]} <= set(FINISHED)
-    assert sorted(row["folder"] for row in known["surfaces"]) == ["held", "modest", "open", "plain"]
+    assert sorted(row["folder"] for row in known["surfaces"]) == ["first", "held", "modest", "open"]
     assert {path.name for path in tmp_path.iterdir()} == {"parts", "out", "scratch", "stdout", "stderr"}
