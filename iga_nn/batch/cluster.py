@@ -14,7 +14,7 @@ from uuid import uuid4
 
 import dask.config
 from dask.utils import format_bytes, parse_bytes
-from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, wait
+from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, Worker, WorkerPlugin, wait
 
 from ..errors import InputError, one_line
 from .options import WorkerOptions
@@ -55,7 +55,16 @@ def connected(options: WorkerOptions, most: int) -> Iterator[Client]:
                 raise InputError(f"{options.scheduler}: no dask scheduler answers there ({one_line(error)})") from None
         else:
             client = Client(stack.enter_context(_local(options, most)))
+            client.register_plugin(_OwnOutput())
         yield stack.enter_context(client)
+
+
+class _OwnOutput(WorkerPlugin):
+    """Sends what libraries print in a worker to stderr: stdout is for the answer of the command."""
+
+    def setup(self, worker: Worker) -> None:
+        """Redirect the worker's process, which starts or has just started."""
+        os.dup2(2, 1)
 
 
 @contextmanager
@@ -79,7 +88,8 @@ def _local(options: WorkerOptions, most: int) -> Iterator[LocalCluster]:
                 scheduler_kwargs={"dashboard": False, "allowed_failures": 0},
                 silence_logs=SILENT,
             )
-        yield stack.enter_context(cluster)
+            stack.enter_context(cluster)
+        yield cluster
 
 
 def memory_limit(options: WorkerOptions) -> int:
@@ -102,7 +112,8 @@ def _environment(values: dict[str, str]) -> Iterator[None]:
     try:
         yield
     finally:
-        os.environ.clear()
+        for name in os.environ.keys() - before.keys():
+            del os.environ[name]
         os.environ.update(before)
 
 
