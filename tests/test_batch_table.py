@@ -1,13 +1,16 @@
 from __future__ import annotations
 
+import asyncio
 import csv
 import io
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import running
 from conftest import formula_parameterization
 from PIL import Image
 
@@ -109,6 +112,32 @@ def test_odd_names_on_the_page(done):
     (odd.folder / "report.html").touch()
     found = Page(page(Batch(Path("out"), (Row(odd).ended(Ended("done", report=done)),))))
     assert [link["href"] for link in found.all("a")] == ["100%25%23%3F/report.html"]
+
+
+def test_a_click_on_a_heading_sorts(chromium, batch, tmp_path):
+    file = tmp_path / "batch.html"
+    later, sooner = (json.loads(json.dumps(batch.rows[1].report)) for _ in range(2))
+    later["seconds"]["total"], sooner["seconds"]["total"] = 1200.0, 0.001
+    folded = replace(batch.rows[2], report=sooner)
+    second = replace(batch.rows[1], entry=Entry("second.obj", "second.obj", Path("out/second")), report=later)
+    rows = (*batch.rows[:2], folded, batch.rows[3], second)
+    file.write_text(page(replace(batch, rows=rows)))
+    names = "[...document.querySelectorAll('tbody tr')].map((row) => row.cells[1].dataset.value)"
+
+    async def clicked(*headings):
+        async with running(chromium, tmp_path) as browser:
+            tab = await browser.open(file.as_uri())
+            found = []
+            for heading in headings:
+                await tab.click(heading)
+                found.append(await tab.value(names))
+            assert tab.complaints == [] and set(tab.asked) <= {file.as_uri()}
+        return found
+
+    slow_last, slow_first, by_name = asyncio.run(clicked("seconds", "seconds", "surface"))
+    assert slow_last == ["folded.obj", "cube.obj", "second.obj", "b<i>.obj", "later.obj"]  # what is empty last
+    assert slow_first == ["second.obj", "cube.obj", "folded.obj", "b<i>.obj", "later.obj"]
+    assert by_name == ["b<i>.obj", "cube.obj", "folded.obj", "later.obj", "second.obj"]
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ log = logging.getLogger(__name__)
 
 POLL = 0.5  # seconds between two looks at what has ended
 PATIENCE = 10.0  # seconds until a scheduler must have answered
+HOPELESS = 600.0  # seconds without a worker on this machine: they start again within some
 GRACE = 3.0  # seconds that interrupted surfaces have to keep a checkpoint
 SMALLEST = 1 << 29  # bytes: the libraries alone take nearly as much
 MEMORY_TOPIC = "worker-restart-memory"  # dask tells here which workers were ended for their memory
@@ -34,6 +35,7 @@ CONFIG = {
     "distributed.worker.memory.spill": False,  # and a worker that pauses would wait for ever for it to shrink
     "distributed.worker.memory.pause": False,
     "distributed.worker.profile.enabled": False,
+    "distributed.deploy.lost-worker-timeout": "1 day",  # a worker that starts again on a busy machine is not lost
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
 }
@@ -143,9 +145,14 @@ def computed(
     client.subscribe_topic(batch, lambda event: tell(event[1]["number"], event[1]["stage"], event[1]["share"]))
     waiting, tries = list(range(len(tasks))), [0] * len(tasks)
     running: dict[Future, int] = {}
+    seen = time.monotonic()  # when there was a worker
     try:
         while waiting or running:
-            free = max(0, sum(client.nthreads().values()) - len(running))
+            workers = sum(client.nthreads().values())
+            seen = time.monotonic() if workers or options.scheduler else seen
+            if time.monotonic() - seen > HOPELESS:
+                raise InputError("the workers of this machine do not start again; the same command goes on")
+            free = max(0, workers - len(running))
             for number in waiting[:free]:
                 running[client.submit(work, tasks[number], number, batch, pure=False)] = number
             del waiting[:free]

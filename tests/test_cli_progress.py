@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import io
+import logging
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from rich.progress import Progress as Bar
+
+from iga_nn.batch.run import Running
+from iga_nn.batch.surfaces import Entry
+from iga_nn.batch.table import Batch, Row
+from iga_nn.cli import progress
+
+RUNNING = [Running("bean", "cube", 0.4), Running("duck", "spline", 0.9)]
+
+
+def batch(*states):
+    return Batch(Path("out"), tuple(Row(Entry(str(i), str(i), Path(str(i))), s) for i, s in enumerate(states)))
+
+
+def test_one_bar_shows_how_many_ended_and_how_far_the_others_are():
+    with Bar(console=Console(file=io.StringIO())) as bar:
+        show = progress.batch_bar(bar)
+        show(batch("waiting", "waiting", "waiting", "certified"), [])
+        (task,) = bar.tasks
+        assert (task.completed, task.total, task.fields["state"]) == (1, 4, "workers start")
+        show(batch("waiting", "waiting", "refused", "certified"), RUNNING)
+        assert task.completed == pytest.approx(3.3) and task.fields["ended"] == "2/4"
+        assert task.fields["state"] == "bean cube 40%, duck spline 90%"
+        show(batch("certified", "failed", "refused", "certified"), [])
+        assert task.completed == task.total == 4 and task.fields["state"] == ""
+
+
+def test_plain_lines_come_every_ten_seconds(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    out = io.StringIO()
+    show = progress.PlainBatchLines(Console(file=out, width=200))
+    for now[0] in (1.0, 9.0, 11.0, 12.0, 22.0):
+        show(batch("waiting", "waiting", "certified"), RUNNING)
+    assert out.getvalue() == 2 * "1 of 3 surfaces; bean cube 40%, duck spline 90%\n"
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_a_line_for_each_surface_that_ends(quiet, capsys):
+    log = logging.getLogger("iga_nn.batch.run")
+    with progress.shown_batch(quiet) as show:
+        assert (show is None) == quiet
+        log.info("bean: certified")
+        log.warning("duck: refused, open")
+    assert capsys.readouterr().err == ("" if quiet else "bean: certified\n") + "warning: duck: refused, open\n"
