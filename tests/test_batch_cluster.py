@@ -3,6 +3,7 @@ from __future__ import annotations
 import csv
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import dask
 import pytest
@@ -35,6 +36,13 @@ def test_the_environment_is_left_as_it_was():
         assert os.environ["OMP_NUM_THREADS"] == "3"
         os.environ["MALLOC_TRIM_THRESHOLD_"] = "65536"  # as dask does
     assert dict(os.environ) == before
+
+
+def test_workers_that_never_come_are_not_waited_for_without_end(monkeypatch):
+    monkeypatch.setattr(cluster, "HOPELESS", -1.0)
+    nobody = SimpleNamespace(subscribe_topic=lambda *_: None, nthreads=dict)
+    with pytest.raises(InputError, match="do not start again"):
+        next(cluster.computed(nobody, [None], WorkerOptions(), lambda *_: None))
 
 
 def test_the_slurm_script_runs_a_batch_on_the_workers_of_a_cluster(in_folder):
