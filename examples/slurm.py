@@ -1,4 +1,7 @@
-"""Many surfaces on a SLURM cluster: `python examples/slurm.py parts/*.stl --out results --jobs 20`.
+"""Many surfaces on a cluster
+==========================
+
+On one with SLURM: `python examples/slurm.py parts/*.stl --out results --jobs 20`.
 
 Run it on a login node, in a folder that the compute nodes see. Options that it does not know go to `iga-nn batch`.
 """

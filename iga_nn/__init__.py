@@ -35,6 +35,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "SplineField": "solve",
     "Surface": "parameterize.surface.surface",
     "System": "solve",
+    "WorkerOptions": "iga_nn.batch.options",
     "certify": "parameterize.certificate.jacobian",
     "convergence": "solve",
     "discretize": "solve",

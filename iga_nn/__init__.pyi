@@ -16,6 +16,7 @@ from solve import convergence as convergence
 from solve import discretize as discretize
 from solve import solve_problem
 
+from .batch.options import WorkerOptions as WorkerOptions
 from .batch.run import run_batch as run_batch
 from .errors import InputError as InputError
 from .io.formats import export as export

@@ -21,6 +21,11 @@ class WorkerOptions:
         retries: how often a surface goes on from its checkpoint after its worker was lost or its run failed.
         scheduler: address of a dask scheduler, such as tcp://host:8786, whose workers compute instead of workers on
             this machine; they must see the same folders under the same paths.
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.WorkerOptions(workers=4, memory_limit="2GiB").retries
+        1
     """
 
     workers: int = 2

@@ -50,14 +50,54 @@ def run_batch(
     vector: bool = False,
     progress: Progress | None = None,
 ) -> Batch:
-    """Parameterize many surfaces and solve Poisson's equation on them, each in a folder of its own; return the table.
+    """Parameterize many surfaces and solve Poisson's equation on them in worker processes; return the table.
 
-    surfaces: files, folders, patterns, names of samples and models, or g1. out: the folder of the batch; batch.csv,
-    batch.json and batch.html are in it, written anew after every surface. A surface that is finished with the same
-    options is skipped, one that has a checkpoint goes on from there, and failures are tried again; with `force` all
-    start anew. vector: write plots of curves as PDF, too. progress: is told after every change.
-    Raises InputError for options that cannot be run, a folder that cannot be written, and where dask is missing;
-    surfaces that are refused or fail have rows that say why. An interruption leaves folders that the same call resumes.
+    Each surface has a folder of its own in `out`, named after it, and batch.csv, batch.json and batch.html beside them are
+    written anew after every surface. One that is finished with the same options is skipped, one that has a checkpoint
+    goes on from there, and failures are tried again.
+
+    Parameters
+    ----------
+    surfaces : sequence of str or Path
+        Files, folders, patterns, names of samples and models, or "g1", the models of that set.
+    out : str or Path
+        The folder of the batch.
+    mapping : MapOptions, optional
+        How a surface becomes a volume.
+    poisson : PoissonOptions, optional
+        The problem that is solved on each.
+    workers : WorkerOptions, optional
+        Who computes; two processes of this machine by default.
+    force : bool
+        Start all surfaces anew.
+    vector : bool
+        Write plots of curves as PDF, too.
+    progress : callable, optional
+        Called with the batch and a list of those that are computed after every change.
+
+    Returns
+    -------
+    Batch
+        Its `rows`, each with a `state`, a `line` that says why it was refused or failed, and a `report`; its `counts` of
+        states, and its `folder`.
+
+    Raises
+    ------
+    ExpressionError
+        For a formula that is refused.
+    InputError
+        For other options, a folder that cannot be written, and where dask is not installed. Surfaces that are refused or
+        fail raise nothing.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> quick = iga_nn.MapOptions(steps_factor=0.02, control_points=6)
+    >>> coarse = iga_nn.PoissonOptions(refine=(0,))
+    >>> outcome = iga_nn.run("poisson", "cube", "out/cube", mapping=quick, poisson=coarse)
+    >>> batch = iga_nn.run_batch(["cube"], "out", mapping=quick, poisson=coarse)  # is finished already
+    >>> len(batch.rows), batch.rows[0].report == outcome.report
+    (1, True)
     """
     mapping, options = mapping or MapOptions(), poisson or PoissonOptions()
     pipeline.checked(mapping, options)

@@ -95,7 +95,7 @@ def _render(template: str, **content: Any) -> str:
 
 
 def filled(package: str, template: str, inserted: Mapping[str, Traversable], **content: Any) -> str:
-    """Return a package's template with its content, which is escaped, and with files of ours, which stay as they are."""
+    """Return a package's template with its content, which is escaped, and with files of ours as they are."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
