@@ -52,7 +52,7 @@ def run_batch(
 ) -> Batch:
     """Parameterize many surfaces and solve Poisson's equation on them in worker processes; return the table.
 
-    Each surface has a folder of its own in `out`, named after it, and batch.csv, batch.json and batch.html beside them are
+    Each surface has a folder of its own in `out`, named after it; batch.csv, batch.json and batch.html beside them are
     written anew after every surface. One that is finished with the same options is skipped, one that has a checkpoint
     goes on from there, and failures are tried again.
 
@@ -78,16 +78,16 @@ def run_batch(
     Returns
     -------
     Batch
-        Its `rows`, each with a `state`, a `line` that says why it was refused or failed, and a `report`; its `counts` of
-        states, and its `folder`.
+        Its `rows`, each with a `state`, a `line` that says why it was refused or failed, and a `report`; its `counts`
+        of states, and its `folder`.
 
     Raises
     ------
     ExpressionError
         For a formula that is refused.
     InputError
-        For other options, a folder that cannot be written, and where dask is not installed. Surfaces that are refused or
-        fail raise nothing.
+        For other options, a folder that cannot be written, and where dask is not installed. Surfaces that are refused
+        or fail raise nothing.
 
     Examples
     --------
