@@ -59,12 +59,16 @@ class MapOptions(SurfaceOptions):
         preset: "fast", made for two CPU cores, or "paper", the paper's own settings.
         seed: equal seeds give equal volumes, bit for bit.
         device: where the network is trained; "auto" takes CUDA where it is available.
-        control_points: number of control points per direction.
+        control_points: number of control points per direction; "auto" starts with 30 and adds more where the surface is
+            not met, each direction its own, until the tolerance is met or there are max_control_points.
         corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the
             cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
         resume: continue from the checkpoint in the output folder.
         steps_factor: multiply the steps of every stage by this factor; a small one gives a quick look.
+        tolerance: of control_points "auto": root mean square distance at the surface's vertices over the diagonal of
+            its bounding box.
+        max_control_points: of control_points "auto": at most so many per direction.
 
     Examples:
         >>> import iga_nn
@@ -75,10 +79,12 @@ class MapOptions(SurfaceOptions):
     preset: Literal["fast", "paper"] = "fast"
     seed: int = 0
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    control_points: int = 30
+    control_points: int | Literal["auto"] = 30
     corners: Path | None = None
     resume: bool = False
     steps_factor: float = 1.0
+    tolerance: float = 5e-4
+    max_control_points: int = 60
 
     def config(self) -> Config:
         """Return the configuration of these options. Raises InputError for values that cannot be run."""
@@ -89,12 +95,20 @@ class MapOptions(SurfaceOptions):
         if not 0.0 < self.steps_factor <= MAX_STEPS_FACTOR:
             raise InputError(f"steps factor {self.steps_factor}: must be positive, at most {MAX_STEPS_FACTOR:g}")
         with input_errors():
-            config = preset(self.preset)
-            fewest = config.spline.degree + 1
-            if not fewest <= self.control_points <= MAX_CONTROL_POINTS:
-                limits = f"at least {fewest}, at most {MAX_CONTROL_POINTS} per direction"
-                raise InputError(f"control points {self.control_points}: {limits}")
-            return config.scaled(self.steps_factor).with_control_points(self.control_points)
+            config = preset(self.preset).scaled(self.steps_factor)
+            if self.control_points == "auto":
+                _check_count("max control points", self.max_control_points, config.spline.control_points)
+                return config.refined(self.tolerance, self.max_control_points)
+            _check_count("control points", self.control_points, config.spline.degree + 1)
+            for name in ("tolerance", "max_control_points"):
+                if getattr(self, name) != getattr(MapOptions, name):
+                    raise InputError(f"{name.replace('_', ' ')}: has a meaning with --control-points auto alone")
+            return config.with_control_points(self.control_points)
+
+    @property
+    def most_control_points(self) -> int:
+        """Return how many control points a direction may get."""
+        return self.max_control_points if self.control_points == "auto" else self.control_points
 
 
 @dataclass(frozen=True)
@@ -289,6 +303,12 @@ class ElasticityStudyOptions(StudyOptions):
         """Return the problem of these options. Raises InputError."""
         own = ElasticityOptions(self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio)
         return own.problem()
+
+
+def _check_count(name: str, count: int, fewest: int) -> None:
+    """Raise InputError for a number of control points that cannot be run."""
+    if not fewest <= count <= MAX_CONTROL_POINTS:
+        raise InputError(f"{name} {count}: at least {fewest}, at most {MAX_CONTROL_POINTS} per direction")
 
 
 def check_space(refine: Sequence[int], degree: int | None) -> None:

@@ -18,7 +18,7 @@ from torch import Tensor
 from .files import save_bytes
 
 FORMAT = 2
-NAMES = ("training", "spline")
+NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
 
 
@@ -50,6 +50,12 @@ class Checkpoints:
         """Return the checkpoints of another try of the spline stage, in files of their own; the first is number 0."""
         other = copy(self)
         other._suffix += f"-try{number}" if number else ""
+        return other
+
+    def of_refinement(self, number: int) -> "Checkpoints":
+        """Return the checkpoints of the spline stage after so many refinements, in files of their own."""
+        other = copy(self)
+        other._suffix += f"-refined{number}"
         return other
 
     def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:

@@ -118,6 +118,26 @@ class SplineConfig:
 
 
 @dataclass(frozen=True)
+class RefinementConfig:
+    """When knots are inserted after the spline stage, where, and how the map is optimised then.
+
+    tolerance: of the root mean square distance at the mesh's vertices, over the diagonal of its bounding box.
+    max_control_points: a direction.
+    """
+
+    tolerance: float = 5e-4
+    max_control_points: int = 60
+    share: float = 0.7  # of the squared distances lies on the spans that are halved together
+    growth: float = 2.0  # factor of the number of control points in one refinement, at most
+    distortion: float = 0.25  # what the distortion above its limit counts, all squared distances together counting 1
+    narrowest: float = 0.2  # of the first spline's spans: none gets narrower than this share of their length
+    vertex: float = 5.0  # factor of the spline stage's `vertex`: the boundary counts more once the map is in shape
+    gain: float = 2e-4  # in place of the spline stage's
+    rounds: int = 8  # after a refinement, at most
+    polish: int = 3  # of them, while the map is certified, at most
+
+
+@dataclass(frozen=True)
 class LayoutConfig:
     """How the surface is cut and laid out on the cube; a share is one of a mesh edge's length."""
 
@@ -173,6 +193,7 @@ class Config:
     spline: SplineConfig
     layout: LayoutConfig = LAYOUT
     starts: int = 2  # a map that is not certified is tried anew with the cube turned, so many times in all
+    refinement: RefinementConfig | None = None  # the control points of `spline` are all there are where it is None
 
     def scaled(self, factor: float) -> Config:
         """Return the same options with `factor` (at most 100) times as many steps in every stage, at least one each."""
@@ -181,6 +202,18 @@ class Config:
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
         return replace(self, stages=stages, spline=spline)
+
+    def refined(self, tolerance: float, max_control_points: int) -> Config:
+        """Return the same options with knots inserted until a tolerance is met, see RefinementConfig.
+
+        Raises ValueError for a tolerance that is not positive, and for fewer control points than there are already.
+        """
+        if not tolerance > 0.0:
+            raise ValueError(f"tolerance must be positive, got {tolerance}")
+        if max_control_points < self.spline.control_points:
+            fewest = self.spline.control_points
+            raise ValueError(f"max_control_points must be at least {fewest}, got {max_control_points}")
+        return replace(self, refinement=RefinementConfig(tolerance, max_control_points))
 
     def with_control_points(self, n: int) -> Config:
         """Return the same options with n x n x n control points."""

@@ -30,6 +30,7 @@ from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback, ignore
 from .quality.quality import QualityReport, measure
+from .refinement import Refinement, refine
 from .spline.bspline import open_uniform_knots
 from .spline.volume import BSplineVolume
 from .surface.geometry import vertex_quadrics, vertex_weights
@@ -60,11 +61,13 @@ class Parameterization:
         Columns of equal length, one row a training step.
     seconds : dict of str to float
         Wall seconds of train, fit, optimize and certify, the last with quality, at the end: the certificates on the way
-        count as optimize.
+        count as optimize; with config.refinement, also those of refine.
     device : str
         Where the network was trained.
     seed : int
     config : Config
+    refinement : Refinement or None
+        With config.refinement, how many control points each direction got, and why no more.
 
     Examples
     --------
@@ -84,6 +87,7 @@ class Parameterization:
     device: str
     seed: int
     config: Config
+    refinement: Refinement | None = None
 
 
 def parameterize(
@@ -174,13 +178,19 @@ def parameterize(
         other = _attempt(task, start, checkpoints.of_start(start))
         if other[0].faults < found.faults:
             found, fit = other
+    told = None
+    if config.refinement is not None:
+        with _timed(seconds, "refine"):
+            found, fit, told = refine(found, fit, own, spline, config.refinement, checkpoints=checkpoints, **report)
     with _timed(seconds, "optimize"):
         volume, boundary = _in_users_units(found, surface, task, fit)
     with _timed(seconds, "certify"):
         certificate = certify(volume)  # of the volume in the user's units: bringing it there rounds
         proofs = certificate, check_boundary(volume)
         quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, *proofs)
-    return Parameterization(volume, boundary, certificate, quality, history.arrays(), seconds, place.type, seed, config)
+    return Parameterization(
+        volume, boundary, certificate, quality, history.arrays(), seconds, place.type, seed, config, told
+    )
 
 
 def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config, int]:
@@ -336,16 +346,10 @@ def _in_users_units(
     found: Optimized, surface: Surface, task: _Task, fit: SurfaceFit
 ) -> tuple[BSplineVolume, BoundaryMap]:
     """Return the volume and its boundary map; parameters are first brought close to this volume's closest points."""
-    spline, places = task.config.spline, fit.places
-    longest = 0.5 / spline.control_points
-    for _ in range(spline.last_slides):
-        places.slide(found.control, fit.points, longest)
-    places.unflip()
-    places.relax(spline.last_sweeps)  # where flips are left
-    for _ in range(spline.last_slides):
-        places.slide(found.control, fit.points, longest, keep_layout=True)
+    spline = task.config.spline
+    places = fit.places.settled(found.control, fit.points, spline.last_slides, spline.last_sweeps)
     points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
-    volume = BSplineVolume((spline.degree,) * 3, task.knots, points)
+    volume = BSplineVolume((spline.degree,) * 3, places.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
     return volume, boundary_map(volume, own, places.triangles, places.parameters, task.config.layout)
 

@@ -46,6 +46,8 @@ def verdict_in_words(outcome: Outcome) -> str:
     for scale, arap in verdict.get("arap", {}).items():
         rms = verdict["boundary_rms"][scale]
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max; boundary rms {rms:.3g}")
+    if chosen := reports.control_points_in_words(outcome.report):
+        lines.append(f"control points   {chosen}")
     levels = [_level(level) for level in verdict.get("levels", [])]
     lines += [*levels[:-1], f"{verdict['seconds']:.1f} s", *advice.in_words(outcome.report)]
     proved = f"det J > 0 {verdict['bijective']}; one-to-one: {verdict['one_to_one']}"

@@ -64,7 +64,8 @@ def what_to_try(report: Report, options: MapOptions | None = None) -> list[str]:
         remedies.append("a surface whose parts are farther apart there, or more faces around that gap")
     more = min(max(quality["control_points"]) + 10, MAX_CONTROL_POINTS)
     if more > max(quality["control_points"]):
-        remedies.append(f"more control points: --control-points {more}")
+        is_limit = quality.get("refinement", {}).get("stopped") == "limit reached"
+        remedies.append(f"more control points: --{'max-' * is_limit}control-points {more}")
     if options is None or options.corners is None:
         remedies.append("your own corners, away from those places: --corners FILE")
     else:

@@ -107,6 +107,24 @@ def one_to_one(report: Report) -> str:
     return "yes" if quality["bijective"] == "certified" and quality.get("boundary_injective") else "undecided"
 
 
+def control_points_in_words(report: Report) -> str:
+    """Return how many control points `auto` took and why no more; empty where their number was given."""
+    if not (told := report["parameterization"].get("refinement")):
+        return ""
+    first, last, asked = told["levels"][0], told["levels"][-1], f"tolerance {told['tolerance']:.2g}"
+    reason = f"{asked} met"
+    if told["stopped"] == "limit reached":
+        reason = f"{asked} not met with at most {told['max_control_points']} per direction"
+    elif told["stopped"] == "no better map":
+        reason = f"{asked} not met: no better map that is certified was found with {_size(told['dropped'])}"
+    start = f", {_size(first)} at first" if first != last else ""
+    return f"{_size(last)}{start}; boundary rms {last['boundary']:.2g} of the diagonal, {reason}"
+
+
+def _size(level: Report) -> str:
+    return " x ".join(map(str, level["control_points"]))
+
+
 def verdict(report: Report, folder: Path) -> Report:
     """Return what decides whether a result is used: what `--json` prints."""
     quality = report["parameterization"]
@@ -117,6 +135,8 @@ def verdict(report: Report, folder: Path) -> Report:
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
     defects = {name: quality[name] for name in ("unproved", "boundary_meeting") if quality.get(name)}
     short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
+    if refinement := quality.get("refinement"):
+        short["refinement"] = refinement
     if section := solved(report):
         keys = ("dofs", *EXACT_ERRORS, *ESTIMATES, "iterations", "converged", "meaningful")
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]

@@ -149,7 +149,10 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
         facts += [_error_fact(finest, *keys) for keys in ERRORS if finest.get(keys[0]) is not None]
         facts.append(("Unknowns", f"{finest['dofs']:,}", f"{finest['iterations']} iterations"))
     points = " × ".join(map(str, quality["control_points"]))
-    return [*facts, ("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"])))]
+    facts.append(("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"]))))
+    if told := quality.get("refinement"):
+        facts.append(("Control points chosen", told["stopped"], reports.control_points_in_words(report)))
+    return facts
 
 
 def _error_fact(level: Report, absolute: str, relative: str) -> tuple[str, str, str]:

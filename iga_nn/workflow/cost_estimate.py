@@ -6,6 +6,7 @@ second derivative of the spline's distortion. How many of them a run takes is kn
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ import numpy as np
 if TYPE_CHECKING:
     import torch
 
-    from parameterize.config import Config, SplineConfig
+    from parameterize.config import Config, RefinementConfig, SplineConfig
     from parameterize.surface.surface import Surface
 
 Clock = Callable[[], float]
@@ -35,6 +36,7 @@ REST = 1000.0  # libraries loaded, figures drawn
 # Products
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
 EASY, HARD = (5, 13), (11, 13)  # rounds, and Newton steps a round
+HARD_AFTER = (3, 14)  # likewise each time that knots were inserted
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
@@ -82,9 +84,22 @@ def forecast(
         once + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
         for rounds, steps in (EASY, HARD)
     )
+    most = spline.control_points
+    if config.refinement is not None:  # it may end with the first spline, or go on to its limit
+        most = config.refinement.max_control_points
+        rounds, steps = HARD_AFTER
+        growths = _growths(config.refinement, spline.control_points)
+        high += sum(growths) * rounds * (min(steps, spline.steps) * step + CERTIFICATE * product)
     activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
-    mapped = PER_CONTROL_POINT * spline.control_points**3 + PER_VERTEX * vertices
+    mapped = PER_CONTROL_POINT * most**3 + PER_VERTEX * vertices
     return Forecast((low, high), LIBRARIES + FIGURES + max(activations, mapped, PER_UNKNOWN * unknowns))
+
+
+def _growths(refinement: RefinementConfig, control_points: int) -> list[float]:
+    """Return the factors by which the control points are more after each refinement, up to the limit."""
+    whole = (refinement.max_control_points / control_points) ** 3
+    count = math.ceil(math.log(whole) / math.log(refinement.growth))
+    return [min(refinement.growth**number, whole) for number in range(1, count + 1)]
 
 
 def _training_points(surface: Surface, config: Config) -> int:

@@ -187,7 +187,9 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
         seed=options.seed,
         device=result.device,
         versions=reports.versions(),
-        parameterization=result.quality.as_dict() | advice.unproved(result.volume, result.certificate),
+        parameterization=result.quality.as_dict()
+        | ({"refinement": result.refinement.as_dict()} if result.refinement else {})
+        | advice.unproved(result.volume, result.certificate),
     )
     tell(state, options)
 

@@ -104,8 +104,8 @@ def run(
 
 def checked(mapping: MapOptions, options: ProblemOptions) -> tuple[Equation, int]:
     """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
-    equation, spline = options.problem(), mapping.config().spline
-    blank = BSplineVolume.uniform(np.zeros((spline.control_points,) * 3 + (3,)), spline.degree)
+    equation, degree = options.problem(), mapping.config().spline.degree
+    blank = BSplineVolume.uniform(np.zeros((mapping.most_control_points,) * 3 + (3,)), degree)
     return equation, check_size(blank, max(options.refine), options.degree, equation.form.components)
 
 

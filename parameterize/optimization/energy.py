@@ -39,9 +39,9 @@ class SplineEnergy:
         self._bending = BendingOperator(mass, slope, curve, 2.0 * config.fairness)
         self._rough_bending = self._bending.to(_ROUGH)
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient)
-        ends = torch.zeros_like(mass[0])
-        ends[0, 0] = ends[-1, -1] = config.pull * config.vertex / 6.0  # the points spread over six faces
-        rough = tuple(2.0 * k + 2.0 * config.fairness * h + ends for k, h in zip(slope, curve, strict=True))
+        rough = tuple(2.0 * k + 2.0 * config.fairness * h for k, h in zip(slope, curve, strict=True))
+        for matrix in rough:
+            matrix[[0, -1], [0, -1]] += config.pull * config.vertex / 6.0  # the points spread over six faces
         self._precondition = FastDiagonalization(rough, mass).to(_ROUGH)
 
     def start_round(self, control: Tensor, penalty: float) -> None:
@@ -61,7 +61,7 @@ class SplineEnergy:
     def slide(self, control: Tensor) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
         for _ in range(self.config.slides):
-            self.surface.places.slide(control, self.surface.points, 0.5 / control.shape[1])
+            self.surface.places.slide(control, self.surface.points, 0.5 / max(control.shape[1:]))
         self.surface.places.relax(self.config.relaxations)
         self.watch_facing(control)
         if self._contact is not None:

@@ -15,6 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from ..arrays import IntArray
 from ..certificate.boundary import check_boundary
 from ..certificate.jacobian import Certificate, certify
 from ..checkpoint import Checkpoints
@@ -66,6 +67,8 @@ def optimize(
     history: History,
     progress: ProgressCallback = ignore,
     checkpoints: Checkpoints | None = None,
+    begun: int = 0,
+    watched: IntArray | None = None,
 ) -> Optimized:
     """Minimise from `control` (3, n_u, n_v, n_w), volume 1, in rounds: descend, certify, watch the spans not proved.
 
@@ -77,14 +80,17 @@ def optimize(
     those last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
     result is the last certified map whose boundary does not meet itself, else the last certified one, else the one with
     the fewest unproved spans.
+    begun: of how many rounds `control` is the result, on other knots; watched (k, 3): spans that nearly fold there.
     A checkpoint is kept after every round.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with one_thread_an_operation():
         energy = SplineEnergy(config, knots, surface)
         energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
+        if watched is not None:
+            energy.barrier.activate(watched)
         first = Optimized.of(control, knots, config)
-        rounds = _Rounds(energy, knots, control, first, near=energy.anchors.near(control))
+        rounds = _Rounds(energy, knots, control, first, near=energy.anchors.near(control), number=begun)
         if (saved := checkpoints.load(_CHECKPOINT)) is not None:
             rounds.restore(*saved, history)
         while not rounds.finished:
@@ -115,13 +121,9 @@ class _Rounds:
     best: Optimized
     near: bool  # whether F was close to the surface all along the cube's edges to begin with
     number: int = 0
+    certified: bool = False  # whether a round on these knots has ended with a certified map
     parting: int = 0  # rounds in which the boundary of a certified map that meets itself is pushed apart
     polished: int = 0  # rounds after that, or after the map was certified for the first time
-
-    @property
-    def certified(self) -> bool:
-        """Whether a round has ended with a certified map."""
-        return self.number > 0 and self.best.certificate.verdict == "certified"
 
     @property
     def finished(self) -> bool:
@@ -158,6 +160,7 @@ class _Rounds:
         unproved = found.certificate.unproved
         meets = ", the boundary meets itself" if found.meets_itself else ""
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
+        self.certified |= found.certificate.verdict == "certified"
         if self.number == 0 or found.faults <= self.best.faults:
             self.best = found
         self.energy.barrier.activate(unproved)
@@ -181,7 +184,7 @@ class _Rounds:
             "span_weights": torch.as_tensor(self.energy.barrier.weights),
         }
         counts = {"number": self.number, "parting": self.parting, "polished": self.polished}
-        state = counts | {"history": history.rows}
+        state = counts | {"certified": self.certified, "history": history.rows}
         checkpoints.save(_CHECKPOINT, tensors, state)
 
     def restore(self, tensors: dict[str, Tensor], state: dict[str, Any], history: History) -> None:
@@ -194,6 +197,7 @@ class _Rounds:
         self.control = tensors["control"]
         self.best = Optimized.of(tensors["best"], self.knots, energy.config)
         self.number, self.parting, self.polished = (int(state[name]) for name in ("number", "parting", "polished"))
+        self.certified = bool(state["certified"])
         if self.parting:
             energy.watch_contact(self.control)
         history.rows[:] = [tuple(row) for row in state["history"]]

@@ -5,6 +5,7 @@ must: the paper keeps them fixed (section 4.3.2), which freezes the network's co
 boundary error and distortion together.
 """
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -50,6 +51,12 @@ class SlidingParameters:
         self.parameters, self.cube_faces = parameters, cube_faces
         for known in ("window", "rows"):
             self.__dict__.pop(known, None)
+
+    def on_knots(self, knots: tuple[Array, Array, Array]) -> "SlidingParameters":
+        """Return the same parameters for a spline with other knots."""
+        other = SlidingParameters(knots, self.degree, self.parameters, self.triangles, self.layout)
+        other.place(self.parameters, self.cube_faces)
+        return other
 
     def values(self, control: Tensor) -> Array:
         """Return F at the parameters: (N, 3)."""
@@ -99,6 +106,21 @@ class SlidingParameters:
             share[blocked] *= 0.5
             self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
         self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles, self.layout))
+
+    def settled(self, control: Tensor, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
+        """Return the parameters where F's boundary is closest to their points (N, 3), as far as no triangle flips.
+
+        They slide `slides` times; triangles that this flips are relaxed in at most so many sweeps; then they slide as
+        often again.
+        """
+        other, longest = copy(self), 0.5 / max(control.shape[1:])
+        for _ in range(slides):
+            other.slide(control, points, longest)
+        other.unflip()
+        other.relax(sweeps)  # where flips are left
+        for _ in range(slides):
+            other.slide(control, points, longest, keep_layout=True)
+        return other
 
     def relax(self, sweeps: int) -> None:
         """Untangle flipped triangles in a few sweeps, so that what sliding tangles does not pile up."""

@@ -37,6 +37,13 @@ class SurfaceFit:
         self.yielding = np.ones(len(points))
         self.aim(points, quadrics)
 
+    def on_knots(self, knots: tuple[Array, Array, Array]) -> "SurfaceFit":
+        """Return the same data for a spline with other knots, at the present parameters and weights."""
+        places, given = self.places.on_knots(knots), self.given_corners
+        other = SurfaceFit(places, self.points, self._quadrics, self._weights, given_corners=given)
+        other.give_way(self.yielding)
+        return other
+
     def aim(self, points: Array, quadrics: Array) -> None:
         """Take other points (N, 3) and quadrics (N, 3, 3)."""
         self.points, self._quadrics = points, quadrics

@@ -17,7 +17,7 @@ from .bspline import (
     evaluate_at,
     evaluate_grid,
     greville,
-    insert_knots,
+    insertion_into,
     interpolate_along,
     midpoints,
     open_uniform_knots,
@@ -217,13 +217,19 @@ class BSplineVolume(Shown):
             raise ValueError(f"levels must be non-negative, got {levels}")
         volume = self
         for _ in range(levels):
-            knots, points = [], volume.control_points
-            for a in range(3):
-                finer, matrix = insert_knots(volume.knots[a], volume.degrees[a], midpoints(volume.knots[a]))
-                points = apply_along(matrix, points, a)
-                knots.append(finer)
-            volume = BSplineVolume(self.degrees, tuple(knots), points)  # type: ignore[arg-type]
+            u, v, w = (np.sort(np.concatenate([row, midpoints(row)])) for row in volume.knots)
+            volume = volume.on_knots((u, v, w))
         return volume
+
+    def on_knots(self, finer: Knots) -> "BSplineVolume":
+        """Return the same map on finer knots, exactly (knot insertion).
+
+        Raises ValueError where these lack one of the map's own knots.
+        """
+        points = self.control_points
+        for a in range(3):
+            points = apply_along(insertion_into(self.knots[a], self.degrees[a], finer[a]), points, a)
+        return BSplineVolume(self.degrees, finer, points)
 
     def face(self, axis: int, side: int) -> Array:
         """Return the control points of a boundary face, e.g. (n_v, n_w, 3) for axis 0; side 0 or 1."""

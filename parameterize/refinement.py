@@ -1,0 +1,208 @@
+"""Inserts knots where a map needs them and optimises further, until its boundary is close enough to the surface.
+
+Knots that are inserted leave a map as it is, so each further spline stage starts from what the one before has found.
+What it finds is kept where no less is proved of it; else the map before is the result, and that is said.
+"""
+
+import logging
+from dataclasses import asdict, dataclass, replace
+from itertools import count
+from typing import Any, Literal
+
+import numpy as np
+import torch
+
+from .arrays import Array, IntArray
+from .certificate.determinant import DeterminantForm
+from .checkpoint import Checkpoints
+from .config import RefinementConfig, SplineConfig
+from .optimization.newton import Optimized, optimize
+from .optimization.surface_distance import SurfaceFit
+from .progress import History, ProgressCallback
+from .quality.distances import Distances
+from .quality.quality import arap_grid
+from .spline.knot_choice import Knots, halved_where_most, totals_along
+from .spline.volume import BSplineVolume
+
+_log = logging.getLogger(__name__)
+_CHECKPOINT = "knots"
+
+Stop = Literal["tolerance met", "limit reached", "no better map"]
+
+
+@dataclass(frozen=True)
+class Level:
+    """Say of one map: its control points a direction, its boundary error, and how many spans are not proved.
+
+    boundary: root mean square distance at the mesh's vertices over the diagonal of its bounding box.
+    """
+
+    control_points: tuple[int, int, int]
+    boundary: float
+    unproved: int
+
+    def __str__(self) -> str:
+        return (
+            f"{' x '.join(map(str, self.control_points))} control points: boundary {self.boundary:.3g} of the diagonal"
+        )
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """Say how a map came to its control points.
+
+    levels: the maps that were kept, the result last. dropped: one with more control points that is no better: less is
+    proved of it, or its boundary is no closer. stopped: why no more knots were inserted.
+    """
+
+    tolerance: float
+    max_control_points: int
+    stopped: Stop
+    levels: tuple[Level, ...]
+    dropped: Level | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry `refinement` of report.json."""
+        return asdict(self)
+
+
+def refine(
+    found: Optimized,
+    fit: SurfaceFit,
+    own: int,
+    config: SplineConfig,
+    refinement: RefinementConfig,
+    *,
+    history: History,
+    progress: ProgressCallback,
+    checkpoints: Checkpoints,
+) -> tuple[Optimized, SurfaceFit, Refinement]:
+    """Return the last map of which no less is proved than of `found`, its surface data, and how it was found.
+
+    own: how many of the surface's points are vertices of the mesh, the first ones. Each refinement has checkpoints of
+    its own: the chosen knots, and those of its spline stage.
+    """
+    report: dict[str, Any] = {"history": history, "progress": progress}
+    spots = _Spots.of(found, fit, own, config)
+    levels, dropped = [spots.level], None
+    stopped: Stop = "tolerance met"
+    for number in count(1):
+        _log.info("%s", levels[-1])
+        if not any(found.faults) and levels[-1].boundary <= refinement.tolerance:
+            break
+        kept = checkpoints.of_refinement(number)
+        finer = _chosen_knots(spots, config, refinement, kept)
+        if _counts(finer, config) == levels[-1].control_points:
+            stopped = "limit reached"
+            break
+        other = _optimized_on(finer, spots.volume, fit, config, refinement, kept, report)
+        spots = _Spots.of(*other, own, config)
+        if (other[0].faults, spots.level.boundary) >= (found.faults, levels[-1].boundary):
+            stopped, dropped = "no better map", spots.level
+            _log.warning("no better map with %s, %d spans unproved: the one before is kept", dropped, dropped.unproved)
+            break
+        found, fit = other
+        levels.append(spots.level)
+    told = Refinement(refinement.tolerance, refinement.max_control_points, stopped, tuple(levels), dropped)
+    return found, fit, told
+
+
+@dataclass(frozen=True, eq=False)
+class _Spots:
+    """A map at volume 1, and what is found on it and where.
+
+    places, squares: the parameters (n, 3) of the mesh's vertices, and their squared distances (n,).
+    """
+
+    volume: BSplineVolume
+    places: Array
+    squares: Array
+    unproved: IntArray
+    level: Level
+    arap_limit: float
+
+    @classmethod
+    def of(cls, found: Optimized, fit: SurfaceFit, own: int, config: SplineConfig) -> "_Spots":
+        """Measure the boundary as the report will: at parameters that are settled."""
+        volume = BSplineVolume((config.degree,) * 3, fit.places.knots, found.control.permute(1, 2, 3, 0).cpu().numpy())
+        places = fit.places.settled(found.control, fit.points, config.last_slides, config.last_sweeps)
+        distances = np.linalg.norm(places.values(found.control)[:own] - fit.points[:own], axis=1)
+        diagonal = float(np.linalg.norm(np.ptp(fit.points[:own], axis=0)))
+        unproved = found.certificate.unproved
+        level = Level(volume.shape, Distances.of(distances).rms / diagonal, len(unproved))
+        return cls(volume, places.parameters[:own], distances**2, unproved, level, config.arap_limit)
+
+    def amounts(self, distortion_share: float) -> tuple[Array, Array, Array]:
+        """Return for each direction what is found on each of its spans.
+
+        Unproved spans, where there are any; else squared distances, and distortion above the limit with a share.
+        """
+        knots = self.volume.knots
+        if len(self.unproved):
+            n_spans = [len(np.unique(row)) - 1 for row in knots]
+            u, v, w = (np.bincount(self.unproved[:, d], minlength=n).astype(float) for d, n in enumerate(n_spans))
+            return u, v, w
+        boundary = totals_along(self.places, self.squares / self.squares.sum(), knots)
+        points, density, weights = arap_grid(self.volume, n_gauss=2)
+        limit = self.arap_limit * (1.0 + float(np.sum(weights * density)))
+        excess = weights * np.maximum(density - limit, 0.0) ** 2
+        grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
+        stretched = totals_along(grid, distortion_share * excess.ravel() / max(float(excess.sum()), 1e-300), knots)
+        u, v, w = (a + b for a, b in zip(boundary, stretched, strict=True))
+        return u, v, w
+
+
+def _chosen_knots(spots: _Spots, config: SplineConfig, refinement: RefinementConfig, checkpoints: Checkpoints) -> Knots:
+    """Return finer knots, those of the checkpoint where there is one, and keep them in a checkpoint."""
+    if (saved := checkpoints.load(_CHECKPOINT)) is not None:
+        u, v, w = (saved[0][axis].numpy() for axis in "uvw")
+        return u, v, w
+    finer = halved_where_most(
+        spots.volume.knots,
+        spots.amounts(refinement.distortion),
+        np.array(spots.volume.shape),
+        most=refinement.max_control_points,
+        share=refinement.share,
+        growth=refinement.growth,
+        narrowest=refinement.narrowest / (config.control_points - config.degree),
+    )
+    checkpoints.save(_CHECKPOINT, {axis: torch.as_tensor(row) for axis, row in zip("uvw", finer, strict=True)}, {})
+    return finer
+
+
+def _counts(knots: Knots, config: SplineConfig) -> tuple[int, int, int]:
+    u, v, w = (len(row) - config.degree - 1 for row in knots)
+    return u, v, w
+
+
+def _optimized_on(
+    finer: Knots,
+    volume: BSplineVolume,
+    fit: SurfaceFit,
+    config: SplineConfig,
+    refinement: RefinementConfig,
+    checkpoints: Checkpoints,
+    report: dict[str, Any],
+) -> tuple[Optimized, SurfaceFit]:
+    """Insert the knots and go on with the rounds that follow those of a certified map."""
+    later = replace(
+        config,
+        vertex=refinement.vertex * config.vertex,
+        gain=refinement.gain,
+        rounds=config.firm_rounds + refinement.rounds,
+        polish=refinement.polish,
+    )
+    start, surface = volume.on_knots(finer), fit.on_knots(finer)
+    form = DeterminantForm(start)
+    nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < config.min_coefficient)
+    found = optimize(
+        torch.as_tensor(np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0))),
+        finer,
+        surface,
+        later,
+        checkpoints=checkpoints,
+        begun=config.firm_rounds,
+        watched=form.numbers(nearly),
+        **report,
+    )
+    return found, surface

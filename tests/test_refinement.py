@@ -1,0 +1,145 @@
+import numpy as np
+import pytest
+import torch
+from shapes import rounded_cube, turned
+
+from parameterize import refinement
+from parameterize.checkpoint import Checkpoints
+from parameterize.config import RefinementConfig, SplineConfig
+from parameterize.cube.cube import project_radially
+from parameterize.optimization.newton import Optimized, optimize
+from parameterize.optimization.sliding import SlidingParameters
+from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.progress import History, ignore
+from parameterize.refinement import refine
+from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.surface.geometry import vertex_quadrics, vertex_weights
+
+CONFIG = SplineConfig(control_points=6, steps=12, penalties=(20.0, 100.0, 500.0, 2500.0), rounds=7, polish=1)
+KNOTS = (open_uniform_knots(6, 3),) * 3
+OWN = 300
+
+
+def surface_fit():
+    """A rounded cube, slightly turned, whose parameters are the radial projection."""
+    points, faces = rounded_cube(OWN, power=12.0)
+    vertices = turned(points)
+    places = SlidingParameters(KNOTS, 3, 0.5 + project_radially(points - 0.5), faces)
+    quadrics = vertex_quadrics(vertices, faces, CONFIG.tangential)
+    return SurfaceFit(places, vertices, quadrics, vertex_weights(vertices, faces, OWN))
+
+
+@pytest.fixture(scope="module")
+def first():
+    """A certified map, and its surface data."""
+    fit, row = surface_fit(), greville(KNOTS[0], 3)
+    control = torch.as_tensor(np.stack(np.meshgrid(row, row, row, indexing="ij")))
+    found = optimize(control, KNOTS, fit, CONFIG, history=History())
+    assert not any(found.faults)
+    return found, fit
+
+
+def refined(first, checkpoints=None, progress=ignore, **options):
+    limits = RefinementConfig(**{"rounds": 4, "polish": 2} | options)
+    kept = checkpoints or Checkpoints(None, {}, resume=False)
+    return refine(*first, OWN, CONFIG, limits, history=History(), progress=progress, checkpoints=kept)
+
+
+def boundary_rms(found, fit):
+    places = fit.places.settled(found.control, fit.points, CONFIG.last_slides, CONFIG.last_sweeps)
+    distances = np.linalg.norm(places.values(found.control)[:OWN] - fit.points[:OWN], axis=1)
+    return np.sqrt((distances**2).mean()) / np.linalg.norm(np.ptp(fit.points[:OWN], axis=0))
+
+
+def test_a_map_close_enough_stays_as_it_is(first):
+    found, fit, told = refined(first, tolerance=1.0)
+    assert found is first[0] and fit is first[1]
+    assert told.stopped == "tolerance met" and told.dropped is None
+    (level,) = told.levels
+    assert level.control_points == (6, 6, 6) and level.unproved == 0
+    assert level.boundary == pytest.approx(boundary_rms(*first), rel=1e-12)
+
+
+def test_knots_are_inserted_until_the_tolerance_is_met(first):
+    tolerance = 0.7 * boundary_rms(*first)
+    found, fit, told = refined(first, tolerance=tolerance)
+    assert told.stopped == "tolerance met" and len(told.levels) > 1
+    assert boundary_rms(found, fit) == told.levels[-1].boundary <= tolerance
+    assert not any(found.faults)
+    assert tuple(found.control.shape[1:]) == told.levels[-1].control_points
+    for row in fit.places.knots:
+        assert set(KNOTS[0]) <= set(row) and len(row) > len(KNOTS[0])
+
+
+def test_no_direction_gets_more_than_the_limit(first):
+    found, fit, told = refined(first, tolerance=1e-9, max_control_points=8)
+    assert told.stopped == "limit reached"
+    assert max(told.levels[-1].control_points) == 8 == max(found.control.shape[1:])
+    assert not any(found.faults) and boundary_rms(found, fit) < boundary_rms(*first)
+
+
+def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypatch, caplog):
+    def folded(control, knots, *args, **options):
+        mirrored = control * torch.tensor([-1.0, 1.0, 1.0], dtype=control.dtype)[:, None, None, None]
+        return Optimized.of(mirrored, knots, CONFIG)
+
+    monkeypatch.setattr(refinement, "optimize", folded)
+    found, fit, told = refined(first, tolerance=1e-9)
+    assert found is first[0] and fit is first[1]
+    assert told.stopped == "no better map" and len(told.levels) == 1
+    assert told.dropped.unproved > 0 and max(told.dropped.control_points) > 6
+    assert "the one before is kept" in caplog.text
+    assert told.as_dict()["dropped"]["unproved"] == told.dropped.unproved
+
+
+def test_spans_that_are_not_proved_are_halved_first(first, monkeypatch):
+    """A fold is pressed into one corner: what lies there is halved, and nothing else."""
+    control, seen = first[0].control.clone(), []
+    control[:, 0, 0, 0] += 0.5
+    found = Optimized.of(control, KNOTS, CONFIG)
+    assert set(map(tuple, found.certificate.unproved)) == {(0, 0, 0)}
+
+    def caught(control, knots, *args, **options):
+        seen.append(knots)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(refinement, "optimize", caught)
+    with pytest.raises(KeyboardInterrupt):
+        refined((found, first[1]), tolerance=1.0)
+    for row in seen[0]:
+        assert np.setdiff1d(row, KNOTS[0]).tolist() == [pytest.approx(1.0 / 6.0)]
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_interrupted_and_resumed_is_undisturbed(first, tmp_path, step):
+    options, steps = {"tolerance": 0.7 * boundary_rms(*first)}, []
+
+    def interrupt(state):
+        steps.append(state)
+        if len(steps) == step:
+            raise KeyboardInterrupt
+
+    undisturbed, _, told = refined(first, **options)
+    with pytest.raises(KeyboardInterrupt):
+        refined(first, Checkpoints(tmp_path, {}, resume=False), interrupt, **options)
+    resumed, _, again = refined(first, Checkpoints(tmp_path, {}, resume=True), **options)
+    assert torch.equal(resumed.control, undisturbed.control) and again == told
+
+
+def test_knots_once_chosen_are_those_of_the_checkpoint(first, tmp_path):
+    """Another machine may round otherwise, and choose other ones, which the optimised map would not fit."""
+    options = {"tolerance": 0.7 * boundary_rms(*first)}
+    _, fit, told = refined(first, Checkpoints(tmp_path, {}, resume=False), **options)
+    _, other, again = refined(first, Checkpoints(tmp_path, {}, resume=True), **options | {"share": 0.1})
+    assert again == told
+    assert all(np.array_equal(a, b) for a, b in zip(fit.places.knots, other.places.knots, strict=True))
+
+
+def test_weights_that_gave_way_are_carried_over(first):
+    fit = surface_fit()
+    fit.give_way(np.linspace(0.1, 1.0, len(fit.points)))
+    finer = tuple(np.sort(np.append(row, 0.1)) for row in KNOTS)
+    other = fit.on_knots(finer)
+    assert np.array_equal(other.yielding, fit.yielding) and np.array_equal(other.weights, fit.weights)
+    assert np.array_equal(other.places.parameters, fit.places.parameters)
+    assert other.places.knots == finer
