@@ -17,7 +17,7 @@ from torch import Tensor
 
 from .files import save_bytes
 
-FORMAT = 2
+FORMAT = 3
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
 

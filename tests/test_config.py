@@ -39,6 +39,18 @@ def test_scaled_refuses_factors_out_of_range(factor):
         preset("fast").scaled(factor)
 
 
+def test_refined():
+    config = preset("fast").with_control_points(12).refined(1e-3, 20)
+    assert config.spline.control_points == 12
+    assert (config.refinement.tolerance, config.refinement.max_control_points) == (1e-3, 20)
+    assert preset("fast").refinement is None
+    for tolerance in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match="tolerance must be positive"):
+            config.refined(tolerance, 20)
+    with pytest.raises(ValueError, match="at least 12, got 11"):
+        config.refined(1e-3, 11)
+
+
 def test_with_control_points():
     config = preset("fast").with_control_points(12)
     assert config.spline.control_points == 12 and config.stages == preset("fast").stages

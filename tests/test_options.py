@@ -4,6 +4,7 @@ from dataclasses import fields, replace
 
 import pytest
 
+from iga_nn.errors import InputError
 from iga_nn.options import PROBLEMS, ElasticityOptions, MapOptions, PoissonOptions
 
 SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss"}
@@ -34,3 +35,26 @@ def test_shared_options_leave_the_order_of_the_own_ones():
 
 def test_every_problem_is_tested_here():
     assert {type(options) for options in OTHERS} == set(PROBLEMS.values())
+
+
+def test_auto_takes_its_limits_to_the_map():
+    config = MapOptions(control_points="auto", tolerance=1e-3, max_control_points=40).config()
+    assert (config.refinement.tolerance, config.refinement.max_control_points) == (1e-3, 40)
+    assert config.spline == MapOptions().config().spline and MapOptions().config().refinement is None
+    assert MapOptions(control_points="auto").most_control_points == 60 and MapOptions().most_control_points == 30
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"control_points": "auto", "tolerance": 0.0}, "tolerance must be positive, got 0.0"),
+        ({"control_points": "auto", "max_control_points": 29}, "max control points 29: at least 30, at most 100"),
+        ({"control_points": "auto", "max_control_points": 101}, "max control points 101: at least 30, at most 100"),
+        ({"control_points": 3}, "control points 3: at least 4, at most 100"),
+        ({"tolerance": 1e-3}, "tolerance: has a meaning with --control-points auto alone"),
+        ({"max_control_points": 40}, "max control points: has a meaning with --control-points auto alone"),
+    ],
+)
+def test_limits_that_cannot_be_run_are_refused(given, says):
+    with pytest.raises(InputError, match=says):
+        MapOptions(**given).config()

@@ -40,7 +40,7 @@ def first():
 
 
 def refined(first, checkpoints=None, progress=ignore, **options):
-    limits = RefinementConfig(**{"rounds": 4, "polish": 2} | options)
+    limits = RefinementConfig(**{"rounds": 4, "polish": 1} | options)
     kept = checkpoints or Checkpoints(None, {}, resume=False)
     return refine(*first, OWN, CONFIG, limits, history=History(), progress=progress, checkpoints=kept)
 
@@ -49,6 +49,13 @@ def boundary_rms(found, fit):
     places = fit.places.settled(found.control, fit.points, CONFIG.last_slides, CONFIG.last_sweeps)
     distances = np.linalg.norm(places.values(found.control)[:OWN] - fit.points[:OWN], axis=1)
     return np.sqrt((distances**2).mean()) / np.linalg.norm(np.ptp(fit.points[:OWN], axis=0))
+
+
+@pytest.fixture(scope="module")
+def once(first, tmp_path_factory):
+    """What one refinement makes of it, the options of that, and the folder of its checkpoints."""
+    options, folder = {"tolerance": 0.7 * boundary_rms(*first)}, tmp_path_factory.mktemp("refined")
+    return refined(first, Checkpoints(folder, {}, resume=False), **options), options, folder
 
 
 def test_a_map_close_enough_stays_as_it_is(first):
@@ -60,21 +67,20 @@ def test_a_map_close_enough_stays_as_it_is(first):
     assert level.boundary == pytest.approx(boundary_rms(*first), rel=1e-12)
 
 
-def test_knots_are_inserted_until_the_tolerance_is_met(first):
-    tolerance = 0.7 * boundary_rms(*first)
-    found, fit, told = refined(first, tolerance=tolerance)
+def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
+    (found, fit, told), options, _ = once
     assert told.stopped == "tolerance met" and len(told.levels) > 1
-    assert boundary_rms(found, fit) == told.levels[-1].boundary <= tolerance
+    assert boundary_rms(found, fit) == told.levels[-1].boundary <= options["tolerance"]
     assert not any(found.faults)
-    assert tuple(found.control.shape[1:]) == told.levels[-1].control_points
+    assert tuple(found.control.shape[1:]) == told.levels[-1].control_points > (6, 6, 6)
     for row in fit.places.knots:
-        assert set(KNOTS[0]) <= set(row) and len(row) > len(KNOTS[0])
+        assert set(KNOTS[0]) < set(row)
 
 
 def test_no_direction_gets_more_than_the_limit(first):
-    found, fit, told = refined(first, tolerance=1e-9, max_control_points=8)
+    found, fit, told = refined(first, tolerance=1e-9, max_control_points=7)
     assert told.stopped == "limit reached"
-    assert max(told.levels[-1].control_points) == 8 == max(found.control.shape[1:])
+    assert max(told.levels[-1].control_points) == 7 == max(found.control.shape[1:])
     assert not any(found.faults) and boundary_rms(found, fit) < boundary_rms(*first)
 
 
@@ -110,27 +116,25 @@ def test_spans_that_are_not_proved_are_halved_first(first, monkeypatch):
         assert np.setdiff1d(row, KNOTS[0]).tolist() == [pytest.approx(1.0 / 6.0)]
 
 
-@pytest.mark.parametrize("step", [1, 5])
-def test_interrupted_and_resumed_is_undisturbed(first, tmp_path, step):
-    options, steps = {"tolerance": 0.7 * boundary_rms(*first)}, []
+def test_interrupted_and_resumed_is_undisturbed(first, once, tmp_path):
+    steps = []
 
     def interrupt(state):
-        steps.append(state)
-        if len(steps) == step:
+        steps.append(state.step)
+        if steps[-1] > CONFIG.steps * (CONFIG.firm_rounds + 1):  # in the second round
             raise KeyboardInterrupt
 
-    undisturbed, _, told = refined(first, **options)
+    (undisturbed, _, told), options, _ = once
     with pytest.raises(KeyboardInterrupt):
         refined(first, Checkpoints(tmp_path, {}, resume=False), interrupt, **options)
     resumed, _, again = refined(first, Checkpoints(tmp_path, {}, resume=True), **options)
     assert torch.equal(resumed.control, undisturbed.control) and again == told
 
 
-def test_knots_once_chosen_are_those_of_the_checkpoint(first, tmp_path):
+def test_knots_once_chosen_are_those_of_the_checkpoint(first, once):
     """Another machine may round otherwise, and choose other ones, which the optimised map would not fit."""
-    options = {"tolerance": 0.7 * boundary_rms(*first)}
-    _, fit, told = refined(first, Checkpoints(tmp_path, {}, resume=False), **options)
-    _, other, again = refined(first, Checkpoints(tmp_path, {}, resume=True), **options | {"share": 0.1})
+    (_, fit, told), options, folder = once
+    _, other, again = refined(first, Checkpoints(folder, {}, resume=True), **options | {"share": 0.1})
     assert again == told
     assert all(np.array_equal(a, b) for a, b in zip(fit.places.knots, other.places.knots, strict=True))
 

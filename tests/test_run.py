@@ -104,6 +104,28 @@ def test_interrupted_and_resumed_is_undisturbed(surface, undisturbed, tmp_path, 
     assert ("S(2)", 1) not in steps  # it did go on, not start again
 
 
+def test_a_refinement_interrupted_and_resumed_is_undisturbed(surface, tmp_path):
+    config = tiny_config().refined(tolerance=1e-9, max_control_points=7)
+    undisturbed = parameterize(surface, config, seed=3, device="cpu")
+    told = undisturbed.refinement
+    assert told.levels[-1].control_points == undisturbed.volume.shape == undisturbed.quality.control_points
+    assert "refine" in undisturbed.seconds and undisturbed.config == config
+    options, rounds = {"seed": 3, "device": "cpu", "checkpoint_dir": tmp_path}, config.spline.firm_rounds + 1
+
+    def interrupt(state):
+        if state.stage == "spline" and state.step > config.spline.steps * rounds:  # in the second after the knots
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        parameterize(surface, config, progress=interrupt, **options)
+    resumed = parameterize(surface, config, resume=True, **options)
+    same_result(undisturbed, resumed)
+    assert resumed.refinement == told
+    assert all(np.array_equal(a, b) for a, b in zip(resumed.volume.knots, undisturbed.volume.knots, strict=True))
+    with pytest.raises(CheckpointError, match=r"\(config\.refinement\.tolerance differ\)"):
+        parameterize(surface, config.refined(1e-3, 7), resume=True, **options)
+
+
 def test_progress_tells_every_step(surface, tmp_path):
     seen = []
 

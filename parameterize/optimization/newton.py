@@ -15,7 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ..arrays import IntArray
+from ..arrays import Array, IntArray
 from ..certificate.boundary import check_boundary
 from ..certificate.jacobian import Certificate, certify
 from ..checkpoint import Checkpoints
@@ -81,7 +81,7 @@ def optimize(
     result is the last certified map whose boundary does not meet itself, else the last certified one, else the one with
     the fewest unproved spans.
     begun: of how many rounds `control` is the result, on other knots; watched (k, 3): spans that nearly fold there.
-    A checkpoint is kept after every round.
+    A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with one_thread_an_operation():
@@ -90,13 +90,15 @@ def optimize(
         if watched is not None:
             energy.barrier.activate(watched)
         first = Optimized.of(control, knots, config)
-        rounds = _Rounds(energy, knots, control, first, near=energy.anchors.near(control), number=begun)
+        places = surface.places.parameters, surface.places.cube_faces
+        rounds = _Rounds(energy, knots, control, first, places, near=energy.anchors.near(control), number=begun)
         if (saved := checkpoints.load(_CHECKPOINT)) is not None:
             rounds.restore(*saved, history)
         while not rounds.finished:
             rounds.begin()
             rounds.conclude(_descend(rounds.control, energy, rounds.number, history, progress))
             rounds.save(checkpoints, history)
+        surface.places.place(*rounds.best_places)
     return rounds.best
 
 
@@ -119,6 +121,7 @@ class _Rounds:
     knots: Knots
     control: Tensor
     best: Optimized
+    best_places: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their cube faces (N,)
     near: bool  # whether F was close to the surface all along the cube's edges to begin with
     number: int = 0
     certified: bool = False  # whether a round on these knots has ended with a certified map
@@ -162,7 +165,8 @@ class _Rounds:
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
         self.certified |= found.certificate.verdict == "certified"
         if self.number == 0 or found.faults <= self.best.faults:
-            self.best = found
+            places = self.energy.surface.places
+            self.best, self.best_places = found, (places.parameters, places.cube_faces)
         self.energy.barrier.activate(unproved)
         if self.number >= config.patient_rounds and len(unproved):
             self.energy.barrier.stiffen(unproved, config.span_growth, config.span_most)
@@ -176,6 +180,8 @@ class _Rounds:
         tensors = {
             "control": self.control,
             "best": self.best.control,
+            "best_parameters": torch.as_tensor(self.best_places[0]),
+            "best_cube_faces": torch.as_tensor(self.best_places[1]),
             "parameters": torch.as_tensor(surface.places.parameters),
             "cube_faces": torch.as_tensor(surface.places.cube_faces),
             "yielding": torch.as_tensor(surface.yielding),
@@ -196,6 +202,7 @@ class _Rounds:
         energy.barrier.weigh(tensors["span_weights"].numpy())
         self.control = tensors["control"]
         self.best = Optimized.of(tensors["best"], self.knots, energy.config)
+        self.best_places = tensors["best_parameters"].numpy(), tensors["best_cube_faces"].numpy()
         self.number, self.parting, self.polished = (int(state[name]) for name in ("number", "parting", "polished"))
         self.certified = bool(state["certified"])
         if self.parting:

@@ -1,0 +1,78 @@
+"""`--control-points auto` on the command line: what the report, the page and the terminal say of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+from conftest import formula_parameterization
+
+from iga_nn.cli.commands import main
+from iga_nn.report import document as reports
+from parameterize.refinement import Level, Refinement
+
+FIRST, LAST = Level((30, 30, 30), 9e-4, 0), Level((34, 41, 30), 4.7e-4, 0)
+MET = Refinement(5e-4, 60, "tolerance met", (FIRST, LAST), None)
+TOLD = {
+    "34 x 41 x 30, 30 x 30 x 30 at first; boundary rms 0.00047 of the diagonal, tolerance 0.0005 met": MET,
+    "30 x 30 x 30; boundary rms 0.0009 of the diagonal, tolerance 0.001 met": Refinement(
+        1e-3, 60, "tolerance met", (FIRST,), None
+    ),
+    "30 x 30 x 30; boundary rms 0.0009 of the diagonal, tolerance 0.0005 not met with at most 30 per direction": (
+        Refinement(5e-4, 30, "limit reached", (FIRST,), None)
+    ),
+    "30 x 30 x 30; boundary rms 0.0009 of the diagonal, "
+    "tolerance 0.0005 not met: no better map that is certified was found with 34 x 41 x 30": Refinement(
+        5e-4, 60, "no better map", (FIRST,), replace(LAST, unproved=2)
+    ),
+}
+
+
+@pytest.mark.parametrize("words", TOLD)
+def test_it_is_said_how_many_and_why(words):
+    section = {"refinement": json.loads(json.dumps(TOLD[words].as_dict()))}
+    assert reports.control_points_in_words({"parameterization": section}) == words
+    assert reports.control_points_in_words({"parameterization": {}}) == ""
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The configuration that the training is given, in whose place there is a map by formula."""
+    seen = []
+
+    def parameterize(surface, config, **options):
+        seen.append(config)
+        return replace(formula_parameterization(), refinement=MET)
+
+    monkeypatch.setattr("parameterize.run.parameterize", parameterize)
+    return seen
+
+
+def test_report_page_and_terminal_say_it(asked, in_folder, capsys):
+    flags = ["--control-points", "auto", "--tolerance", "1e-3", "--max-control-points", "31"]
+    assert main(["parameterize", "cube", "--out", "out", *flags]) == 0
+    (config,) = asked
+    assert (config.refinement.tolerance, config.refinement.max_control_points) == (1e-3, 31)
+    (words, *_) = TOLD
+    assert f"control points   {words}" in capsys.readouterr().out
+    report = reports.read(in_folder / "out")
+    assert report["parameterization"]["refinement"]["levels"][-1]["control_points"] == [34, 41, 30]
+    assert report["command"] == "iga-nn parameterize cube " + (
+        "--control-points auto --tolerance 0.001 --max-control-points 31 --out out"
+    )
+    assert words in (in_folder / "out" / "report.html").read_text()
+    assert reports.verdict(report, in_folder / "out")["refinement"]["stopped"] == "tolerance met"
+
+
+def test_room_for_the_most_control_points_is_asked_for_before_the_training(asked, in_folder, capsys):
+    flags = ["--control-points", "auto", "--refine", "3"]
+    assert main(["run", "poisson", "cube", *flags]) == 2
+    assert "refine 3 gives" in capsys.readouterr().err and not asked
+
+
+@pytest.mark.parametrize("given", ["many", "-1"])
+def test_other_words_are_refused(given, in_folder, capsys):
+    assert main(["parameterize", "cube", f"--control-points={given}"]) == 2
+    *_, last = capsys.readouterr().err.strip().splitlines()
+    assert last.startswith("iga-nn: ") and given in last
