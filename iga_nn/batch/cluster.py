@@ -61,7 +61,7 @@ def connected(options: WorkerOptions, most: int) -> Iterator[Client]:
         yield stack.enter_context(client)
 
 
-class _OwnOutput(WorkerPlugin):
+class _OwnOutput(WorkerPlugin):  # type: ignore[misc]
     """Sends what libraries print in a worker to stderr: stdout is for the answer of the command."""
 
     def setup(self, worker: Worker) -> None:
