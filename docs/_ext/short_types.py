@@ -1,5 +1,6 @@
 """Names the types of arrays in signatures, which autodoc spells out where annotations are not kept as text."""
 
+import re
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -22,7 +23,7 @@ def shorten(
 def _short(text: str) -> str:
     for spelled, name in SPELLED.items():
         text = text.replace(spelled, name)
-    return text
+    return re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text)  # of autodoc_type_aliases
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
