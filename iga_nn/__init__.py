@@ -1,7 +1,7 @@
 """Takes a closed surface mesh to a solved PDE on a certified trivariate B-spline.
 
-The docstrings of these packages explain the method with formulas: `parameterize` the map and its certificate, `solve`
-the discretisation and its preconditioner, `iga_nn.io.formats` the files.
+docs/method.md explains the map and its certificate with formulas, docs/solver.md the discretisation and its
+preconditioner, `iga_nn.io.formats` the files.
 
 The public names are loaded on first use: importing the package loads neither torch nor VTK.
 """

@@ -1,3 +1,3 @@
 """Holds the version, and imports nothing, so that every module may read it."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
