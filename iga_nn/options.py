@@ -325,13 +325,15 @@ def _check_level(level: int) -> None:
         raise InputError(f"refine {level}: at most {MAX_REFINE}; each level has 8 times the unknowns")
 
 
-def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1) -> int:
-    """Return the number of unknowns on a mesh of the volume. Raises InputError where they are too many."""
+def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1, processes: int = 1) -> int:
+    """Return the number of unknowns on a mesh of the volume. Raises InputError where they are too many for as many
+    processes.
+    """
     from solve.discretization.space import trial_space
 
     dofs = components * trial_space(volume, refine, degree).dofs
-    if dofs > MAX_DOFS:
-        raise InputError(f"refine {refine} gives {dofs:,} unknowns, more than {MAX_DOFS:,}: lower refine or degree")
+    if dofs > (most := MAX_DOFS * processes):
+        raise InputError(f"refine {refine} gives {dofs:,} unknowns, more than {most:,}: lower refine or degree")
     return dofs
 
 

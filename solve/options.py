@@ -1,6 +1,7 @@
 """What a solve may be told: how the trial space is made, and how the linear system is solved."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from parameterize.threads import default_threads
 
@@ -13,6 +14,7 @@ class SpaceOptions:
 
     refine: how often every span of the map's knots is halved for the trial space; degree: default the map's own.
     threads: default NUMBA_NUM_THREADS, OMP_NUM_THREADS or the cores at hand; the result is the same for any number.
+    comm: a communicator of mpi4py whose processes share the work, a thread each by default (docs/mpi.md).
     quadrature: of the operator: "spline", Gauss rules of the spline space, as many points as the map and the law need;
         "gauss", `degree` Gauss points a span; "gauss+1", one more. Errors have degree + 2 points a span in any case.
 
@@ -23,6 +25,7 @@ class SpaceOptions:
     degree: int | None = None
     threads: int | None = None
     quadrature: str = "spline"
+    comm: Any = None
 
     def __post_init__(self) -> None:
         if self.threads is not None and self.threads < 1:

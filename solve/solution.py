@@ -1,5 +1,6 @@
 """Solution: the spline that a solve returns, and SolveReport: its numbers."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,6 +60,9 @@ class SolveReport:
         False where a formula does not vary on the domain, or the mesh does not resolve the exact solution.
     residuals : tuple of float
         The same before the first and after every iteration.
+    traffic : dict of str to float
+        Of several processes, the bytes that all together send in a step of the linear solver: for copies of rows
+        ("halo"), and in the preconditioner ("transposition", "substitution").
 
     Examples
     --------
@@ -81,6 +85,7 @@ class SolveReport:
     notices: tuple[str, ...] = ()
     meaningful: bool = True
     residuals: tuple[float, ...] = field(default=(), repr=False)
+    traffic: Mapping[str, float] = field(default_factory=dict)
 
     l2 = _known("errors", "l2")
     l2_relative = _known("errors", "l2_relative")
@@ -92,7 +97,8 @@ class SolveReport:
     def as_dict(self) -> dict[str, Any]:
         """Return the entry as report.json holds it; errors that are not known are absent."""
         names = ("elements", "dofs", "h", *NORMS, "iterations", "converged", "residual", "meaningful", "seconds")
-        return {name: value for name in names if (value := getattr(self, name)) is not None}
+        found = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return found | ({"traffic": dict(self.traffic)} if self.traffic else {})
 
     def __str__(self) -> str:
         parts = [f"{self.elements} elements", f"{self.dofs} dofs", f"h {self.h:.4g}"]

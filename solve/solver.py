@@ -14,6 +14,7 @@ from parameterize.threads import default_threads
 from .discretization.operator import free_window
 from .discretization.planes import map_planes
 from .discretization.quadrature import gauss_rule
+from .discretization.slab import Slab
 from .discretization.space import trial_space
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
@@ -47,6 +48,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
         The result is the same for any number. Default: NUMBA_NUM_THREADS, OMP_NUM_THREADS, or the cores at hand.
     quadrature : str
         "spline", "gauss" or "gauss+1" (`solve.options.SpaceOptions`).
+    comm : mpi4py.MPI.Comm, optional
+        Its processes share the work, a thread each by default, and each returns the whole solution.
     tolerance : float
         Of the residual, relative to the right-hand side; 1e-10 by default.
     max_iterations : int
@@ -124,24 +127,33 @@ def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, *
     options = SpaceOptions(**how)
     _check_types(volume, problem)
     placed, space = problem.on(volume), trial_space(volume, options.refine, options.degree)
-    if any(part.stop <= part.start for part in free_window(space, placed.dirichlet)):
+    free = free_window(space, placed.dirichlet)
+    if any(part.stop <= part.start for part in free):
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up(volume.degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
-    return build(volume, placed, space, options.threads or default_threads(), options.quadrature)
+    if options.comm is not None:
+        space = Slab.of(space, options.comm, free)
+    threads = options.threads or (default_threads() if options.comm is None else 1)
+    return build(volume, placed, space, threads, options.quadrature)
 
 
-def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem) -> None:
+def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
     """Evaluate a problem's data where the coarsest solve needs them; finer levels need them at points between.
 
+    comm: a communicator of mpi4py whose processes share the work.
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
     problem, space = problem.on(volume), trial_space(volume)
+    if comm is not None:
+        space = Slab.of(space, comm, free_window(space, problem.dirichlet))
     assembled, _, _ = assemble_data(volume, problem, space, quadrature="gauss")
     if len(problem.natural) == 6 and not problem.form.has_reaction:
-        balanced(assembled.load)
+        space.add(assembled.load)
+        balanced(assembled.load[:, *assembled.operator.window], space)
     if problem.exact is not None:
-        for _, _, x in map_planes(volume, gauss_rule(space)):
-            problem.exact_at(x)
+        with space.agreed():
+            for _, _, x in map_planes(volume, gauss_rule(space)):
+                problem.exact_at(x)
 
 
 def _check_types(volume: object, problem: object) -> None:

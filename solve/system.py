@@ -3,8 +3,8 @@
 import logging
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .diagnostics import ConvergenceError, judge, solve_notices
-from .discretization.boundary import FaceRule, boundary_coefficients, face_rule
+from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_estimate, error_norms, missing_mean
 from .discretization.operator import Assembled, FormOperator, Operator, assemble, free_window
 from .discretization.planes import is_rough
@@ -32,6 +32,7 @@ from .threads import one_blas_thread
 
 DEVICES = ("cpu", "cuda")
 SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
+ALL = slice(None)
 Robin = Mapping[str, tuple[FaceRule, Array]]
 
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
@@ -73,6 +74,7 @@ class System:
 
     A vector (N,) holds the free coefficients in C order of (c, m_u, m_v, m_w): components, and functions a direction,
     those that Dirichlet data fix left out; `operator`, `mass` and `preconditioner` are SciPy LinearOperators (N, N).
+    Where processes share the space, arrays hold a process's rows and vectors its own ones; all call each method.
 
     Examples
     --------
@@ -104,7 +106,7 @@ class System:
     @cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
-        window = self.assembled.operator.window
+        window = self.assembled.operator.free
         single = assemble(self.volume, self.space, MassForm(), window=window, threads=self.threads).operator
         return self._linear(lambda free: np.stack([single.apply_free(component) for component in free]))
 
@@ -120,9 +122,18 @@ class System:
 
     def field(self, x: Array) -> SplineField:
         """Return the spline of the free coefficients x (N,) and of those that are fixed."""
+        return self._spline(self._whole(self._filled(np.reshape(x, self.right.shape))))
+
+    def _filled(self, free: Array) -> Array:
+        """Return the coefficients (c, n_u, n_v, n_w), those that are fixed included."""
         full = self.known.copy()
-        full[self.window] = np.reshape(x, self.right.shape)
-        return self._spline(full)
+        full[self.window] = free
+        self.space.fill(full)
+        return full
+
+    def _whole(self, full: Array) -> Array:
+        """Return the coefficients of all processes."""
+        return self.space.gather(full[:, *self.space.own((slice(0, self.space.whole.shape[0]), ALL, ALL))])
 
     def vector(self, field: SplineField) -> Array:
         """Return the free coefficients (N,) of a field of this space, or of one that it contains.
@@ -134,7 +145,7 @@ class System:
 
     def _spline(self, full: Array) -> SplineField:
         coefficients = full[0] if len(full) == 1 else np.moveaxis(full, 0, -1)
-        return SplineField(self.space.degrees, self.space.knots, coefficients, self.volume)
+        return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
 
     @property
     def window(self) -> tuple[slice, ...]:
@@ -143,9 +154,7 @@ class System:
 
     def multiply(self, free: Array) -> Array:
         """Return A times the free coefficients (c, m_u, m_v, m_w)."""
-        full = np.zeros(self.known.shape)
-        full[self.window] = free
-        return np.ascontiguousarray(_product(self.assembled, self.robin, full)[self.window])
+        return self.assembled.operator.restricted(partial(_product, self.assembled, self.robin), free)
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
@@ -169,7 +178,7 @@ class System:
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
-        for notice in solution.report.notices:
+        for notice in solution.report.notices if self.space.rank == 0 else ():
             log.warning("%s", notice)
         if options.strict and not solution.report.converged:
             raise ConvergenceError(solution)
@@ -177,10 +186,12 @@ class System:
 
     def _solve(self, options: SolverOptions) -> Solution:
         volume, problem, space = self.volume, self.problem, self.space
-        clock = [time.process_time()]
+        dofs = len(self.known) * space.dofs
+        clock, sent = [time.process_time()], space.traffic()
         result = self.iterate(options)
-        full = self.known.copy()
-        full[self.window] = result.x
+        steps = result.iterations + (options.start is not None)  # products made
+        traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in space.traffic().items() if steps}
+        full = self._filled(result.x)
         if self.blocks[0].singular:
             full += missing_mean(volume, space, full[0], problem)
         clock.append(time.process_time())
@@ -190,11 +201,11 @@ class System:
         if options.estimate or (options.estimate is None and problem.exact is None):
             estimate = error_estimate(volume, space, full, problem)
         clock.append(time.process_time())
-        doubtful, meaningful = judge(volume, problem, errors, estimate, full.size)
+        doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
         failed = solve_notices(volume, space, self.assembled, options.certified, result)
         report = SolveReport(
             elements=space.elements,
-            dofs=full.size,
+            dofs=dofs,
             h=longest_edge(volume, space),
             iterations=result.iterations,
             converged=result.converged,
@@ -205,9 +216,10 @@ class System:
             notices=(*doubtful, *failed),
             meaningful=meaningful,
             residuals=result.residuals,
+            traffic=traffic,
         )
-        spline = self._spline(full)
-        return Solution(space.degrees, space.knots, spline.coefficients, volume, report=report, problem=self.problem)
+        field = self._spline(self._whole(full))
+        return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
 
     def iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
@@ -218,8 +230,22 @@ class System:
 
             assert isinstance(self.assembled.operator, Operator)
             return solve_on_device(self.assembled.operator, self.blocks[0], self.right, *limits, options.device, guess)
-        iterate = conjugate_gradients if self.problem.form.symmetric else generalized_residuals
-        return iterate(self.multiply, self.right, self.precondition, *limits, guess)
+        system = self.multiply, self.right, self.precondition
+        if self.problem.form.symmetric:
+            return conjugate_gradients(*system, *limits, guess, self.space.total)
+        return self._on_whole_vectors(*limits, guess)
+
+    def _on_whole_vectors(self, tolerance: float, max_iterations: int, guess: Array | None) -> LinearResult:
+        """Return what GMRES finds: its vectors are whole on every process, products and preconditioner are shared."""
+        gather, own = self.space.gather, (slice(None), self.space.place)
+
+        def on_whole(apply: Callable[[Array], Array]) -> Callable[[Array], Array]:
+            return lambda x: gather(apply(x[own]))
+
+        start = None if guess is None else gather(guess)
+        multiply, precondition = on_whole(self.multiply), on_whole(self.precondition)
+        found = generalized_residuals(multiply, gather(self.right), precondition, tolerance, max_iterations, start)
+        return replace(found, x=found.x[own])
 
 
 def build(
@@ -233,26 +259,32 @@ def build(
     start = time.process_time()
     with one_blas_thread():
         assembled, robin, known = assemble_data(volume, problem, space, threads, quadrature)
-        operator = assembled.operator
+        operator, others = assembled.operator, {*problem.dirichlet, *problem.natural}
         extra = np.zeros(space.shape)
         for face, weights in robin.values():
             face.add_mass_diagonal(weights, extra)
         blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
-        means = {name: float(weights.sum()) for name, (_, weights) in robin.items()}
+        means = {
+            name: float(space.total(robin[name][1].sum() if name in robin else 0.0))
+            for name in FACE_NAMES
+            if name not in others
+        }
         inverses = tuple(fast_diagonalization(block, means, extra) for block in blocks)
         if isinstance(operator, FormOperator) and inverses[0].singular:
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
                 "solution open: give one face to boundary or robin"
             )
-        right = np.ascontiguousarray((assembled.load - _product(assembled, robin, known))[:, *operator.window])
-        right = balanced(right) if inverses[0].singular else right
+        load = assembled.load - _product(assembled, robin, known)
+        space.add(load)
+        right = np.ascontiguousarray(load[:, *operator.window])
+        right = balanced(right, space) if inverses[0].singular else right
         setup = time.process_time() - start
     return System(volume, problem, space, assembled, robin, known, inverses, right, threads, setup)
 
 
 def _product(assembled: Assembled, robin: Robin, coefficients: Array) -> Array:
-    """Return operator and Robin's terms times coefficients (c, n_u, n_v, n_w)."""
+    """Return operator and Robin's terms times coefficients (c, n_u, n_v, n_w), as far as this process integrates."""
     result = assembled.operator.apply(coefficients)
     for face, weights in robin.values():
         for component, total in zip(coefficients, result, strict=True):
@@ -272,43 +304,44 @@ def assemble_data(
     if isinstance(problem, Problem):
         samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
         couples = check_law(form, Points.of(samples, (SAMPLES, SAMPLES, SAMPLES)))
-    rough = quadrature == "spline" and is_rough(volume, space, form.tensor)
+    rough = quadrature == "spline" and is_rough(volume, space.whole, form.tensor)
     assembled = assemble(
         volume,
         space,
         form,
         problem.source_at,
         operator_rule(space, quadrature, rough),
-        window=free_window(space, problem.dirichlet),
+        window=free_window(space.whole, problem.dirichlet),
         component=0 if form.components == 1 and form.symmetric and not couples else None,
         threads=threads,
     )
     robin = {}
-    for name in FACE_NAMES:
-        if name in problem.dirichlet:
-            continue
-        face = face_rule(volume, space, name)
-        if name in problem.natural:
-            data = problem.flux_at(name, face.points, face.normal)
-        else:
-            alpha, data = problem.robin_at(name, face.points, face.normal)
-            robin[name] = (face, alpha * face.measure)
-        for density, total in zip(data, assembled.load, strict=True):
-            total[face.layer] += face.integrate(density * face.measure)
-    known = boundary_coefficients(volume, space, problem.boundary_at, problem.dirichlet, form.components)
-    return assembled, robin, known
+    with space.agreed():
+        for name in FACE_NAMES:
+            if name in problem.dirichlet or not has_face(space, name):
+                continue
+            face = face_rule(volume, space, name)
+            if name in problem.natural:
+                data = problem.flux_at(name, face.points, face.normal)
+            else:
+                alpha, data = problem.robin_at(name, face.points, face.normal)
+                robin[name] = (face, alpha * face.measure)
+            for density, total in zip(data, assembled.load, strict=True):
+                total[face.layer] += face.integrate(density * face.measure)
+    known = boundary_coefficients(volume, space.whole, problem.boundary_at, problem.dirichlet, form.components)
+    return assembled, robin, known[:, space.rows].copy()
 
 
-def balanced(load: Array) -> Array:
-    """Return the load (1, n_u, n_v, n_w) less its mean: of problems that leave the solution's constant open.
+def balanced(load: Array, space: TrialSpace) -> Array:
+    """Return the free coefficients' load (1, ...) less its mean: of problems that leave the solution's constant open.
 
     The basis functions sum to one, so the load is then orthogonal to constants.
     Raises ValueError where the load's sum, the integral of source and fluxes, is not nearly zero.
     """
-    total, size = float(load.sum()), float(np.abs(load).sum())
+    total, size = float(space.total(load.sum())), float(space.total(np.abs(load).sum()))
     if abs(total) > LARGEST_IMBALANCE * size:
         raise ValueError(
             f"incompatible Neumann data: source plus flux integrate to {total:.4g}, must be 0 where no Dirichlet face, "
             "no Robin face and no reaction fixes the solution"
         )
-    return load - load.mean()
+    return load - total / space.dofs

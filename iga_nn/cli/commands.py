@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from pathlib import Path
@@ -55,6 +56,9 @@ Volume = Annotated[
 ]
 ObjFile = Annotated[Path | None, Parameter(help="file to write; NAME.obj in the current folder by default.")]
 Overwrite = Annotated[bool, Parameter(help="replace that file where it has other content.")]
+Mpi = Annotated[
+    bool, Parameter(help="share the solve among the processes of `mpiexec -n 4 iga-nn solve ...`; docs/mpi.md.")
+]
 Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.")]
 
 
@@ -169,6 +173,7 @@ def solve_poisson(
     /,
     *,
     device: Literal["cpu", "cuda"] = "cpu",
+    mpi: Mpi = False,
     output: OutputFlags = OUTPUT,
     poisson: PoissonFlags = POISSON,
 ) -> int:
@@ -180,28 +185,29 @@ def solve_poisson(
     Args:
         device: where the linear system is solved.
     """
-    return _solve(volume, output, poisson, device)
+    return _solve(volume, output, poisson, mpi, device)
 
 
 @solve_app.command(name="elasticity")
 def solve_elasticity(
-    volume: Volume, /, *, output: OutputFlags = OUTPUT, elasticity: ElasticityFlags = ELASTICITY
+    volume: Volume, /, *, mpi: Mpi = False, output: OutputFlags = OUTPUT, elasticity: ElasticityFlags = ELASTICITY
 ) -> int:
     """Solve linear elasticity on a volume.npz.
 
     A vector is three formulas separated by semicolons, in quotes: "x*y;0;sin(z)". The volume's six faces u0, u1, v0,
     v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under --traction.
     """
-    return _solve(volume, output, elasticity)
+    return _solve(volume, output, elasticity, mpi)
 
 
-def _solve(volume: Path, output: OutputOptions, problem: ProblemOptions, device: str = "cpu") -> int:
+def _solve(volume: Path, output: OutputOptions, problem: ProblemOptions, mpi: bool, device: str = "cpu") -> int:
     """Solve a problem on a volume, print the verdict and return the exit code."""
-    from ..workflow import pipeline
+    from ..workflow import pipeline, processes
 
     with shown_progress(output.quiet):
-        outcome = pipeline.solve_to(volume, problem=problem, device=device, **output.folder)
-    return _finish(outcome, output)
+        comm = processes.all_processes() if mpi else None
+        outcome = pipeline.solve_to(volume, problem=problem, device=device, comm=comm, **output.folder)
+    return DONE if outcome is None else _finish(outcome, output)
 
 
 @study_app.default
@@ -330,7 +336,8 @@ def serve_page(
 def main(argv: list[str]) -> int:
     """Run one command and return its exit code; only an internal error shows a traceback."""
     try:
-        code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
+        with _processes(argv):
+            code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
     except KeyboardInterrupt as error:  # its message says how to continue, where that is possible
         print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
@@ -339,6 +346,15 @@ def main(argv: list[str]) -> int:
         print(f"iga-nn: {one_line(error)}{hint}", file=sys.stderr)
         return BAD_INPUT
     return code if isinstance(code, int) else DONE  # a command that only writes a file returns nothing
+
+
+def _processes(argv: list[str]) -> AbstractContextManager[None]:
+    """Return the context in which the processes of an MPI job fail together, and one of them prints."""
+    if "--mpi" not in argv:
+        return nullcontext()
+    from ..workflow import processes
+
+    return processes.together(processes.all_processes())
 
 
 def _minus_hint(argv: list[str]) -> str:

@@ -156,11 +156,20 @@ def _fastest(work: Callable[[], object], clock: Clock) -> float:
     return max(min(seconds[1:]), 1e-6)
 
 
-def available_memory_mb() -> float | None:
-    """Return the megabytes of memory that a process can still take, None where the system does not say."""
+def available_memory_mb(processes: int = 1) -> float | None:
+    """Return the megabytes of memory that each of some processes can still take, None where the system does not say.
+
+    That is what the machine has free, and what the limit on this process's address space (`ulimit -v`) leaves.
+    """
     try:
         lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
+        pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[0])
     except OSError:
         return None
-    found = (line.split() for line in lines if line.startswith("MemAvailable:"))
-    return next((int(words[1]) / 1000.0 for words in found), None)
+    import resource  # where there is /proc there is this module
+
+    found = [int(line.split()[1]) / 1000.0 / processes for line in lines if line.startswith("MemAvailable:")]
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY:
+        found.append(max(0.0, (limit - pages * resource.getpagesize()) / 1e6))
+    return min(found, default=None)

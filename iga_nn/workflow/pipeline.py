@@ -6,14 +6,17 @@ Every file is written as soon as its content is known, so that a late failure lo
 from __future__ import annotations
 
 import logging
+from collections import deque
+from contextlib import ExitStack, nullcontext
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from parameterize.files import save_text
 from parameterize.spline.volume import BSplineVolume
+from solve.discretization.slab import agreed
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
@@ -21,9 +24,10 @@ from ..options import PROBLEMS, Equation, MapOptions, PoissonOptions, ProblemOpt
 from ..report import document as reports
 from ..report import html, tables
 from .mapping import map_surface
+from .memory import tell_memory
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
 from .repeat import command_line, gives_the_same
-from .solving import described, notices_of, reported, scene_of, solve_levels, verdict_of
+from .solving import described, each_level, notices_of, reported, scene_of, solve_levels, verdict_of
 from .verdict import write_certificate
 
 if TYPE_CHECKING:
@@ -153,28 +157,43 @@ def solve_to(
     force: bool = False,
     vector: bool = False,
     device: str = "cpu",
-) -> Outcome:
+    comm: Any = None,
+) -> Outcome | None:
     """Solve a problem on a saved volume and return the output folder with its report. On the CPU it needs no torch.
 
-    device: where Poisson's linear system is solved, "cpu" or "cuda". Takes the other options of `run`, and raises as
-    it does.
+    device: where Poisson's linear system is solved, "cpu" or "cuda". comm: a communicator of mpi4py whose processes all
+    call this and share the solve; the first one writes, the others get None. Takes the other options of `run`, and
+    raises as it does.
     """
     from solve import check_device, check_problem
 
     options, path = problem or PoissonOptions(), Path(volume)
+    if comm is not None and device != "cpu":
+        raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
     equation = options.problem()
     loaded = load_volume(path)
-    check_size(loaded, max(options.refine), options.degree, equation.form.components)
+    processes = 1 if comm is None else comm.size
+    if comm is not None and processes == 1:
+        log.warning("--mpi in a single process: `mpiexec -n 4 iga-nn solve ... --mpi` takes four")
+    check_size(loaded, max(options.refine), options.degree, equation.form.components, processes)
     with input_errors():
-        check_problem(loaded, equation)
+        check_problem(loaded, equation, comm)
         check_device(device, equation)
+    tell_memory(loaded, equation, options, comm)
     elsewhere = {"device": device} if device != "cpu" else {}
-    with open_folder(path, out, force, vector=vector) as state:
-        state.begin("solution")
-        write_certificate(
-            state, path, loaded, command_line(f"solve {options.section}", path, options, **elsewhere, out=out)
-        )
-        solution = solve_levels(state, loaded, equation, options, **elsewhere)
+    how = elsewhere | ({"mpi": True} if comm is not None else {})
+    command = command_line(f"solve {options.section}", path, options, **how, out=out)
+    with ExitStack() as stack:
+        with agreed(comm) if comm is not None else nullcontext():  # no process waits for one whose folder is refused
+            state = None
+            if comm is None or comm.rank == 0:
+                state = stack.enter_context(open_folder(path, out, force, vector=vector))
+                state.begin("solution")
+                write_certificate(state, path, loaded, command)
+        if state is None:
+            deque(each_level(loaded, equation, options, comm=comm), maxlen=0)
+            return None
+        solution = solve_levels(state, loaded, equation, options, comm=comm, **elsewhere)
         return _finish(state, loaded, solution, equation)
 
 

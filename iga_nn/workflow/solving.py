@@ -28,23 +28,17 @@ log = logging.getLogger(__name__)
 def solve_levels(
     state: RunFolder, volume: BSplineVolume, equation: Equation, options: ProblemOptions, **solver: Any
 ) -> Solution:
-    """Solve level after level, each from the one before, write the report of all, and return the finest solution.
+    """Solve level after level, write the report of all, and return the finest solution.
 
     solution.npz holds the finest so far. solver: keywords of `solve.solve_problem`.
     """
-    from solve import rates, solve_problem
+    from solve import rates
 
     solutions: list[Solution] = []
-    solver |= options.solver() | {"certified": verdict_of(state)}
     with reported(state, volume), state.timed("solve"):
-        for level in sorted(options.refine):
-            with input_errors():
-                solution = solve_problem(volume, equation, refine=level, **solver)
-            log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
+        for solution in each_level(volume, equation, options, certified=verdict_of(state), **solver):
             solution.save(state.folder / "solution.npz")
             solutions.append(solution)
-            if equation.form.components == 1:
-                solver["start"] = solution
     found = [solution.report for solution in solutions]
     asked = {name: given for name, given in asdict(options).items() if name not in ("refine", "degree")}
     known = asked | described(equation, volume)
@@ -58,6 +52,27 @@ def solve_levels(
     if len(equation.dirichlet) < 6:  # the user names faces: show which is which
         state.draw("solution", named_volume=volume)
     return solutions[-1]
+
+
+def each_level(volume: BSplineVolume, equation: Equation, options: ProblemOptions, **solver: Any) -> Iterator[Solution]:
+    """Solve level after level, each from the one before, and yield the solutions.
+
+    solver: keywords of `solve.solve_problem`. Processes of an MPI job do this together.
+    """
+    from solve import solve_problem
+
+    solver |= options.solver()
+    for level in sorted(options.refine):
+        try:
+            with input_errors():
+                solution = solve_problem(volume, equation, refine=level, **solver)
+        except MemoryError:
+            remedy = "free some, lower --refine, or share the solve: mpiexec -n 4 iga-nn solve ... --mpi"
+            raise InputError(f"refine {level}: the memory does not suffice; {remedy}") from None
+        log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
+        yield solution
+        if equation.form.components == 1:
+            solver["start"] = solution
 
 
 @contextmanager

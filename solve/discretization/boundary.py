@@ -95,6 +95,12 @@ class FaceRule:
         diagonal[self.layer] += b.T @ weights @ c
 
 
+def has_face(space: TrialSpace, name: str) -> bool:
+    """Return whether this process integrates over a part of a face, one of FACE_NAMES."""
+    u = space.breaks[0]
+    return len(u) > 1 and (name[0] != "u" or u[-int(name[1])] == float(name[1]))
+
+
 def face_rule(volume: BSplineVolume, space: TrialSpace, name: str) -> FaceRule:
     """Return the rule of a face, one of FACE_NAMES."""
     axis, side = divmod(FACE_NAMES.index(name), 2)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
-from parameterize.spline.bspline import apply_along, breakpoints, collocation
+from parameterize.spline.bspline import apply_along, collocation
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
@@ -20,6 +20,7 @@ from .quadrature import GaussRule, gauss_rule
 from .space import TrialSpace
 
 PLANES = 16  # of points of u, in a piece of work
+POINTS = 2**16  # of a plane that are evaluated at once: they take dozens of arrays
 
 
 @dataclass(frozen=True)
@@ -48,13 +49,17 @@ def error_norms(
     exact: takes points (3, ...) and returns u (c, ...) and grad u (c, 3, ...), or None in the gradient's place.
     There are degree + 2 Gauss points a span and direction.
     """
-    rule = gauss_rule(space, [p + 2 for p in space.degrees])
-    tables, splines = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients)
+    whole, splines = gauss_rule(space, [p + 2 for p in space.degrees]), np.ascontiguousarray(coefficients)
+    strips = [(rule, rule.tabulate(space.degrees, space.knots)) for rule in whole.strips(POINTS)]
     # of (u - u_h)^2, u^2, |grad u - grad u_h|^2, |grad u|^2, plane by plane: the same for any number of threads
-    sums = np.zeros((rule.shape[0], 4))
+    sums = np.zeros((whole.shape[0], 4))
     has_gradient = []
 
     def integrate(points: range) -> None:
+        for strip in strips:
+            add(points, *strip)
+
+    def add(points: range, rule: GaussRule, tables: kernels.Tables) -> None:
         fields = np.empty((len(splines), 4, *rule.plane_shape))
         slopes = np.empty((len(splines), 3, *rule.plane_shape))
         for q, rows, measure, x in geometry_planes(volume, rule, points):
@@ -63,16 +68,17 @@ def error_norms(
             for spline, field in zip(splines, fields, strict=True):
                 kernels.evaluate_plane(spline, q, tables, field)
             fields[:, 0] *= scale
-            sums[q, :2] = kernels.squares(values[:, None], scale, fields[:, :1])
+            sums[q, :2] += kernels.squares(values[:, None], scale, fields[:, :1])
             has_gradient.append(gradients is not None)
             if gradients is not None:
                 kernels.turn(rows, fields[:, 1:], slopes, False)
-                sums[q, 2:] = kernels.squares(gradients, scale, slopes)
+                sums[q, 2:] += kernels.squares(gradients, scale, slopes)
 
-    planes = range(rule.shape[0])
-    in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
-    l2, norm, seminorm, slope = np.sqrt(sums.sum(axis=0)).tolist()
-    if not all(has_gradient):
+    planes = range(whole.shape[0])
+    with space.agreed():
+        in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
+    l2, norm, seminorm, slope = np.sqrt(space.total(sums.sum(axis=0))).tolist()
+    if not all(space.shared(all(has_gradient))):
         return Errors(l2, _ratio(l2, norm))
     return Errors(l2, _ratio(l2, norm), seminorm, _ratio(seminorm, slope))
 
@@ -87,12 +93,13 @@ def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, 
     tables, spline = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients)
     plane = np.empty((4, *rule.plane_shape))
     lack = size = 0.0
-    for q, _, measure, x in geometry_planes(volume, rule):
-        kernels.evaluate_plane(spline, q, tables, plane)
-        wanted = 0.0 if problem.exact is None else problem.exact_at(x)[0][0]
-        lack += float(((wanted - plane[0]) * np.abs(measure)).sum())
-        size += float(np.abs(measure).sum())
-    return lack / size
+    with space.agreed():
+        for q, _, measure, x in geometry_planes(volume, rule):
+            kernels.evaluate_plane(spline, q, tables, plane)
+            wanted = 0.0 if problem.exact is None else problem.exact_at(x)[0][0]
+            lack += float(((wanted - plane[0]) * np.abs(measure)).sum())
+            size += float(np.abs(measure).sum())
+    return float(space.total(lack) / space.total(size))
 
 
 def error_estimate(
@@ -107,11 +114,11 @@ def error_estimate(
         return None
     rule, counts = gauss_rule(space), space.gauss_points
     bases = [_bases(space.degrees, space.knots, rule), _bases(volume.degrees, volume.knots, rule)]
-    sizes = [np.repeat(np.diff(breakpoints(k)), count) for k, count in zip(space.knots, counts, strict=True)]
+    sizes = [np.repeat(np.diff(breaks), count) for breaks, count in zip(space.breaks, counts, strict=True)]
     w_u, w_v, w_w = rule.weights
     sums = np.zeros(2)
-    for start in range(0, rule.shape[0], counts[0]):  # layer by layer of elements in u
-        layer = slice(start, start + counts[0])
+
+    def integrate(layer: slice) -> None:
         points = (rule.points[0][layer], *rule.points[1:])
         spacing = (sizes[0][layer, None, None], sizes[1][:, None], sizes[2])
         solution = _derivatives(bases[0], coefficients, layer)
@@ -119,7 +126,11 @@ def error_estimate(
         error, det = _local_error(geometry, solution, problem, spacing, Points.of(geometry[0, 0, 0], points))
         for place, field in enumerate((error, solution[0, 0, 0])):
             sums[place] += np.einsum("ijk,i,j,k", np.abs(det) * (field**2).sum(axis=0), w_u[layer], w_v, w_w)
-    l2, norm = np.sqrt(sums).tolist()
+
+    with space.agreed():
+        for start in range(0, rule.shape[0], counts[0]):  # layer by layer of elements in u
+            integrate(slice(start, start + counts[0]))
+    l2, norm = np.sqrt(space.total(sums)).tolist()
     return Errors(l2, _ratio(l2, norm))
 
 

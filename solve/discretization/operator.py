@@ -4,6 +4,7 @@ Of a scalar symmetric law G = det J J^-1 kappa J^-T is kept, six numbers a quadr
 planes of points: gradients are pulled back, the law turns them into fluxes, and these are pushed forward.
 """
 
+import math
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,9 +24,7 @@ from ..threads import colours
 from . import kernels
 from .planes import geometry_planes
 from .quadrature import GaussRule, operator_rule
-from .space import TrialSpace
-
-Window = tuple[slice, slice, slice]
+from .space import TrialSpace, Window
 
 
 def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> Window:
@@ -43,13 +42,18 @@ def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> W
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    window: the free coefficients of each component. threads: of a product.
+    free: the free coefficients of each component, in the whole space. threads: of a product.
     """
 
     space: TrialSpace
     rule: GaussRule
-    window: Window
+    free: Window
     threads: int
+
+    @property
+    def window(self) -> Window:
+        """The free coefficients of each component that are this process's own."""
+        return self.space.own(self.free)
 
     @cached_property
     def tables(self) -> kernels.Tables:
@@ -62,17 +66,24 @@ class MatrixFree:
             in_parallel(task, pieces, self.threads)
 
     def apply(self, coefficients: Array) -> Array:
-        """Return the product with coefficients, those that are not free included."""
-        source = np.ascontiguousarray(coefficients).reshape(-1, *self.space.shape)
+        """Return the product with coefficients, those that are not free included; of a slab, the integrals over it."""
+        source = np.ascontiguousarray(coefficients).reshape(math.prod(coefficients.shape[:-3]), *self.space.shape)
         result = np.zeros_like(source)
         self.on_planes(lambda points: self._multiply(points, source, result))
         return result.reshape(coefficients.shape)
 
     def apply_free(self, free: Array) -> Array:
         """Return the product restricted to the free coefficients, (c, ...) or (...) of the window's shape."""
+        return self.restricted(self.apply, free)
+
+    def restricted(self, product: Callable[[Array], Array], free: Array) -> Array:
+        """Return a product with coefficients (.., n_u, n_v, n_w) restricted to the free ones, this process's own."""
         full = np.zeros((*free.shape[:-3], *self.space.shape))
         full[..., *self.window] = free
-        return np.ascontiguousarray(self.apply(full)[..., *self.window])
+        self.space.fill(full)
+        result = product(full)
+        self.space.add(result)
+        return np.ascontiguousarray(result[..., *self.window])
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
         """Add the part of some points of u to the product with coefficients (c, n_u, n_v, n_w)."""
@@ -92,7 +103,10 @@ class Operator(MatrixFree):
         kernels.multiply_planes(coefficients[0], points, self.tables, self.factors, result[0])
 
     def diagonal(self) -> Array:
-        """Return the diagonal of the matrix, shape `space.shape`: squared basis functions in place of the basis."""
+        """Return the diagonal of the matrix, shape `space.shape`: squared basis functions in place of the basis.
+
+        Of a slab it is that of the integrals over it.
+        """
         result = np.zeros(self.space.shape)
         products = [  # per direction, (3, q, degree + 1): values of B B, B B' and B' B' at index sum of derivatives
             (first, np.stack([b[0] ** 2, b[0] * b[1], b[1] ** 2]), functions) for first, b, functions in self.tables
@@ -115,7 +129,7 @@ class Operator(MatrixFree):
 
     def mean_mass(self) -> float:
         """Return the average over the cube of c |det J|."""
-        return float(sum(plane[6:].sum() for plane in self.factors))
+        return float(self.space.total(sum(plane[6:].sum() for plane in self.factors)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +170,17 @@ class FormOperator(MatrixFree):
     def block(self, component: int) -> Operator:
         """Return the symmetric part of a component's diagonal block: the law of its own gradient and value."""
         law, rule = (self.volume, self.space, self.form), self.rule
-        block = assemble(*law, rule=rule, window=self.window, component=component, threads=self.threads).operator
+        block = assemble(*law, rule=rule, window=self.free, component=component, threads=self.threads).operator
         assert isinstance(block, Operator)
         return block
 
 
 @dataclass(frozen=True, eq=False)
 class Assembled:
-    """Operator, load (c, n_u, n_v, n_w), and how many of the quadrature points have det J < 0."""
+    """Operator, load (c, n_u, n_v, n_w), and how many of the quadrature points have det J < 0.
+
+    Of a slab the load is that of the integrals over it; the numbers of points are those of all processes.
+    """
 
     operator: Operator | FormOperator
     load: Array
@@ -185,7 +202,8 @@ def assemble(
     """Return operator and load of a law on a volume.
 
     source: takes the points (3, q_w, q_v) of a plane and returns (c, q_w, q_v); None for zero.
-    window: the free coefficients, as `free_window` gives them (default: all but those of the six faces).
+    window: the free coefficients of the whole space, as `free_window` gives them (default: all but those of the six
+        faces).
     component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
     threads: of this pass and of the operator; the functions must then be safe to call from several at a time.
 
@@ -193,16 +211,12 @@ def assemble(
     trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
     Raises ValueError where det J is zero at a point, naming it.
     """
-    rule, window = rule or operator_rule(space), window or free_window(space)
+    rule, window = rule or operator_rule(space), window or free_window(space.whole)
     parts = space, rule, window, threads
     basis, part = MatrixFree(*parts), component or 0
-    factors = kept = None
-    if component is not None:
-        factors = np.empty((rule.shape[0], 6 + form.has_reaction, *rule.plane_shape))
-    elif form.constant:
-        kept = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
     load = np.zeros((form.components, *space.shape))
     folded = []
+    factors = kept = None
 
     def fill(points: IntArray) -> None:
         for q, rows, measure, x in geometry_planes(volume, rule, points):
@@ -218,9 +232,14 @@ def assemble(
                 for density, total in zip(source(x), load, strict=True):
                     add_integrals(basis.tables, q, density * size, total)
 
-    basis.on_planes(fill)
+    with space.agreed():
+        if component is not None:
+            factors = np.empty((rule.shape[0], 6 + form.has_reaction, *rule.plane_shape))
+        elif form.constant:
+            kept = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
+        basis.on_planes(fill)
     operator = FormOperator(*parts, volume, form, kept) if factors is None else Operator(*parts, factors)
-    return Assembled(operator, load, sum(folded), int(np.prod(rule.shape)))
+    return Assembled(operator, load, space.total(sum(folded)), space.total(int(np.prod(rule.shape))))
 
 
 def add_integrals(

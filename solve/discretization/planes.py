@@ -26,11 +26,16 @@ def map_planes(
     The map is (3, 4, q_w, q_v): components x value and gradient. points: the q wanted, default all. The arrays are
     reused from one step to the next.
     """
-    tables = rule.tabulate(volume.degrees, volume.knots)
-    components = np.ascontiguousarray(np.moveaxis(volume.control_points, -1, 0))
+    (first, basis, functions), table_v, table_w = rule.tabulate(volume.degrees, volume.knots)
+    tables = (np.zeros_like(first), basis, functions), table_v, table_w
+    row, components = -1, np.empty((3, 0, 0, 0))
     fields = np.empty((3, 4, *rule.plane_shape))
     u, v, w = rule.points
     for q in range(rule.shape[0]) if points is None else points:
+        if first[q] != row:  # the rows of control points that are not zero on a span: all at once would be a second map
+            row = int(first[q])
+            rows = volume.control_points[row : row + len(functions)]
+            components = np.ascontiguousarray(np.moveaxis(rows, -1, 0))  # (3, p + 1, n_v, n_w)
         for component, out in zip(components, fields, strict=True):
             kernels.evaluate_plane(component, q, tables, out)
         yield q, fields, Points.of(fields[:, 0], (u[q : q + 1], v, w), (2, 1))

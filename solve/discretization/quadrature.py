@@ -53,6 +53,13 @@ class GaussRule:
         w_u, w_v, w_w = self.weights
         return w_u[q] * (w_w[:, None] * w_v)
 
+    def strips(self, most: int) -> list["GaussRule"]:
+        """Return rules of consecutive points of w that make up this one, with at most so many points in a plane."""
+        (u, v, w), (weights_u, weights_v, weights_w) = self.points, self.weights
+        step = max(1, most // len(v))
+        parts = [slice(start, start + step) for start in range(0, len(w), step)]
+        return [GaussRule((u, v, w[part]), (weights_u, weights_v, weights_w[part])) for part in parts]
+
     def tabulate(self, degrees: tuple[int, int, int], knots: tuple[Array, Array, Array]) -> Tables:
         """Return tables of any spline basis (the trial space's or the map's) at the points of this rule.
 
@@ -68,8 +75,8 @@ class GaussRule:
 
 def gauss_rule(space: TrialSpace, counts: Sequence[int] | None = None) -> GaussRule:
     """Return the Gauss rule on the spans of `space` with `counts` points per span (default: `space.gauss_points`)."""
-    each = zip(space.knots, counts or space.gauss_points, strict=True)
-    return _tensor_rule([gauss_on_spans(knots, count) for knots, count in each])
+    each = zip(space.whole.knots, counts or space.gauss_points, strict=True)
+    return _tensor_rule(space, [gauss_on_spans(knots, count) for knots, count in each])
 
 
 def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = True) -> GaussRule:
@@ -85,8 +92,8 @@ def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = T
         return gauss_rule(space)
     if quadrature == "gauss+1":
         return gauss_rule(space, [degree + 1 for degree in space.degrees])
-    each = zip(space.knots, space.degrees, space.gauss_points, strict=True)
-    return _tensor_rule([_fewest_points(*direction, rough) for direction in each])
+    each = zip(space.whole.knots, space.degrees, space.gauss_points, strict=True)
+    return _tensor_rule(space, [_fewest_points(*direction, rough) for direction in each])
 
 
 def _fewest_points(knots: Array, degree: int, gauss: int, rough: bool) -> tuple[Array, Array]:
@@ -100,9 +107,11 @@ def _fewest_points(knots: Array, degree: int, gauss: int, rough: bool) -> tuple[
     return gauss_on_spans(knots, gauss) if degree == 2 else spline_rule(knots, degree, 2 * degree - 1)
 
 
-def _tensor_rule(rows: Iterable[tuple[Array, Array]]) -> GaussRule:
+def _tensor_rule(space: TrialSpace, rows: Iterable[tuple[Array, Array]]) -> GaussRule:
+    """Return the rule of three rows of points and weights, in u those on this process's spans."""
     (u, v, w), (weights_u, weights_v, weights_w) = zip(*rows, strict=True)
-    return GaussRule((u, v, w), (weights_u, weights_v, weights_w))
+    here = slice(*np.searchsorted(u, space.breaks[0][[0, -1]]))
+    return GaussRule((u[here], v, w), (weights_u[here], weights_v, weights_w))
 
 
 def gauss_on_spans(knots: Array, count: int) -> tuple[Array, Array]:

@@ -1,6 +1,9 @@
 """The trial space: tensor-product splines on a volume's own knots, refined and raised in degree."""
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -8,28 +11,111 @@ from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, breakpoints, insert_knots, insertion_into, midpoints
 from parameterize.spline.volume import BSplineVolume
 
+Window = tuple[slice, slice, slice]
+
 
 @dataclass(frozen=True, eq=False)
 class TrialSpace:
-    """Scalar trivariate splines on the unit cube, of three degrees on three open knot vectors on [0, 1]."""
+    """Scalar trivariate splines on the unit cube, of three degrees on three open knot vectors on [0, 1].
+
+    One process keeps all of it here; where several share it, each has a `slab.Slab`, which says what it keeps and
+    passes on what the others need. A row is all that belongs to one function of u.
+    """
 
     degrees: tuple[int, int, int]
     knots: tuple[Array, Array, Array]
 
     @property
+    def rank(self) -> int:
+        """The number of this process."""
+        return 0
+
+    @property
+    def whole(self) -> "TrialSpace":
+        """The space that all processes share."""
+        return self
+
+    @property
+    def rows(self) -> slice:
+        """The rows of the whole space that this process keeps."""
+        return slice(0, self.shape[0])
+
+    @property
+    def breaks(self) -> tuple[Array, Array, Array]:
+        """The ends of the spans that this process integrates over, a direction each."""
+        u, v, w = map(breakpoints, self.knots)
+        return u, v, w
+
+    @property
+    def place(self) -> slice:
+        """The own rows of this process among all free rows."""
+        return slice(0, None)
+
+    @property
+    def columns(self) -> slice:
+        """Of the free functions of v, those of the columns that this process gets from `to_columns`."""
+        return slice(0, None)
+
+    def own(self, free: Window) -> Window:
+        """Return those of the free coefficients of the whole space that are this process's own, in its arrays."""
+        return free
+
+    def shared(self, value: Any) -> list[Any]:
+        """Return the value of every process, in the order of their ranks."""
+        return [value]
+
+    def total(self, value: Any) -> Any:
+        """Return the sum of the values of all processes, the same on each."""
+        return sum(self.shared(value))
+
+    @contextmanager
+    def agreed(self) -> Iterator[None]:
+        """Raise what the block raises on one process on all of them; they do not meet within it."""
+        yield
+
+    def fill(self, coefficients: Array) -> None:
+        """Complete coefficients (.., n_u, n_v, n_w) by the rows that are other processes' own."""
+
+    def add(self, integrals: Array) -> None:
+        """Complete integrals (.., n_u, n_v, n_w) of own rows by what other processes have of them."""
+
+    def gather(self, own: Array) -> Array:
+        """Return the rows (c, m_u, ..) of all processes, one after another."""
+        return own
+
+    def to_columns(self, x: Array) -> Array:
+        """Return (m_u, columns, m_w), of all free rows, from own free rows (rows, m_v, m_w)."""
+        return x
+
+    def to_rows(self, x: Array) -> Array:
+        """Invert `to_columns`."""
+        return x
+
+    def traffic(self) -> Mapping[str, int]:
+        """Return how many bytes all processes have sent so far, by what for."""
+        return {}
+
+    def receive(self, part: Array, after: bool = False) -> bool:
+        """Overwrite `part` by what the process with the free rows before, or after, sends; False where none is."""
+        return False
+
+    def send(self, part: Array, after: bool = False) -> None:
+        """Send `part` to the process with the free rows before, or after, where there is one."""
+
+    @property
     def shape(self) -> tuple[int, ...]:
-        """Number of basis functions per direction."""
+        """Number of basis functions per direction, of u those of `rows`."""
         return tuple(len(k) - p - 1 for k, p in zip(self.knots, self.degrees, strict=True))
 
     @property
     def dofs(self) -> int:
         """Number of basis functions, those fixed by the boundary data included."""
-        return int(np.prod(self.shape))
+        return int(np.prod(self.whole.shape))
 
     @property
     def elements(self) -> int:
         """Number of non-empty knot spans."""
-        return int(np.prod([len(breakpoints(k)) - 1 for k in self.knots]))
+        return int(np.prod([len(breakpoints(k)) - 1 for k in self.whole.knots]))
 
     @property
     def gauss_points(self) -> tuple[int, ...]:
@@ -42,13 +128,13 @@ class TrialSpace:
         """
         return tuple(
             degree + int(_is_only_continuous(knots, degree) or len(breakpoints(knots)) == 2)
-            for knots, degree in zip(self.knots, self.degrees, strict=True)
+            for knots, degree in zip(self.whole.knots, self.degrees, strict=True)
         )
 
     @property
     def is_only_continuous(self) -> bool:
         """Whether the functions' derivatives jump somewhere inside."""
-        return any(map(_is_only_continuous, self.knots, self.degrees))
+        return any(map(_is_only_continuous, self.whole.knots, self.degrees))
 
 
 def _is_only_continuous(knots: Array, degree: int) -> bool:
@@ -78,13 +164,15 @@ def embedded(
 ) -> Array:
     """Return the coefficients in `space` of a spline given in a smaller space of the same degrees; exact.
 
+    Of a slab they are those of its rows.
     Raises ValueError where the smaller space is not contained in the larger.
     """
     try:
         if degrees != space.degrees:
             raise ValueError("other degrees")
-        for axis, (own, wanted) in enumerate(zip(knots, space.knots, strict=True)):
-            coefficients = apply_along(insertion_into(own, degrees[axis], wanted), coefficients, axis)
+        for axis, (own, wanted) in enumerate(zip(knots, space.whole.knots, strict=True)):
+            rows = space.rows if axis == 0 else slice(None)
+            coefficients = apply_along(insertion_into(own, degrees[axis], wanted)[rows], coefficients, axis)
     except ValueError as error:
         raise ValueError(
             f"start: its space is not contained in the trial space ({error}); refine it by halving, same degree"
@@ -102,6 +190,6 @@ def same_smoothness(knots: Array, old: int, new: int) -> Array:
 
 def longest_edge(volume: BSplineVolume, space: TrialSpace) -> float:
     """h: the longest straight distance between neighbouring corners of the mapped elements, in the volume's units."""
-    u, v, w = (breakpoints(k) for k in space.knots)
-    corners = volume.grid(u, v, w)  # (e_u + 1, e_v + 1, e_w + 1, 3)
-    return max(float(np.linalg.norm(np.diff(corners, axis=a), axis=-1).max()) for a in range(3))
+    corners = volume.grid(*space.breaks)  # (e_u + 1, e_v + 1, e_w + 1, 3)
+    lengths = (np.linalg.norm(np.diff(corners, axis=a), axis=-1).max(initial=0.0) for a in range(3))
+    return max(space.shared(float(max(lengths))))

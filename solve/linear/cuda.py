@@ -94,9 +94,12 @@ def device_preconditioner(preconditioner: FastDiagonalization, device: str) -> F
     """Return fast diagonalization on a device, of tensors."""
     arrays = (*preconditioner.vectors, preconditioner.inverse, preconditioner.scaling)
     u, v, w, inverse, scaling = (torch.as_tensor(part, device=device) for part in arrays)
-    return _OnDevice((u, v, w), inverse, scaling, preconditioner.singular)  # type: ignore[arg-type]
+    return _OnDevice(preconditioner.space, (u, v, w), inverse, scaling, preconditioner.singular)  # type: ignore[arg-type]
 
 
 class _OnDevice(FastDiagonalization):
-    def _transform(self, u: Any, v: Any, w: Any, x: Any) -> Any:
-        return (v @ torch.tensordot(u, x, 1)) @ w.T
+    def _along_u(self, u: Any, x: Any) -> Any:
+        return torch.tensordot(u, x, 1)
+
+    def _across(self, v: Any, w: Any, x: Any) -> Any:
+        return (v @ x) @ w.T

@@ -35,30 +35,36 @@ def conjugate_gradients(
     tolerance: float = 1e-10,
     max_iterations: int = 1000,
     start: Vector | None = None,
+    total: Callable[[float], float] = float,
 ) -> LinearResult:
     """Solve A x = b from x = `start` (default: zero) until |r| <= tolerance |b|.
 
     Saad, *Iterative Methods for Sparse Linear Systems*, 2nd ed., algorithm 9.1.
 
-    b: an array or a tensor of any shape; the operator's answers are overwritten.
+    b: an array or a tensor of any shape; the operator's answers are overwritten. total: the sum of a number over all
+        processes, where each has a part of the vectors.
     Stops without convergence after `max_iterations`, or as soon as a direction shows that A is not positive definite.
     """
-    norm_b = math.sqrt(_dot(b, b))
+
+    def dot(one: Vector, other: Vector) -> float:
+        return total(_dot(one, other))
+
+    norm_b = math.sqrt(dot(b, b))
     x, p, r = 0.0 * b, 0.0 * b, 1.0 * b
     if norm_b == 0.0:
         return LinearResult(x, (0.0,), True)
     if start is not None:
         x += start
         r -= operator(x)
-    residuals = [math.sqrt(_dot(r, r)) / norm_b]
+    residuals = [math.sqrt(dot(r, r)) / norm_b]
     rz_old = 1.0
     while residuals[-1] > tolerance and len(residuals) <= max_iterations:
         z = preconditioner(r)
-        rz = _dot(r, z)
+        rz = dot(r, z)
         p *= rz / rz_old
         p += z
         product = operator(p)
-        curvature = _dot(p, product)
+        curvature = dot(p, product)
         if not (rz > 0.0 and curvature > 0.0):  # NaN included
             break
         step = rz / curvature
@@ -66,7 +72,7 @@ def conjugate_gradients(
         product *= step
         r -= product
         rz_old = rz
-        residuals.append(math.sqrt(_dot(r, r)) / norm_b)
+        residuals.append(math.sqrt(dot(r, r)) / norm_b)
     return LinearResult(x, tuple(residuals), residuals[-1] <= tolerance)
 
 

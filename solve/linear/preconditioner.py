@@ -6,8 +6,10 @@ and Robin's conditions enter.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -17,6 +19,7 @@ from parameterize.spline.volume import FACE_NAMES
 from parameterize.threads import in_parallel
 
 from ..discretization.operator import Operator
+from ..discretization.space import TrialSpace
 from .shear import IncompleteCholesky, helps, incomplete_cholesky
 
 DIAGONAL = (0, 3, 5)  # the places of uu, vv, ww among the six factors
@@ -30,8 +33,10 @@ class FastDiagonalization:
     vectors: per direction (n, n), generalized eigenvectors in columns. inverse, scaling: (n_u, n_v, n_w), the diagonals
     L^-1 and D. singular: constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin face), and
     the preconditioner keeps to their orthogonal complement. local: of a sheared map, what is added (`shear`).
+    Of a slab `inverse` has the columns that `space.to_columns` gives, everything else its own rows.
     """
 
+    space: TrialSpace
     vectors: tuple[Array, Array, Array]
     inverse: Array
     scaling: Array
@@ -42,35 +47,53 @@ class FastDiagonalization:
     def __call__(self, residual: Array) -> Array:
         """Return the preconditioned residual, both (n_u, n_v, n_w) or (1, n_u, n_v, n_w)."""
         u, v, w = self.vectors
-        shape, residual = residual.shape, residual.reshape(self.inverse.shape)
+        shape, residual = residual.shape, residual.reshape(self.scaling.shape)
         if self.singular:
-            residual = residual - residual.mean()
-        spectral = self._transform(u.T, v.T, w.T, self.scaling * residual)
+            residual = residual - self._mean(residual)
+        spectral = self._to_columns(u.T, v.T, w.T, self.scaling * residual)
         spectral *= self.inverse
-        result = self._transform(u, v, w, spectral)
+        result = self._to_rows(u, v, w, spectral)
         result *= self.scaling
         if self.local is not None:
             u, v, w = self.local.inverses
-            result += self._transform(u, v, w, self.local(self._transform(u.T, v.T, w.T, residual.copy())))
+            nodes = self.space.to_rows(self._to_columns(u.T, v.T, w.T, residual.copy()))
+            result += self._to_rows(u, v, w, self.space.to_columns(self.local(nodes)))
         if self.singular:
-            result -= result.mean()
+            result -= self._mean(result)
         return result.reshape(shape)
 
-    def _transform(self, u: Array, v: Array, w: Array, x: Array) -> Array:
-        """Apply three small matrices along the three axes of x, which is overwritten."""
-        columns, along_u = x.reshape(len(x), -1), np.empty_like(x)
-        rows = along_u.reshape(columns.shape)
+    def _mean(self, x: Array) -> Any:
+        """Return the mean over the free coefficients of all processes."""
+        return self.space.total(x.sum()) / len(self.vectors[0]) / math.prod(x.shape[1:])
 
-        def first(start: int) -> None:
+    def _to_columns(self, u: Array, v: Array, w: Array, x: Array) -> Array:
+        """Apply three small matrices along the three axes of own rows x, which are overwritten; return columns."""
+        return self._along_u(u, self.space.to_columns(self._across(v, w, x)))
+
+    def _to_rows(self, u: Array, v: Array, w: Array, x: Array) -> Array:
+        """Apply three small matrices along the three axes of columns x, and return own rows."""
+        return self._across(v, w, self.space.to_rows(self._along_u(u, x)))
+
+    def _along_u(self, u: Array, x: Array) -> Array:
+        """Apply a matrix along the first axis."""
+        columns, result = x.reshape(len(x), -1), np.empty_like(x)
+        rows = result.reshape(columns.shape)
+
+        def multiply(start: int) -> None:
             piece = slice(start, start + COLUMNS)
             np.matmul(u, columns[:, piece], out=rows[:, piece])
 
-        def second(start: int) -> None:
-            for i in range(start, min(start + LAYERS, len(x))):
-                np.matmul(v @ along_u[i], w.T, out=x[i])
+        in_parallel(multiply, range(0, rows.shape[1], COLUMNS), self.threads)
+        return result
 
-        in_parallel(first, range(0, rows.shape[1], COLUMNS), self.threads)
-        in_parallel(second, range(0, len(x), LAYERS), self.threads)
+    def _across(self, v: Array, w: Array, x: Array) -> Array:
+        """Apply two matrices along the other axes of x, which is overwritten."""
+
+        def multiply(start: int) -> None:
+            for i in range(start, min(start + LAYERS, len(x))):
+                np.matmul(v @ x[i], w.T, out=x[i])
+
+        in_parallel(multiply, range(0, len(x), LAYERS), self.threads)
         return x
 
 
@@ -81,20 +104,22 @@ def fast_diagonalization(
 
     robin: of the faces with Robin's condition, the average over the face's parameters of alpha times the surface
     element. extra_diagonal: (n_u, n_v, n_w), the diagonal of what is added to the operator elsewhere (Robin's terms).
+    All processes that share the space call it.
     """
+    space = operator.space
     robin = robin or {}
     slopes, masses, averages = _directional_matrices(operator, robin)
     reaction = operator.mean_mass() / float(np.prod(averages))
     values, vectors = zip(*(eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
-    spectrum = values[0][:, None, None] + values[1][:, None] + values[2] + reaction
+    spectrum = values[0][:, None, None] + values[1][space.columns, None] + values[2] + reaction
     scaling = _scaling(operator, slopes, masses, reaction, extra_diagonal)
-    whole = all(free == slice(0, n) for free, n in zip(operator.window, operator.space.shape, strict=True))
+    whole = all(free == slice(0, n) for free, n in zip(operator.free, space.whole.shape, strict=True))
     singular = whole and reaction == 0.0 and not any(robin.values())
     if singular:
-        spectrum[0, 0, 0] = np.inf
+        spectrum[0, : int(space.columns.start == 0), 0] = np.inf
     u, v, w = vectors
     local = incomplete_cholesky(operator) if not singular and helps(operator) else None
-    return FastDiagonalization((u, v, w), 1.0 / spectrum, scaling, singular, operator.threads, local)
+    return FastDiagonalization(space, (u, v, w), 1.0 / spectrum, scaling, singular, operator.threads, local)
 
 
 def _directional_matrices(
@@ -106,8 +131,9 @@ def _directional_matrices(
     """
     along, across = _separable_coefficients(operator)
     averages = [float(w @ b) for w, b in zip(operator.rule.weights, across, strict=True)]
+    averages[0] = operator.space.total(averages[0])
     slopes, masses = [], []
-    for axis, free in enumerate(operator.window):
+    for axis, free in enumerate(operator.free):
         mass = _gram(operator, axis, operator.rule.weights[axis] * across[axis], 0)
         slope = _gram(operator, axis, operator.rule.weights[axis] * along[axis], 1)
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
@@ -122,11 +148,15 @@ def _scaling(
     operator: Operator, slopes: list[Array], masses: list[Array], reaction: float, extra_diagonal: Array | None
 ) -> Array:
     """Return D, the square root of the diagonal of P over that of the operator, on the free coefficients."""
-    stiff, mass = ([np.diag(matrix) for matrix in matrices] for matrices in (slopes, masses))
+    place = operator.space.place, slice(None), slice(None)
+    stiff, mass = (
+        [np.diag(matrix)[own] for matrix, own in zip(matrices, place, strict=True)] for matrices in (slopes, masses)
+    )
     terms = [(stiff[0], mass[1], mass[2]), (mass[0], stiff[1], mass[2]), (mass[0], mass[1], stiff[2])]
     diagonal = sum(np.einsum("i,j,k->ijk", *term) for term in terms)
     diagonal += reaction * np.einsum("i,j,k->ijk", *mass)
     wanted = operator.diagonal() + (0.0 if extra_diagonal is None else extra_diagonal)
+    operator.space.add(wanted)
     # A folded map has diagonal entries below zero; their size is all a scaling can use.
     scaling: Array = np.sqrt(np.abs(diagonal / wanted[operator.window]))
     return scaling
@@ -151,7 +181,8 @@ def _separable_coefficients(operator: Operator) -> tuple[list[Array], list[Array
         means[0][:, span] = over_w @ lengths[1]
         means[1] += lengths[0][span] * over_w
         means[2] += lengths[0][span] * (logarithm @ lengths[1])
-    overall = means[0] @ lengths[0]
+    total = operator.space.total
+    means, overall = [means[0], total(means[1]), total(means[2])], total(means[0] @ lengths[0])
     along, across = [], []
     for axis, count in enumerate(counts):
         others = np.delete(means[axis] - overall[:, None], axis, axis=0).sum(axis=0)
@@ -164,4 +195,9 @@ def _gram(operator: Operator, axis: int, weights: Array, derivative: int) -> Arr
     """Return the matrix (n, n) of the integrals of products of one direction's functions, or of their derivatives."""
     basis = operator.dense(axis, derivative)
     matrix: Array = basis.T @ (weights[:, None] * basis)
-    return matrix
+    if axis > 0:
+        return matrix
+    space = operator.space
+    whole = np.zeros((space.whole.shape[0],) * 2)
+    whole[space.rows, space.rows] = matrix
+    return np.asarray(space.total(whole))

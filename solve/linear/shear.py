@@ -16,6 +16,7 @@ from parameterize.spline.bspline import collocation, greville
 
 from ..discretization.kernels import compiled
 from ..discretization.operator import Operator
+from ..discretization.space import TrialSpace
 from ..forms.jets import PAIRS
 
 OFFSETS = np.array(list(product((-1, 0, 1), repeat=3)))[:14]  # to the 13 neighbours that come before a node, to itself
@@ -29,17 +30,28 @@ class IncompleteCholesky:
 
     factor: (nodes, 14), L at the nodes of OFFSETS, the inverse of its diagonal last. steps: (14,), what OFFSETS add to
     the number of a node. inverses: per direction (n, n), from values at the free nodes to coefficients.
+    Of a slab the nodes are those of its own rows; processes work one after another, and pass on a row.
     """
 
+    space: TrialSpace
     factor: Array
     steps: IntArray
     inverses: tuple[Array, Array, Array]
 
     def __call__(self, values: Array) -> Array:
         """Return x for values r, arrays of any shape with as many entries as nodes."""
-        reach = -self.steps[0]
+        reach, row = -self.steps[0], -self.steps[4]
         padded = np.pad(values.ravel(), reach)
-        _substitute(self.factor, self.steps, padded)
+        before, last = padded[reach - row : reach], padded[-reach - row : -reach]
+        self.space.receive(before)
+        _forward(self.factor, self.steps, padded)
+        self.space.send(last, after=True)
+        before[:] = 0.0
+        found = np.empty(row)
+        if self.space.receive(found, after=True):
+            last += found
+        _backward(self.factor, self.steps, padded)
+        self.space.send(before)
         return padded[reach:-reach].reshape(values.shape)
 
 
@@ -50,24 +62,39 @@ def helps(operator: Operator) -> bool:
     """
     if max(operator.space.degrees) > HIGHEST:
         return False
-    u, v, w = (np.unique(np.linspace(0, q - 1, SAMPLES).astype(int)) for q in operator.rule.shape)
+    space, (q_u, *across) = operator.space, operator.rule.shape
+    start, count = _place(space, q_u)
+    u, v, w = (np.unique(np.linspace(0, q - 1, SAMPLES).astype(int)) for q in (count, *across))
+    u = u[(u >= start) & (u < start + q_u)] - start
     uu, uv, uw, vv, vw, ww = np.moveaxis(operator.factors[np.ix_(u, np.arange(6), w, v)], 1, 0)
     determinant = uu * (vv * ww - vw**2) - uv * (uv * ww - vw * uw) + uw * (uv * vw - vv * uw)
-    return bool(np.mean(determinant < FLAT * uu * vv * ww) > SHARE)
+    flat = space.total(np.count_nonzero(determinant < FLAT * uu * vv * ww))
+    return bool(flat > SHARE * space.total(determinant.size))
+
+
+def _place(space: TrialSpace, count: int) -> tuple[int, int]:
+    """Return where those of this process begin among what all processes count, and the number of all."""
+    counts = space.shared(count)
+    return sum(counts[: space.rank]), sum(counts)
 
 
 def incomplete_cholesky(operator: Operator) -> IncompleteCholesky:
     """Return the factorization that belongs to an operator's free coefficients."""
-    spaces = list(zip(operator.space.knots, operator.space.degrees, operator.window, strict=True))
+    space = operator.space
+    spaces = list(zip(space.whole.knots, space.degrees, operator.free, strict=True))
     matrices = [collocation(k, p, greville(k, p)).toarray()[free, free] for k, p, free in spaces]
     u, v, w = (np.linalg.inv(matrix) for matrix in matrices)
     factor = _stencils(operator)
     strides = np.array([factor.shape[1] * factor.shape[2], factor.shape[2], 1])
-    factor = factor.reshape(-1, len(OFFSETS))
+    row, factor = strides[0], factor.reshape(-1, len(OFFSETS))
     sums = OFFSETS[:-1, None] + OFFSETS[:-1]  # from a node over one neighbour to the other's neighbour
     places = np.where(np.abs(sums).max(axis=-1) > 1, -1, (sums + 1) @ (9, 3, 1))
-    _factorize(factor, OFFSETS @ strides, places)
-    return IncompleteCholesky(factor, OFFSETS @ strides, (u, v, w))
+    before = np.empty((row, len(OFFSETS)))
+    start = row if space.receive(before) else 0
+    factor = np.concatenate([before, factor]) if start else factor
+    _factorize(factor, start, OFFSETS @ strides, places)
+    space.send(factor[-row:], after=True)
+    return IncompleteCholesky(space, factor[start:], OFFSETS @ strides, (u, v, w))
 
 
 def _stencils(operator: Operator) -> Array:
@@ -75,29 +102,49 @@ def _stencils(operator: Operator) -> Array:
 
     G of a cell is that of the quadrature point nearest to its middle.
     """
-    nodes = [greville(k, p) for k, p in zip(operator.space.knots, operator.space.degrees, strict=True)]
-    widths = [np.diff(x) for x in nodes]
-    middles = [x[:-1] + 0.5 * h for x, h in zip(nodes, widths, strict=True)]
-    rule = zip(operator.rule.points, middles, strict=True)
-    picks = u, v, w = [np.abs(points - middle[:, None]).argmin(axis=1) for points, middle in rule]
+    space, widths, picks = operator.space, *_nearest_points(operator)
+    start, _ = _place(space, operator.rule.shape[0])
+    here = np.flatnonzero((picks[0] >= start) & (picks[0] < start + operator.rule.shape[0]))
+    widths[0], picks[0] = widths[0][here], picks[0][here] - start
+    origin = (here[0] - space.rows.start if here.size else 0), 0, 0
+    u, v, w = picks
     cells = operator.factors[np.ix_(u, np.arange(6), w, v)].transpose(1, 0, 3, 2)  # (6, cells of u, of v, of w)
     scales = [h / weights[pick] for h, weights, pick in zip(widths, operator.rule.weights, picks, strict=True)]
     lengths = np.meshgrid(*widths, indexing="ij")
     cells = cells * np.einsum("i,j,k->ijk", *scales) / np.stack([lengths[a] * lengths[b] for a, b in PAIRS])
     corners = np.array(list(product((0, 1), repeat=3)))
     reference = _reference()
-    lower = np.zeros((len(OFFSETS), *operator.space.shape))
+    lower = np.zeros((len(OFFSETS), *space.shape))
     for (i, corner), (j, other) in product(enumerate(corners), repeat=2):
         place = int((other - corner + 1) @ (9, 3, 1))
         if place < len(OFFSETS):
-            there = tuple(slice(c, c + len(h)) for c, h in zip(corner, widths, strict=True))
+            there = tuple(slice(c, c + len(h)) for c, h in zip(corner + origin, widths, strict=True))
             lower[place][there] += np.tensordot(reference[:, i, j], cells, 1)
+    space.add(lower)
     lower = lower[:, *operator.window]
     for entries, offset in zip(lower, OFFSETS, strict=True):
         for axis, step in enumerate(offset):
-            if step:  # no neighbour beyond the last free node
-                np.moveaxis(entries, axis, 0)[0 if step < 0 else -1] = 0.0
+            if step and (axis > 0 or space.place.start == 0):  # no neighbour beyond the last free node
+                np.moveaxis(entries, axis, 0)[slice(1) if step < 0 else slice(-1, None)] = 0.0
     return np.ascontiguousarray(np.moveaxis(lower, 0, -1))
+
+
+def _nearest_points(operator: Operator) -> tuple[list[Array], list[IntArray]]:
+    """Return the widths of the cells of each direction, and the points nearest to their middles.
+
+    Points are those at which the functions of both ends are not zero; in u they count those of all processes.
+    """
+    space, widths, picks = operator.space, [], []
+    for axis, (knots, degree) in enumerate(zip(space.whole.knots, space.degrees, strict=True)):
+        points, first = operator.rule.points[axis], operator.tables[axis][0]
+        if axis == 0:
+            points, first = (np.concatenate(space.shared(part)) for part in (points, first + space.rows.start))
+        nodes = greville(knots, degree)
+        width, cell = np.diff(nodes), np.arange(len(nodes) - 1)[:, None]
+        distance = np.abs(points - nodes[:-1, None] - 0.5 * width[:, None])
+        picks.append(np.where((first <= cell) & (cell < first + degree), distance, np.inf).argmin(axis=1))
+        widths.append(width)
+    return widths, picks
 
 
 def _reference() -> Array:
@@ -114,9 +161,12 @@ def _reference() -> Array:
 
 
 @compiled
-def _factorize(lower: Array, steps: IntArray, places: IntArray) -> None:
-    """Overwrite a lower half by its incomplete factor; a pivot that almost vanishes stays as it was."""
-    for i in range(len(lower)):
+def _factorize(lower: Array, start: int, steps: IntArray, places: IntArray) -> None:
+    """Overwrite a lower half, from the node `start` on, by its incomplete factor.
+
+    A pivot that almost vanishes stays as it was.
+    """
+    for i in range(start, len(lower)):
         row = lower[i]
         rest = row[13]
         for a in range(13):
@@ -131,8 +181,8 @@ def _factorize(lower: Array, steps: IntArray, places: IntArray) -> None:
 
 
 @compiled
-def _substitute(lower: Array, steps: IntArray, x: Array) -> None:
-    """Overwrite r by x; zeros before and after them stand for the neighbours that nodes at the ends do not have.
+def _forward(lower: Array, steps: IntArray, x: Array) -> None:
+    """Overwrite r by y, L y = r; zeros before and after them stand for the neighbours that nodes at the ends lack.
 
     With one free node across, some of OFFSETS lead to a later node, past the last one too.
     """
@@ -142,6 +192,12 @@ def _substitute(lower: Array, steps: IntArray, x: Array) -> None:
         for a in range(13):
             total -= lower[i, a] * x[reach + i + steps[a]]
         x[reach + i] = total * lower[i, 13]
+
+
+@compiled
+def _backward(lower: Array, steps: IntArray, x: Array) -> None:
+    """Overwrite y by x, L^T x = y, with what neighbours before the first node get from them in their places."""
+    reach = -steps[0]
     for i in range(len(lower) - 1, -1, -1):
         value = x[reach + i] * lower[i, 13]
         x[reach + i] = value

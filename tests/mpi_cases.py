@@ -1,0 +1,96 @@
+"""Problems that 1, 2, 3, 4 and 7 processes of an MPI job solve together: `mpiexec -n 7 python mpi_cases.py FOLDER`.
+
+The first of each group writes, into a folder named after their number, NAME.npy, the coefficients of each problem, and
+found.json: the reports, and how many processes raised the error that the data of some of them cause.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from volumes import mapped
+
+from parameterize.spline.volume import FACE_NAMES
+from solve import Elasticity, ExpressionError, Form, Poisson, Problem, benchmark_volume, solve_problem
+
+WAVE = "exp(x+z)*sin(y)"
+
+
+class Wind(Form):
+    """Not symmetric: GMRES."""
+
+    symmetric = False
+
+    def flux(self, u, grad, x):
+        return grad
+
+    def react(self, u, grad, x):
+        return grad[:, 0] + u
+
+
+def cases():
+    """Name -> volume, problem and keywords; u has 8 spans, or 4, or 3."""
+    n4, n3 = benchmark_volume(4), benchmark_volume(3)
+    mixed = Poisson(
+        exact=WAVE,
+        kappa="1+y*y",
+        reaction="1+x*x",
+        robin={"u0": ("2", None), "v1": ("1+x*x", None)},
+        neumann={"u1": None, "w0": None},
+    )
+    coarse = solve_problem(n4, Poisson(exact=WAVE), threads=1)
+    body = Elasticity(exact=("exp(x)*sin(y)", "cos(x*z)", "x*y*z"), traction={"u1": None, "v0": None})
+    sheared = mapped(lambda u, v, w: (u + 3.0 * v, v, w + 1.5 * u))
+    return {
+        "poisson": (n4, Poisson(exact=WAVE), {"refine": 1}),
+        "started": (n4, Poisson(exact=WAVE), {"refine": 1, "start": coarse}),
+        "mixed": (n3, mixed, {"refine": 1}),
+        "open": (n4, Poisson(exact=WAVE, neumann=dict.fromkeys(FACE_NAMES)), {}),
+        "estimated": (n4, Poisson(source="1+x"), {"degree": 2}),
+        "linear": (n4, Poisson(exact=WAVE), {"degree": 1}),
+        "elasticity": (n3, body, {}),
+        "sheared": (sheared, Poisson(exact=WAVE), {"refine": 1}),
+        "wind": (n3, Problem(Wind(), exact=WAVE), {}),
+    }
+
+
+def refused(comm):
+    """Return how many processes say that kappa is negative, as it is for some of them."""
+    try:
+        solve_problem(benchmark_volume(4), Poisson(source="1", kappa="x-0.5"), comm=comm)
+    except ExpressionError as error:
+        return sum(comm.allgather("kappa must be positive" in str(error)))
+    return 0
+
+
+GROUPS = ((1, 2, 4), (3,), (7,))  # at work at the same time
+
+
+def main(folder):
+    from mpi4py import MPI
+
+    world = MPI.COMM_WORLD
+    for sizes in GROUPS:
+        group = int(np.searchsorted(np.cumsum(sizes), world.rank, side="right"))
+        comm = world.Split(group)
+        if group < len(sizes):
+            (folder / str(comm.size)).mkdir(exist_ok=True)
+            solve_all(comm, folder / str(comm.size))
+
+
+def solve_all(comm, folder):
+    found = {}
+    for name, (volume, problem, how) in cases().items():
+        solution = solve_problem(volume, problem, comm=comm, **how)
+        found[name] = solution.report.as_dict() | {"ranks": comm.size}
+        assert len(set(comm.allgather(solution.coefficients.tobytes()))) == 1
+        if comm.rank == 0:
+            np.save(folder / f"{name}.npy", solution.coefficients)
+    found["refused"] = refused(comm)
+    if comm.rank == 0:
+        (folder / "found.json").write_text(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

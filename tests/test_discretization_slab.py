@@ -1,0 +1,89 @@
+"""Slabs of a trial space: several processes find what one finds."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from example_files import load
+from mpi_cases import cases
+from mpi_job import mpiexec
+
+from parameterize.spline.bspline import basis_derivatives
+from solve import benchmark_volume, solve_problem
+from solve.discretization.operator import free_window
+from solve.discretization.quadrature import gauss_rule
+from solve.discretization.slab import Slab
+from solve.discretization.space import TrialSpace, trial_space
+
+REPEATED = np.array([0, 0, 0, 0, 0.2, 0.2, 0.5, 0.5, 0.5, 0.6, 1, 1, 1, 1])
+SPACES = {
+    "smooth": trial_space(benchmark_volume(9)),
+    "linear": trial_space(benchmark_volume(4), degree=1),
+    "repeated knots": TrialSpace((3, 3, 3), (REPEATED,) * 3),
+}
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """Name -> solution of a single process."""
+    return {name: solve_problem(volume, p, threads=1, **how) for name, (volume, p, how) in cases().items()}
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    """The folder of what groups of processes have found."""
+    folder = tmp_path_factory.mktemp("job")
+    done = mpiexec(7, "mpi_cases.py", folder, cwd=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4, 7])
+def test_processes_find_the_solution_of_a_single_one(ranks, alone, job):
+    """Of 7 processes some have no span where u has 3 or 4."""
+    found = json.loads((job / str(ranks) / "found.json").read_text())
+    assert found.pop("refused") == ranks
+    assert found.keys() == alone.keys()
+    for name, one in alone.items():
+        many = np.load(job / str(ranks) / f"{name}.npy")
+        assert np.abs(many - one.coefficients).max() <= 1e-10 * np.abs(one.coefficients).max(), name
+        report = found[name]
+        assert report["ranks"] == ranks
+        assert abs(report["iterations"] - one.report.iterations) <= 1, name
+        for norm, value in one.report.as_dict().items():
+            if norm in ("l2", "l2_relative", "h1_seminorm", "h1_relative", "error_estimate", "h"):
+                assert report[norm] == pytest.approx(value, rel=1e-6), (name, norm)
+    _counted_as_the_model_says(found, ranks, alone)
+
+
+def _counted_as_the_model_says(found, ranks, alone):
+    """Rows to neighbours exactly, transpositions up to shares that are not equal."""
+    halo, transposition = load("benchmarks/mpi").model(8, ranks)
+    if ranks == 1:
+        assert all("traffic" not in report for report in found.values())
+        return
+    for name in ("poisson", "started"):
+        traffic = found[name]["traffic"]
+        assert traffic["halo"] == pytest.approx(halo)
+        assert traffic["transposition"] == pytest.approx(transposition, rel=0.15)
+    assert found["sheared"]["traffic"]["substitution"] > 0.0
+
+
+@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize("ranks", [1, 2, 3, 7])
+def test_every_row_has_an_owner_and_every_point_its_functions(name, ranks):
+    space = SPACES[name]
+    free = free_window(space, ("u0", "v0"))
+    slabs = [Slab.of(space, SimpleNamespace(size=ranks, rank=rank), free) for rank in range(ranks)]
+    rows = np.concatenate([np.arange(space.shape[0])[slab.owned[slab.rank]] for slab in slabs])
+    assert np.array_equal(rows, np.arange(space.shape[0]))
+    points = np.concatenate([gauss_rule(slab).points[0] for slab in slabs])
+    assert np.array_equal(points, gauss_rule(space).points[0])
+    assert sum(slab.own(free)[0].stop - slab.own(free)[0].start for slab in slabs) == space.shape[0] - 1
+    for slab in slabs:
+        here = gauss_rule(slab).points[0]
+        first, values = basis_derivatives(space.knots[0], space.degrees[0], here)
+        mine, same = basis_derivatives(slab.knots[0], slab.degrees[0], here)
+        assert np.array_equal(mine + slab.rows.start, first) and np.array_equal(same, values)
+        assert slab.elements == space.elements and slab.dofs == space.dofs

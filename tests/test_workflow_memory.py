@@ -1,0 +1,53 @@
+"""What is said of a solve's memory before it."""
+
+import logging
+import tracemalloc
+
+import pytest
+from volumes import mapped
+
+from iga_nn.options import ElasticityOptions, PoissonOptions
+from iga_nn.workflow import memory
+from solve import benchmark_volume, solve_problem
+
+SHEARED = mapped(lambda u, v, w: (u + 3.0 * v, v, w + 1.5 * u))
+
+
+@pytest.mark.parametrize(
+    ("volume", "options"),
+    [
+        (benchmark_volume(24), PoissonOptions(refine=(0,))),
+        (benchmark_volume(10, 2), PoissonOptions(refine=(1,), reaction="1", neumann=("u1",))),
+        (SHEARED, PoissonOptions(refine=(0, 3))),
+        (benchmark_volume(10, 4), PoissonOptions(refine=(0,), quadrature="gauss+1")),
+        (benchmark_volume(8), ElasticityOptions(refine=(0, 1), exact="x*y;y;sin(z)")),
+    ],
+    ids=["poisson", "reaction", "sheared", "degree 4", "elasticity"],
+)
+def test_a_solve_takes_what_was_said(volume, options):
+    """Within a factor of 1.6: the arrays alone, without those of a first solve that compiles."""
+    problem, how = options.problem(), options.solver() | {"threads": 1}
+    said = memory.solve_memory(volume, problem, options).on(1)
+    solve_problem(benchmark_volume(3, max(volume.degrees)), problem, **how)
+    tracemalloc.start()
+    solve_problem(volume, problem, refine=max(options.refine), tolerance=0.1, **how)
+    taken = tracemalloc.get_traced_memory()[1] / 1e6
+    tracemalloc.stop()
+    assert taken / 1.6 < said < 1.6 * taken
+
+
+def test_what_does_not_fit_names_the_processes_that_would(monkeypatch, caplog):
+    volume, options = benchmark_volume(6), PoissonOptions(refine=(0, 5))
+    wanted = memory.solve_memory(volume, options.problem(), options)
+    for free, named in ((2.0 * wanted.on(1), None), (wanted.on(3), 3), (0.9 * wanted.each_mb, None)):
+        monkeypatch.setattr(memory, "available_memory_mb", lambda _, free=free: free)
+        caplog.clear()
+        with caplog.at_level(logging.INFO, "iga_nn"):
+            memory.tell_memory(volume, options.problem(), options)
+        said = [record.getMessage() for record in caplog.records]
+        assert said[0] == f"estimate: {wanted.on(1) / 1000.0:.2f} GB of memory"
+        assert len(said) == 1 + (free < wanted.on(1))
+        if named:
+            assert f"mpiexec -n {named} iga-nn solve .. --mpi" in said[1]
+        else:
+            assert not any("mpiexec" in line for line in said)
