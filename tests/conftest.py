@@ -87,7 +87,7 @@ def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
     import parameterize.run as home
     from parameterize.config import preset
 
-    full = home.parameterize
+    full = iga_nn.parameterize  # loaded before it is replaced: else what replaces it would be put back
 
     @functools.wraps(full)
     def parameterize(surface: Any, config: Any = None, **options: Any) -> Any:

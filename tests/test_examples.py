@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import ast
 import csv
+import json
 import re
 from itertools import pairwise
 from pathlib import Path
@@ -14,13 +16,16 @@ from small_run import shortened
 
 import iga_nn
 from iga_nn.cli.commands import main
+from iga_nn.figures.render import can_draw
 from iga_nn.options import read_corners
+from parameterize.display import Shown
 from solve.study import benchmark_volume
 
 
 @pytest.fixture
 def formula_map(formula_training, monkeypatch):
     """Training replaced by a formula, for `iga_nn.run` and for `iga_nn.parameterize`."""
+    assert iga_nn.parameterize  # loaded before it is replaced: else the formula would be what is put back
     formula_training()
     given = {}
 
@@ -67,7 +72,7 @@ def test_compare_finds_the_better_map(tmp_path, capsys):
     assert shown(load("compare").main(out=tmp_path, refine=0))
     good, worse = capsys.readouterr().out.splitlines()[1:]
     assert float(good.split()[-1]) < float(worse.split()[-1])
-    assert good.split()[-5] == worse.split()[-5] == "certified"
+    assert good.split()[-8] == worse.split()[-8] == "certified"
 
 
 def test_load_volume(tmp_path, capsys):
@@ -165,6 +170,28 @@ def test_gallery_names_every_example_and_its_pictures_are_small():
 def test_pictures_are_kept_small(tmp_path):
     load("gallery").keep(EXAMPLES / "pictures" / "seashell.png", tmp_path / "small.png")
     assert imread(tmp_path / "small.png").shape[1] == 640 and (tmp_path / "small.png").stat().st_size < 60_000
+
+
+@pytest.mark.pictures
+def test_notebook_runs_and_its_results_show_themselves(in_folder, short_training):
+    cells = json.loads((EXAMPLES / "notebook.ipynb").read_text(encoding="utf-8"))["cells"]
+    sources = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    space = {}
+    shown = [last_value(source, space) for source in sources if ".plot(" not in source or can_draw()]
+    assert isinstance(space["surface"], iga_nn.Surface) and space["solution"].report.converged
+    tables = [value._repr_html_() for value in shown if isinstance(value, Shown)]
+    assert len(tables) == 6 and all("<table>" in table for table in tables)
+    assert space["grid"].volume == pytest.approx(space["surface"].volume, rel=0.1)
+    assert space["half"].volume == pytest.approx(space["grid"].volume / 2.0, rel=0.1)
+
+
+def last_value(source, space):
+    """Run a cell as a notebook does: the value of its last line is what is shown."""
+    *before, last = ast.parse(source).body
+    if not isinstance(last, ast.Expr):
+        before, last = [*before, last], ast.Expr(ast.Constant(None))
+    exec(compile(ast.Module(before, []), "notebook", "exec"), space)  # our own text
+    return eval(compile(ast.Expression(last.value), "notebook", "eval"), space)
 
 
 def test_convergence_rates(tmp_path, capsys):
