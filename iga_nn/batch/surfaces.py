@@ -112,5 +112,5 @@ def _numbered(names: Sequence[str]) -> list[str]:
 
 
 def printable(text: str) -> str:
-    """Return the text as every terminal and file takes it: names of files need not be valid UTF-8."""
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+    """Return the text as every terminal and file takes it: names of files may hold any bytes."""
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
