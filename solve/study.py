@@ -105,6 +105,8 @@ def convergence(
     >>> [row.report.dofs for row in rows], round(rows[-1].rate_l2)
     ([125, 343, 1331], 4)
     """
+    if not isinstance(refine, Iterable):
+        raise ValueError(f"refine must be levels such as range(3), got {refine!r:.80}")
     solve = partial(solve_problem, volume, problem, degree=degree, certified=certified, tolerance=tolerance)
     reports = [solve(refine=level).report for level in refine]
     found = rates(reports)

@@ -151,6 +151,24 @@ def test_laws_that_cannot_be_solved_are_refused_with_one_line(law, says):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("law", "says"),
+    [
+        (refused(), "Own must define flux"),
+        (
+            refused(flux=lambda s, u, grad, x: grad[0]),
+            r"Own\.flux must return shape \(1, 3, 5\) for u of shape \(1, 5\)",
+        ),
+        (refused(flux=lambda s, u, grad, x: None), r"Own\.flux must return shape"),
+        (refused(components=0), "Own.components must be a whole number, 1 or more, got 0"),
+        (refused(components=2.5), "got 2.5"),
+    ],
+)
+def test_shapes_are_said_before_what_jets_cannot_do(law, says):
+    with pytest.raises(ValueError, match=says):
+        iga_nn.Problem(law, exact="X*Y")
+
+
 def test_a_law_that_is_not_coercive_somewhere_is_refused_with_the_place():
     """Its sign changes next to a corner, where no sample lies but a quadrature point does."""
     law = refused(flux=lambda s, u, grad, x: np.where(np.abs(x).sum(axis=0) > 0.2, 1.0, -1.0) * grad)
@@ -167,6 +185,8 @@ def test_a_law_that_is_not_coercive_somewhere_is_refused_with_the_place():
         ({"exact": lambda x: x[:2]}, "source has no data: exact is a function or a field"),
         ({"source": ("1", "1"), "neumann": {"top": None}}, "'top' is no face"),
         ({"source": ("1", "1"), "neumann": {"u0": None}}, "neumann u0 has no data"),
+        ({"source": ("1", "1"), "neumann": ["u0"]}, "neumann must be a dictionary of face names"),
+        ({"source": ("1", "1"), "robin": {"u0": 3}}, r"robin u0: give two entries \(alpha, g\), got 3"),
     ],
 )
 def test_data_that_do_not_fit_the_law_are_refused(arguments, says):
@@ -214,3 +234,14 @@ def test_problems_are_pickled():
     for problem in (iga_nn.Poisson(kappa="1+X*X"), iga_nn.Elasticity(exact=("x", "Y", "0")), PROBLEMS["drift"]):
         there = pickle.loads(pickle.dumps(problem))
         assert np.array_equal(solve_problem(volume, there).coefficients, solve_problem(volume, problem).coefficients)
+
+
+@pytest.mark.parametrize("refine", [1.5, None, [0], "a"])
+def test_levels_that_are_no_numbers_are_refused(refine):
+    with pytest.raises(ValueError, match="refine must be a whole number"):
+        iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(), refine=refine)
+
+
+def test_a_study_of_one_level_is_refused():
+    with pytest.raises(ValueError, match=r"refine must be levels such as range\(3\), got 1"):
+        iga_nn.convergence(benchmark_volume(2), iga_nn.Poisson(), refine=1)

@@ -182,6 +182,9 @@ def test_a_smooth_function_is_met_with_the_order_of_the_degree():
     ("function", "how", "says"),
     [
         (lambda u, v, w: (u, v), {}, "must return three values, x, y and z; it returned 2"),
+        (lambda u, v, w: None, {}, "it returned None"),
+        (lambda u, v, w: (u, v, w), {"control_points": (4, 4)}, r"a whole number, or three of them, got \(4, 4\)"),
+        (lambda u, v, w: (u, v, w), {"control_points": 4.5}, "a whole number, or three of them, got 4.5"),
         (lambda u, v, w: (u, v, np.log(w)), {}, "finite numbers"),
         (lambda u, v, w: (u, v, u[0]), {"control_points": (4, 5, 6)}, "shape"),
         (lambda u, v, w: (u, v, w), {"control_points": 3}, "degree 3 needs at least 4 control points, got 3"),

@@ -144,7 +144,9 @@ def _found(entry: Entry, task: Task, force: bool) -> Row:
             return row
         finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.options, vector=task.vector)
     except expected_errors() as error:
-        return row.ended(Ended("refused", one_line(error)))
+        refused = row.ended(Ended("refused", one_line(error)))
+        log.warning("%s", refused.told())
+        return refused
     return row if finished is None else row.ended(Ended("done", report=finished.report))
 
 

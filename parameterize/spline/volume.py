@@ -135,12 +135,16 @@ class BSplineVolume(Shown):
         control_points: how many, one number or one a direction. A polynomial of that degree a direction is met exactly.
         Raises ValueError where the values are not finite or not three, or the control points too few for the degree.
         """
-        counts = np.broadcast_to(control_points, 3).tolist()
+        wanted = np.asarray(control_points)
+        if wanted.dtype.kind not in "iu" or wanted.shape not in ((), (3,)):
+            raise ValueError(f"control_points must be a whole number, or three of them, got {control_points!r:.80}")
+        counts = np.broadcast_to(wanted, 3).tolist()
         knots = tuple(open_uniform_knots(n, degree) for n in counts)
         grid = np.meshgrid(*[greville(row, degree) for row in knots], indexing="ij")
         values = function(*grid)
-        if len(values) != 3:
-            raise ValueError(f"function must return three values, x, y and z; it returned {len(values)}")
+        if not isinstance(values, tuple | list | np.ndarray) or len(values) != 3:
+            found = len(values) if isinstance(values, tuple | list) else repr(values)[:80]
+            raise ValueError(f"function must return three values, x, y and z; it returned {found}")
         parts = [real_array(value, "values of function") for value in values]
         if any(part.shape not in ((), tuple(counts)) for part in parts):
             raise ValueError(f"function must return arrays of shape {tuple(counts)} or numbers")

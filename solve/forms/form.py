@@ -136,6 +136,40 @@ def _objects(jets: Sequence[Jet], shape: tuple[int, ...]) -> Any:
     return array.reshape(shape)
 
 
+class LawError(ValueError):
+    """A law that is not defined, or whose results on arrays have wrong shapes."""
+
+
+def _results(form: Form, u: Array, grad: Array, x: Array) -> tuple[Array, Array]:
+    """Return flux (c, 3, m) and reaction (c, m) of a law.
+
+    Raises LawError where their shapes are others, ValueError where they are not finite real numbers.
+    """
+    name, results = type(form).__name__, []
+    for part, shape in (("flux", grad.shape), ("react", u.shape)):
+        try:
+            found = np.asarray(getattr(form, part)(u, grad, x))
+        except NotImplementedError as error:
+            raise LawError(str(error)) from None
+        if found.shape != shape and (part == "flux" or found.shape != ()):
+            raise LawError(f"{name}.{part} must return shape {shape} for u of shape {u.shape}, got {found.shape}")
+        if found.dtype.kind not in "iuf" or not np.all(np.isfinite(found)):
+            raise ValueError(f"{name}.{part} must return finite real numbers")
+        results.append(np.broadcast_to(found, shape))
+    return results[0], results[1]
+
+
+def check_shapes(form: Form) -> None:
+    """Raise LawError for a law whose results have wrong shapes; one that wants more than plain arrays is not judged."""
+    c, m = form.components, 5
+    try:
+        _results(form, np.ones((c, m)), np.ones((c, 3, m)), np.ones((3, m)))
+    except LawError:
+        raise
+    except Exception:  # whatever a user's law does with arrays
+        return
+
+
 def check_law(form: Form, x: Array) -> bool:
     """Check a law on random arguments at points x (3, m), and return whether it couples u with its gradient.
 
@@ -147,15 +181,7 @@ def check_law(form: Form, x: Array) -> bool:
     (u, v), (p, q) = rng.standard_normal((2, c, m)), rng.standard_normal((2, c, 3, m))
 
     def law(u: Array, grad: Array) -> tuple[Array, Array]:
-        results = []
-        for part, shape in (("flux", (c, 3, m)), ("react", (c, m))):
-            found = np.asarray(getattr(form, part)(u, grad, x))
-            if found.shape != shape and (part == "flux" or found.shape != ()):
-                raise ValueError(f"{name}.{part} must return shape {shape} for u of shape {(c, m)}, got {found.shape}")
-            if found.dtype.kind not in "iuf" or not np.all(np.isfinite(found)):
-                raise ValueError(f"{name}.{part} must return finite real numbers")
-            results.append(np.broadcast_to(found, shape))
-        return results[0], results[1]
+        return _results(form, u, grad, x)
 
     one, two, both = law(u, p), law(v, q), law(2.0 * u - 3.0 * v, 2.0 * p - 3.0 * q)
     for part, a, b, mixed in zip(("flux", "react"), one, two, both, strict=True):

@@ -14,7 +14,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import SplineField
 from .data import Data, Datum, check_faces, demand, finite, parse
-from .form import Form, strong_form, strong_terms
+from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
 from .jets import Jet, Numbers, coordinates, known
 from .parser import Expression
@@ -43,6 +43,15 @@ class BoundaryValueProblem:
 
         counts: role -> how many entries its datum has, where these are not the law's components.
         """
+        if not isinstance(count := self.form.components, int) or count < 1:
+            raise ValueError(
+                f"{type(self.form).__name__}.components must be a whole number, 1 or more, got {count!r:.80}"
+            )
+        for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
+            if not isinstance(faces, Mapping):
+                raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
+        if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
+            raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
         check_faces(self.label("neumann"), neumann)
         check_faces("robin", robin)
         if both := neumann.keys() & robin.keys():
@@ -109,10 +118,14 @@ class BoundaryValueProblem:
 
     @property
     def not_differentiable(self) -> str:
-        """Why the derivatives of the law's coefficients are unknown; "" where they are known."""
+        """Why the derivatives of the law's coefficients are unknown; "" where they are known.
+
+        Raises LawError where the law's results have wrong shapes: that is said first.
+        """
         try:
             strong_form(self.form, [Jet(np.ones(1))] * self.form.components, np.ones((3, 1)))
         except Exception as error:  # whatever a user's law does with jets
+            check_shapes(self.form)
             return f"the law {type(self.form).__name__} does not run on jets ({error})"
         return ""
 
