@@ -105,7 +105,7 @@ def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, *
     problem : Poisson, Elasticity or Problem
         The law and its data.
     **how
-        refine, degree, threads and quadrature, as in `iga_nn.solve`.
+        refine, degree, threads, quadrature and comm, as in `iga_nn.solve`.
 
     Returns
     -------

@@ -29,6 +29,7 @@ from iga_nn.errors import InputError
 from iga_nn.models import DATA_FOLDER
 from iga_nn.options import MapOptions, PoissonOptions
 from iga_nn.report import document as reports
+from iga_nn.report.tables import csv_text
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.files import save_text
 from solve.forms.poisson import DEFAULT_EXACT
@@ -288,7 +289,7 @@ def as_csv(rows: Sequence[Row]) -> str:
     """Every figure, ours and the paper's, with all its digits; empty where there is none."""
     columns = [field.name for field in fields(Row)] + [f"paper_{field.name}" for field in fields(Published)]
     paper = [{f"paper_{name}": value for name, value in asdict(PAPER[row.model]).items()} for row in rows]
-    return processes.as_csv(columns, (asdict(row) | beside for row, beside in zip(rows, paper, strict=True)))
+    return csv_text(columns, (asdict(row) | beside for row, beside in zip(rows, paper, strict=True)))
 
 
 def as_markdown(rows: Sequence[Row], options: Options) -> str:

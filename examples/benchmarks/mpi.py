@@ -27,9 +27,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from processes import as_csv, as_markdown, cores, processor
+from processes import as_markdown, cores, processor
 
 from iga_nn.report.document import versions
+from iga_nn.report.tables import csv_text
 from parameterize.files import save_text
 from solve import Poisson, benchmark_volume, solve_problem
 
@@ -178,7 +179,7 @@ def save(rows: Sequence[Row], folder: Path) -> None:
     """Write mpi.csv and mpi.md."""
     folder.mkdir(parents=True, exist_ok=True)
     about = (__doc__ or "").split("\n\n")[2].strip()
-    save_text(folder / "mpi.csv", as_csv([field.name for field in fields(Row)], map(asdict, rows)))
+    save_text(folder / "mpi.csv", csv_text([field.name for field in fields(Row)], map(asdict, rows)))
     save_text(folder / "mpi.md", f"# A solve shared by processes\n\n{about}\n\n{text_of(rows)}\n")
 
 

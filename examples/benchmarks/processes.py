@@ -18,7 +18,6 @@ from iga_nn.batch.surfaces import Entry
 from iga_nn.batch.table import Batch, Row
 from iga_nn.batch.task import Ended, Task, compute
 from iga_nn.errors import InputError
-from iga_nn.report.tables import csv_text as as_csv  # noqa: F401 - the benchmarks take it from here
 from iga_nn.workflow.output_folder import has_checkpoint
 from parameterize.files import save_text
 

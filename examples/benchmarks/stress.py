@@ -26,6 +26,7 @@ from iga_nn.batch.task import Task
 from iga_nn.errors import InputError
 from iga_nn.options import MapOptions
 from iga_nn.report import document as reports
+from iga_nn.report.tables import csv_text
 from parameterize.files import save_text
 
 SETTINGS = "{0.preset}, seed {0.seed}, {0.control_points} control points, steps times {0.steps_factor:g}"
@@ -186,7 +187,7 @@ def write_tables(rows: Sequence[Row], options: Options) -> None:
     """stress.csv and stress.md with the rows so far; each replaced in one go."""
     rows = sorted(rows, key=lambda row: row.number)
     columns = [field.name for field in fields(Row)]
-    save_text(options.out / "stress.csv", processes.as_csv(columns, map(asdict, rows)))
+    save_text(options.out / "stress.csv", csv_text(columns, map(asdict, rows)))
     save_text(options.out / "stress.md", as_text(rows, options))
 
 

@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.spline.bspline import apply_along, insertion_into
 from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError, one_line
@@ -73,10 +72,7 @@ def _on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
             f"an MFEM mesh takes only solutions of its own degrees {volume.degrees}, this one has {field.degrees}: "
             "export it --to vtk"
         )
-    points = volume.control_points
-    for axis, (own, finer) in enumerate(zip(volume.knots, field.knots, strict=True)):
-        points = apply_along(insertion_into(own, volume.degrees[axis], finer), points, axis)
-    return BSplineVolume(volume.degrees, field.knots, points)
+    return volume.on_knots(field.knots)
 
 
 def read(path: Path, kind: str) -> BSplineVolume:

@@ -1,7 +1,8 @@
 """Estimates the time and the memory of a run before it starts, from counts and the time of two small pieces of work.
 
 The pieces, run on all threads, are a pass (the network forward and backward on 1000 points) and a product with the
-second derivative of the spline's distortion. How many of them a run takes is known from conch, duck and bird.
+second derivative of the spline's distortion. How many of them a run takes is known from conch and duck, and of
+hard surfaces from bone and homer.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ REST = 1000.0  # libraries loaded, figures drawn
 
 # Products
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
-EASY, HARD = (5, 13), (11, 13)  # rounds, and Newton steps a round
+EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round
 HARD_AFTER = (3, 14)  # likewise each time that knots were inserted
 
 # Megabytes

@@ -305,13 +305,12 @@ def _descend(
             break
         found, length = searched
         damping = _next_damping(damping, length, config)
-        start = point
         if length < 1.0:
             acceleration.forget()
         else:
-            acceleration.add(start.control, found.control)
+            acceleration.add(point.control, found.control)
         ahead = _look_ahead(found, acceleration, energy)
-        gain = start.total - (ahead or found).total  # sliding may raise the energy of what is folded
+        gain = point.total - (ahead or found).total  # before sliding, which may raise the energy of what is folded
         if ahead is None:
             energy.slide(found.control)
             ahead = replace(found, outer=energy.surface_part(found.control))
