@@ -50,8 +50,11 @@ class StageConfig:
 class TrainConfig:
     """What the four stages share."""
 
-    learning_rate: float = 1e-3
-    final_learning_rate: float = 2e-5  # reached by cosine decay at the end of each stage
+    learning_rate: float = 1e-3  # of Adam
+    matrix_rate: float = 0.015  # of Muon, for the hidden layers' matrices; Adam trains these, too, where it is 0
+    final_share: float = 0.02  # of the rates, reached by cosine decay at the end of each stage
+    easy_loss: float = 8.0  # where the first stage ends with a larger loss, all take longer in proportion
+    most_effort: float = 4.0  # factor of their steps then, at most
     cell: float = 0.12  # edge h of the interior cells (section 4.4.2)
     triangles: int = 700  # surface triangles sampled a step; all of them where there are fewer
     min_det: float = 0.1  # alpha of the bijectivity term
@@ -233,11 +236,11 @@ def _stages(steps: tuple[int, int, int, int, int]) -> tuple[StageConfig, ...]:
 
 
 PRESETS = {
-    "fast": Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((120, 80, 120, 40, 80)), SplineConfig()),
+    "fast": Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((60, 40, 60, 20, 40)), SplineConfig()),
     "paper": Config(
         "paper",
         NetworkConfig(width=512, modules=6),
-        TrainConfig(learning_rate=5e-4, final_learning_rate=5e-4, cell=0.04, triangles=1_000_000, whiten=False),
+        TrainConfig(learning_rate=5e-4, matrix_rate=0.0, final_share=1.0, most_effort=1.0, cell=0.04, triangles=1_000_000, whiten=False),
         _stages((600, 400, 1000, 500, 1000)),
         SplineConfig(),
         starts=1,  # without `whiten` every start would be the same

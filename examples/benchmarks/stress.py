@@ -1,6 +1,6 @@
 """Random hard surfaces of genus 0 (hard_shapes.py), default settings: which share ends certified, by kind.
 
-    python examples/benchmarks/stress.py --count 40
+    python examples/benchmarks/stress.py --first 40 --count 120
     python examples/benchmarks/stress.py --kinds thin flat --out out/stress
 
 Runs the surfaces as `iga-nn batch` does, with one thread each: the same command skips what is finished and goes on from
@@ -129,7 +129,9 @@ def _options(argv: list[str] | None) -> Options:
         parser.error(str(error))
     except OSError as error:
         parser.error(f"{given.out}: cannot be written ({error.strerror}); --out names another folder")
-    numbers = tuple(number for number in range(given.count) if kind_of(number) in given.kinds)
+    if given.first < 0:
+        parser.error(f"--first {given.first}: must not be negative")
+    numbers = tuple(number for number in range(given.first, given.first + given.count) if kind_of(number) in given.kinds)
     return Options(numbers, mapping, given.jobs, given.out)
 
 
@@ -137,7 +139,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = processes.OneLineParser(
         prog="stress.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--count", type=int, default=200, help="surfaces 0 to COUNT - 1 (default: 200)")
+    parser.add_argument("--first", type=int, default=0, help="number of the first surface (default: 0)")
+    parser.add_argument("--count", type=int, default=200, help="so many from there on (default: 200)")
     parser.add_argument("--kinds", nargs="+", default=KINDS, choices=KINDS, help="of these alone")
     parser.add_argument("--jobs", type=int, default=1, help="surfaces at a time (default: 1)")
     parser.add_argument("--out", type=Path, default=Path("out/stress"), help="folder (default: out/stress)")

@@ -49,6 +49,11 @@ class InverseMap(nn.Module):
         nn.init.zeros_(self.last.weight)
         nn.init.zeros_(self.last.bias)
 
+    @property
+    def matrices(self) -> list[Tensor]:
+        """The weights of the hidden layers."""
+        return [self.first.weight, *(module.linear.weight for module in self.residual)]
+
     def encode(self, x: Tensor) -> Tensor:
         """Return x, sin(n k x) / (n k), cos(n k x) / (n k) for n = 1..N: (m, 3) -> (m, 6 N + 3)."""
         nk = self.multiples * self.scale  # (N,)

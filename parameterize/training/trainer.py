@@ -1,4 +1,8 @@
-"""The training stages as one loop: smooth cuboids S(2), S(1), cube, fixed corners, fixed edges (section 4.3.1)."""
+"""The training stages as one loop: smooth cuboids S(2), S(1), cube, fixed corners, fixed edges (section 4.3.1).
+
+The first stage is passed through once as a look at the shape: the loss that it ends with tells how much effort, as a
+factor of the steps, the same stage once more and all others take.
+"""
 
 import logging
 import math
@@ -18,6 +22,7 @@ from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targe
 from ..progress import History, Progress, ProgressCallback
 from .network import InverseMap
 from .objective import BoundarySamples, EdgePaths, Objective
+from .optimizer import TrainingOptimizer
 from .samples import TriangleSampler, interior_points, stencils
 
 _log = logging.getLogger(__name__)
@@ -27,11 +32,11 @@ _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
 
 @dataclass
 class _Run:
-    """Where the training stands: stage, step, and the network at the start of the stage and at its best."""
+    """Where the training stands: pass, step, and the network at the start of the pass and at its best."""
 
     number: int
     step: int
-    start: State  # the network at the start of the stage: corners and cuts were taken from it
+    start: State  # the network at the start of the pass: corners and cuts were taken from it
     best: State
     best_key: tuple[float, float] = (math.inf, math.inf)  # folded samples, then loss
 
@@ -40,7 +45,7 @@ class Trainer:
     """Trains G on one surface.
 
     vertices: (n, 3), at volume 1. faces: (m, 3). given_corners: (8,) vertex numbers or None. start: see `start_map`.
-    The random numbers of a step depend on the seed, the stage and the step alone.
+    The random numbers of a step depend on the seed, the pass and the step alone.
     """
 
     def __init__(
@@ -61,6 +66,7 @@ class Trainer:
         self.config, self.seed, self.device, self.dtype = config, seed, device, dtype
         self.vertices, self.faces, self.corners = vertices, faces, given_corners
         self.history, self.progress, self.checkpoints = history, progress, checkpoints
+        self.effort = 1.0  # until the first pass has ended
         self.generator = torch.Generator()
         first_weights = torch.Generator().manual_seed(seed % 2**63)
         self.network = InverseMap(config.network, first_weights).to(device=device, dtype=dtype)
@@ -80,7 +86,7 @@ class Trainer:
         given = self.corners is not None
         saved = self.checkpoints.load(_CHECKPOINT)
         first = int(saved[1]["number"]) if saved else 0
-        for number, stage in list(enumerate(self.config.stages))[first:]:
+        for number, stage in list(enumerate(self._passes))[first:]:
             run = self._load_run(*saved) if saved else _Run(number, 0, self._state(), self._state())
             try:
                 boundary = self._prepare(stage)
@@ -89,12 +95,25 @@ class Trainer:
                     raise
                 _log.warning("training ends before stage %s: %s", stage.name, error)
                 break
-            optimizer = torch.optim.Adam(self.network.parameters(), lr=self.config.train.learning_rate)
+            optimizer = TrainingOptimizer(self.network, self.config.train)
             if saved:
                 self._load_progress(saved[0], optimizer)
             self._train(run, boundary, optimizer)
+            if number == 0:
+                train, (_, loss) = self.config.train, run.best_key
+                self.effort = min(max(loss / train.easy_loss, 1.0), train.most_effort)
             saved = None
         return self.network
+
+    @property
+    def _passes(self) -> list[StageConfig]:
+        return [self.config.stages[0], *self.config.stages]
+
+    def _steps(self, number: int) -> int:
+        """Return the steps of a pass; the first one is not repeated where it was enough."""
+        if number == 1 and self.effort == 1.0:
+            return 0
+        return round((self.effort if number else 1.0) * self._passes[number].steps)
 
     def map(self, points: Array) -> Array:
         """Return G at points (m, 3), as float64."""
@@ -127,29 +146,29 @@ class Trainer:
     def _tensor(self, values: Array) -> Tensor:
         return torch.as_tensor(values, dtype=self.dtype, device=self.device)
 
-    def _train(self, run: _Run, boundary: BoundarySamples, optimizer: torch.optim.Adam) -> None:
+    def _train(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
         """Train one stage, and leave the network at its best state: fewest folded samples, then lowest loss."""
-        stage = self.config.stages[run.number]
-        later = sum(s.steps for s in self.config.stages[run.number + 1 :])
+        stage, steps = self._passes[run.number], self._steps(run.number)
+        later = sum(self._steps(number) for number in range(run.number + 1, len(self._passes)))
         started, begun = time.perf_counter(), run.step
         try:
-            while run.step < stage.steps:
+            while run.step < steps:
                 self._step(run, stage, boundary, optimizer)
                 pace = (time.perf_counter() - started) / (run.step - begun)
                 _, _, loss, folded, _ = self.history.rows[-1]
-                left = pace * (stage.steps - run.step + later)
-                self.progress(Progress(stage.name, run.step, stage.steps, loss, folded, left, self.mapped))
-                if run.step % _CHECKPOINT_STEPS == 0 or run.step == stage.steps:
+                left = pace * (steps - run.step + later)
+                self.progress(Progress(stage.name, run.step, steps, loss, folded, left, self.mapped))
+                if run.step % _CHECKPOINT_STEPS == 0 or run.step == steps:
                     self._save(run, optimizer)
         except KeyboardInterrupt:
             self._save(run, optimizer)
             raise
         self.network.load_state_dict(run.best)
 
-    def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: torch.optim.Adam) -> None:
+    def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
         """Take one Adam step; nothing of the state changes before the loss is known."""
         self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
-        optimizer.zero_grad(set_to_none=True)
+        optimizer.clear()
         loss, folded, terms = self.objective(stage, boundary, self.generator)
         loss.backward()  # type: ignore[no-untyped-call]
         value = float(loss.detach())
@@ -157,23 +176,21 @@ class Trainer:
             raise FloatingPointError(f"stage {stage.name}, step {run.step}: the loss is not finite")
         if (folded, value) < run.best_key:
             run.best_key, run.best = (folded, value), self._state()
-        for group in optimizer.param_groups:
-            group["lr"] = self._learning_rate(run.step, stage.steps)
-        optimizer.step()
+        optimizer.step(self._share(run.step / self._steps(run.number)))
         self.history.add(stage.name, run.step, value, folded, terms)
         run.step += 1
 
     def _state(self) -> State:
         return {name: value.clone() for name, value in self.network.state_dict().items()}
 
-    def _save(self, run: _Run, optimizer: torch.optim.Adam) -> None:
+    def _save(self, run: _Run, optimizer: TrainingOptimizer) -> None:
         parts = {"now": self.network.state_dict(), "start": run.start, "best": run.best}
         tensors = {f"{part}.{name}": value for part, state in parts.items() for name, value in state.items()}
-        for index, moments in optimizer.state_dict()["state"].items():
-            tensors |= {f"adam.{index}.{name}": value for name, value in moments.items()}
+        tensors |= {f"optimizer.{name}": value for name, value in optimizer.tensors().items()}
         state = {
             "number": run.number,
             "step": run.step,
+            "effort": self.effort,
             "best_key": run.best_key,
             "corners": None if self.corners is None else self.corners.tolist(),
             "history": self.history.rows,
@@ -182,6 +199,7 @@ class Trainer:
 
     def _load_run(self, tensors: State, state: dict[str, Any]) -> _Run:
         """Restore everything but the optimiser; leave the network as it was at the start of the stage."""
+        self.effort = state["effort"]
         self.corners = None if state["corners"] is None else np.array(state["corners"])
         self.history.rows[:] = [tuple(row) for row in state["history"]]
         start, best = _part(tensors, "start"), _part(tensors, "best")
@@ -189,18 +207,14 @@ class Trainer:
         folded, loss = state["best_key"]
         return _Run(state["number"], state["step"], start, best, (folded, loss))
 
-    def _load_progress(self, tensors: State, optimizer: torch.optim.Adam) -> None:
+    def _load_progress(self, tensors: State, optimizer: TrainingOptimizer) -> None:
         self.network.load_state_dict(_part(tensors, "now"))
-        moments: dict[int, State] = {}
-        for key, value in _part(tensors, "adam").items():
-            index, name = key.split(".")
-            moments.setdefault(int(index), {})[name] = value
-        optimizer.load_state_dict({"state": moments, "param_groups": optimizer.state_dict()["param_groups"]})
+        optimizer.restore(_part(tensors, "optimizer"))
 
-    def _learning_rate(self, step: int, steps: int) -> float:
-        """Return the learning rate, which falls along a cosine from the first to the final one."""
-        first, last = self.config.train.learning_rate, self.config.train.final_learning_rate
-        return last + 0.5 * (first - last) * (1.0 + math.cos(math.pi * step / steps))
+    def _share(self, done: float) -> float:
+        """Return the share of the learning rates, which falls along a cosine; done: the share of the steps, below 1."""
+        last = self.config.train.final_share
+        return last + 0.5 * (1.0 - last) * (1.0 + math.cos(math.pi * done))
 
 
 def start_map(points: Array, start: int, turn: float) -> Array:
