@@ -4,6 +4,7 @@ The control points of the three derivatives are brought to Bernstein form, and t
 product rule for Bernstein polynomials: of degree 3 p - 1 a direction. No interpolation, so that errors stay small.
 """
 
+import numba
 import numpy as np
 
 from ..arrays import Array, IntArray
@@ -81,17 +82,42 @@ class DeterminantForm:
 
     def _derivative(self, b: int, spans: IntArray) -> tuple[Array, Array]:
         """Return the b-th derivative on spans (k, 3): scaled Bernstein form (3, n_0, n_1, n_2, k), sizes (3, k)."""
-        (first_u, to_u), (first_v, to_v), (first_w, to_w) = self.bases[b]
-        row, column, layer = spans.T
-        rows = (first_u[row] + np.arange(to_u.shape[1])[:, None])[:, None, None]  # (n_0, 1, 1, k)
-        columns = (first_v[column] + np.arange(to_v.shape[1])[:, None])[None, :, None]
-        layers = (first_w[layer] + np.arange(to_w.shape[1])[:, None])[None, None]
-        net = self.nets[b][:, rows, columns, layers]  # (3, n_0, n_1, n_2, k)
-        magnitudes = np.abs(net).max(axis=(1, 2, 3))
-        net = np.einsum("xik,cijlk->cxjlk", np.ascontiguousarray(np.moveaxis(to_u[row], 0, -1)), net)
-        net = np.einsum("yjk,cxjlk->cxylk", np.ascontiguousarray(np.moveaxis(to_v[column], 0, -1)), net)
-        net = np.einsum("zlk,cxylk->cxyzk", np.ascontiguousarray(np.moveaxis(to_w[layer], 0, -1)), net)
-        return net, magnitudes
+        first = np.stack([start[number] for (start, _), number in zip(self.bases[b], spans.T, strict=True)])  # (3, k)
+        net = _windows(self.nets[b], first, tuple(weights.shape[1] for _, weights in self.bases[b]))
+        magnitudes, shape = np.abs(net).max(axis=(1, 2, 3)), net.shape
+        for axis, ((_, weights), number) in enumerate(zip(self.bases[b], spans.T, strict=True)):
+            matrices = np.ascontiguousarray(np.moveaxis(weights[number], 0, -1))
+            net = _times(matrices, net.reshape(3 * int(np.prod(shape[1 : 1 + axis])), len(matrices), -1, len(spans)))
+        return net.reshape(shape), magnitudes
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _windows(net: Array, first: IntArray, sizes: tuple[int, int, int]) -> Array:
+    """Return the control points of (3, N_0, N_1, N_2) from each of the first ones (3, k) on: (3, *sizes, k)."""
+    found = np.empty((3, sizes[0], sizes[1], sizes[2], first.shape[1]))
+    for c in range(3):
+        for i in range(sizes[0]):
+            for j in range(sizes[1]):
+                for l in range(sizes[2]):
+                    row = found[c, i, j, l]
+                    for k in range(row.size):
+                        row[k] = net[c, first[0, k] + i, first[1, k] + j, first[2, k] + l]
+    return found
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _times(matrices: Array, field: Array) -> Array:
+    """Apply matrices (n, n, k), one for each place of the last axis, along the second axis of a field (a, n, b, k)."""
+    applied = np.zeros_like(field)
+    for a in range(field.shape[0]):
+        for x in range(field.shape[1]):
+            for b in range(field.shape[2]):
+                total = applied[a, x, b]
+                for i in range(field.shape[1]):
+                    factor, value = matrices[x, i], field[a, i, b]
+                    for k in range(total.size):
+                        total[k] += factor[k] * value[k]
+    return applied
 
 
 def corners_of(values: Array, first: int = 0) -> Array:

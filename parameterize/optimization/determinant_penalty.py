@@ -8,7 +8,7 @@ Few coefficients fall short of the floor. A coefficient is linear in each of the
 derivative is read from the product of the other two: one row of 3 (p + 1)^3 numbers in the span's Bezier points.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numba
 import numpy as np
@@ -39,15 +39,19 @@ class _Spans:
     weights: Array
     back: Array
 
+    def some(self, chosen: NDArray[np.bool_]) -> "_Spans":
+        """Return the chosen ones of these spans (k,)."""
+        return _Spans(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
     def bezier_points(self, control: Tensor) -> Array:
         """Return the Bezier points (k, 3, p + 1, p + 1, p + 1)."""
         points: Array = _bezier_points(np.ascontiguousarray(control.numpy()), self.first, self.weights)
-        return points.reshape(len(points), 3, *self.weights.shape[2:], -1)
+        return points.reshape(len(points), 3, *(self.weights.shape[2],) * 3)
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Coefficients below the floor, span by span: by how much (r,), and their derivatives (r, 3, p + 1, ...).
+    """Coefficients below the floor, on the spans that have some, span by span: by how much (r,), and their derivatives (r, 3, p + 1, ...).
 
     shares (r,): what the square of each costs. starts (k + 1,): the first row of each span.
     """
@@ -107,23 +111,25 @@ class SpanBarrier:
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
 
-        def part(spans: _Spans) -> tuple[float, Array]:
+        def part(spans: _Spans) -> tuple[float, IntArray, Array]:
             found = self._short_rows(control, spans)
             pull = found.shares * found.shortfall
-            return float(pull @ found.shortfall), _combine(found.rows, found.starts, -2.0 * pull, spans.back)
+            pushed = _combine(found.rows, found.starts, -2.0 * pull, found.spans.back)
+            return float(pull @ found.shortfall), found.spans.first, pushed
 
         parts = in_parallel(part, self._pieces)
-        return sum(energy for energy, _ in parts), self._collect([pushed for _, pushed in parts], control)
+        return sum(energy for energy, _, _ in parts), _collected([(first, pushed) for _, first, pushed in parts], control)
 
     def curvature(self, control: Tensor) -> Operator:
         """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
         pieces = in_parallel(lambda spans: self._short_rows(control, spans, np.float32), self._pieces)
 
-        def part(piece: _Rows, x: Tensor) -> Array:
+        def part(piece: _Rows, x: Tensor) -> tuple[IntArray, Array]:
             changes = _changes(piece.rows, piece.starts, piece.spans.bezier_points(x))
-            return np.asarray(_combine(piece.rows, piece.starts, 2.0 * piece.shares * changes, piece.spans.back))
+            pulled = _combine(piece.rows, piece.starts, 2.0 * piece.shares * changes, piece.spans.back)
+            return piece.spans.first, pulled
 
-        return lambda x: self._collect(in_parallel(lambda piece: part(piece, x), pieces), x)
+        return lambda x: _collected(in_parallel(lambda piece: part(piece, x), pieces), x)
 
     def _short_rows(self, control: Tensor, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
         """Return the coefficients that fall short on some spans."""
@@ -139,16 +145,18 @@ class SpanBarrier:
         rows = np.zeros((len(place), *np.roll(bezier.shape, 1)[1:]), dtype=dtype)
         for direction, (cross, scale) in enumerate(zip(crosses, self._scales, strict=True)):
             _add_derivatives(place, cross, scale, np.moveaxis(unscaled, -1, 0), direction, rows)
-        starts = np.searchsorted(place[:, 0], np.arange(len(spans.first) + 1))
+        counts = np.bincount(place[:, 0], minlength=len(spans.first))
+        starts = np.concatenate([[0], np.cumsum(counts[counts > 0])])
         shares = spans.shares[place[:, 0]].astype(dtype)
-        return _Rows(spans, short[tuple(place.T)], shares, rows, starts)
+        return _Rows(spans.some(counts > 0), short[tuple(place.T)], shares, rows, starts)
 
-    def _collect(self, parts: list[Array], like: Tensor) -> Tensor:
-        """Add what the pieces say of their windows (k, 3, p + 1, p + 1, p + 1), in their order."""
-        total = torch.zeros_like(like)
-        for spans, windows in zip(self._pieces, parts, strict=True):
-            _add_windows(windows, spans.first, total.numpy())
-        return total
+
+def _collected(parts: list[tuple[IntArray, Array]], like: Tensor) -> Tensor:
+    """Add windows (k, 3, p + 1, p + 1, p + 1) of control points, each from its first one (k, 3) on, in their order."""
+    total = torch.zeros_like(like)
+    for first, windows in parts:
+        _add_windows(windows, first, total.numpy())
+    return total
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
