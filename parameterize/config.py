@@ -104,14 +104,14 @@ class SplineConfig:
     firm_rounds: int = 4  # after these the surface gives way at unproved spans
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most
-    usual_steps: tuple[int, ...] = (25, 25, 12, 10, 10, 10)  # of the rounds of most runs: tells the time left
-    least_steps: int = 10  # a round: what unfolds a few spans hardly lowers the energy of the whole
+    usual_steps: tuple[int, ...] = (15, 20, 8, 6, 6, 6)  # of the rounds of most runs: tells the time left
+    least_steps: int = 6  # a round: what unfolds a few spans hardly lowers the energy of the whole
     slides: int = 2  # of the boundary parameters after each step
     relaxations: int = 1  # sweeps over the triangles that these flipped
     last_slides: int = 20  # before the boundary map is made, and again after `last_sweeps`
     last_sweeps: int = 600  # over the triangles that the last slides flipped, at most
-    first_gain: float = 4e-3  # the first round ends once a step lowers the energy by less than this share of it
-    gain: float = 5e-4  # likewise the later ones
+    first_gain: float = 8e-3  # the first round ends once a step lowers the energy by less than this share of it
+    gain: float = 7e-4  # likewise the later ones
     memory: int = 4  # differences of Newton steps from which the next place is guessed
     damping: float = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
     damping_growth: float = 3.0  # factor after each further one, and divisor after a full step
@@ -199,12 +199,16 @@ class Config:
     refinement: RefinementConfig | None = None  # the control points of `spline` are all there are where it is None
 
     def scaled(self, factor: float) -> Config:
-        """Return the same options with `factor` (at most 100) times as many steps in every stage, at least one each."""
+        """Return the same options with `factor` (at most 100) times as many steps in every stage, at least one each.
+
+        With fewer steps every shape looks hard after the first stage: none is trained longer then.
+        """
         if not 0.0 < factor <= 100.0:
             raise ValueError(f"steps factor must be positive and at most 100, got {factor}")
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
-        return replace(self, stages=stages, spline=spline)
+        train = self.train if factor >= 1.0 else replace(self.train, most_effort=1.0)
+        return replace(self, train=train, stages=stages, spline=spline)
 
     def refined(self, tolerance: float, max_control_points: int) -> Config:
         """Return the same options with knots inserted until a tolerance is met, see RefinementConfig.
@@ -240,7 +244,15 @@ PRESETS = {
     "paper": Config(
         "paper",
         NetworkConfig(width=512, modules=6),
-        TrainConfig(learning_rate=5e-4, matrix_rate=0.0, final_share=1.0, most_effort=1.0, cell=0.04, triangles=1_000_000, whiten=False),
+        TrainConfig(
+            learning_rate=5e-4,
+            matrix_rate=0.0,
+            final_share=1.0,
+            most_effort=1.0,
+            cell=0.04,
+            triangles=1_000_000,
+            whiten=False,
+        ),
         _stages((600, 400, 1000, 500, 1000)),
         SplineConfig(),
         starts=1,  # without `whiten` every start would be the same
@@ -266,7 +278,7 @@ def preset(name: str) -> Config:
     >>> import iga_nn
     >>> config = iga_nn.preset("fast").scaled(0.5).with_control_points(20)
     >>> config.spline.control_points, config.stages[0].steps
-    (20, 60)
+    (20, 30)
     """
     if name not in PRESETS:
         raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")

@@ -178,6 +178,35 @@ def test_checkpoint_of_another_run_is_refused(surface, tmp_path):
         resume(seed=1, corners=np.arange(8))
 
 
+def hard_config(easy_loss=1e-3):
+    config = tiny_config()
+    return replace(config, train=replace(config.train, easy_loss=easy_loss, most_effort=2.0))
+
+
+def test_a_hard_shape_is_trained_longer_and_an_easy_one_is_not(surface, undisturbed):
+    stages = parameterize(surface, hard_config(), seed=3, device="cpu").history["stage"]
+    counts = [(stages == stage.name).sum() for stage in tiny_config().stages]
+    assert counts == [
+        3 * STEPS[0],
+        *(2 * steps for steps in STEPS[1:]),
+    ]  # a look first, then twice the steps
+    easy = parameterize(surface, hard_config(easy_loss=1e6), seed=3, device="cpu")
+    same_result(undisturbed, easy)
+
+
+@pytest.mark.parametrize(("stage", "step"), [("S(2)", 6), ("S(2)", 10), ("cube", 12)])
+def test_a_longer_training_resumes_as_well(surface, tmp_path, stage, step):
+    def interrupt(state):
+        if (state.stage, state.step) == (stage, step):
+            raise KeyboardInterrupt
+
+    options = {"seed": 3, "device": "cpu"}
+    whole = parameterize(surface, hard_config(), **options)
+    with pytest.raises(KeyboardInterrupt):
+        parameterize(surface, hard_config(), progress=interrupt, checkpoint_dir=tmp_path, **options)
+    same_result(whole, parameterize(surface, hard_config(), checkpoint_dir=tmp_path, resume=True, **options))
+
+
 def test_given_corners_are_honoured(surface):
     points = 2.0 * turned(0.1 + 0.8 * CORNERS) + [10.0, 0.0, -3.0]
     rolled = points[[0, 2, 4, 6, 1, 3, 5, 7]]  # (u, v, w) -> (v, w, u): a third of a turn about the diagonal

@@ -131,7 +131,9 @@ def _options(argv: list[str] | None) -> Options:
         parser.error(f"{given.out}: cannot be written ({error.strerror}); --out names another folder")
     if given.first < 0:
         parser.error(f"--first {given.first}: must not be negative")
-    numbers = tuple(number for number in range(given.first, given.first + given.count) if kind_of(number) in given.kinds)
+    numbers = tuple(
+        number for number in range(given.first, given.first + given.count) if kind_of(number) in given.kinds
+    )
     return Options(numbers, mapping, given.jobs, given.out)
 
 

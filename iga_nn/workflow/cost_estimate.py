@@ -78,12 +78,13 @@ def forecast(
     points = _training_points(surface, config)
     one_pass = _pass_seconds(config, device, clock)
     product = _product_seconds(spline, clock) + CALLS * one_pass
-    once = sum(stage.steps for stage in config.stages) * TRAINING_STEP * points * one_pass
-    once += FIT * product + (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
+    once = FIT * product + (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
     step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
     low, high = (
-        once + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
-        for rounds, steps in (EASY, HARD)
+        once
+        + training * TRAINING_STEP * points * one_pass
+        + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
+        for training, (rounds, steps) in zip(_training_steps(config), (EASY, HARD), strict=True)
     )
     most = spline.control_points
     if config.refinement is not None:  # it may end with the first spline, or go on to its limit
@@ -94,6 +95,12 @@ def forecast(
     activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
     mapped = PER_CONTROL_POINT * most**3 + PER_VERTEX * vertices
     return Forecast((low, high), LIBRARIES + FIGURES + max(activations, mapped, PER_UNKNOWN * unknowns))
+
+
+def _training_steps(config: Config) -> tuple[float, float]:
+    """Return the steps of all stages for an easy surface, and for one that takes the most effort."""
+    steps, most = sum(stage.steps for stage in config.stages), config.train.most_effort
+    return steps, steps if most == 1.0 else config.stages[0].steps + most * steps
 
 
 def _growths(refinement: RefinementConfig, control_points: int) -> list[float]:

@@ -98,10 +98,10 @@ def _windows(net: Array, first: IntArray, sizes: tuple[int, int, int]) -> Array:
     for c in range(3):
         for i in range(sizes[0]):
             for j in range(sizes[1]):
-                for l in range(sizes[2]):
-                    row = found[c, i, j, l]
+                for m in range(sizes[2]):
+                    row = found[c, i, j, m]
                     for k in range(row.size):
-                        row[k] = net[c, first[0, k] + i, first[1, k] + j, first[2, k] + l]
+                        row[k] = net[c, first[0, k] + i, first[1, k] + j, first[2, k] + m]
     return found
 
 

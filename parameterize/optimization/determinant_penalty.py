@@ -51,8 +51,9 @@ class _Spans:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Coefficients below the floor, on the spans that have some, span by span: by how much (r,), and their derivatives (r, 3, p + 1, ...).
+    """Coefficients below the floor, span by span, of the spans that have some.
 
+    shortfall (r,): by how much they are below; rows (r, 3, p + 1, ...): their derivatives in the span's Bezier points.
     shares (r,): what the square of each costs. starts (k + 1,): the first row of each span.
     """
 
@@ -118,7 +119,9 @@ class SpanBarrier:
             return float(pull @ found.shortfall), found.spans.first, pushed
 
         parts = in_parallel(part, self._pieces)
-        return sum(energy for energy, _, _ in parts), _collected([(first, pushed) for _, first, pushed in parts], control)
+        return sum(energy for energy, _, _ in parts), _collected(
+            [(first, pushed) for _, first, pushed in parts], control
+        )
 
     def curvature(self, control: Tensor) -> Operator:
         """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""

@@ -51,8 +51,9 @@ class InverseMap(nn.Module):
 
     @property
     def matrices(self) -> list[Tensor]:
-        """The weights of the hidden layers."""
-        return [self.first.weight, *(module.linear.weight for module in self.residual)]
+        """Return the weights of the hidden layers."""
+        hidden = [self.first, *(module.linear for module in self.residual if isinstance(module, ResidualModule))]
+        return [layer.weight for layer in hidden]
 
     def encode(self, x: Tensor) -> Tensor:
         """Return x, sin(n k x) / (n k), cos(n k x) / (n k) for n = 1..N: (m, 3) -> (m, 6 N + 3)."""

@@ -1,0 +1,73 @@
+"""Muon for the hidden matrices, Adam for the rest, one schedule, and moments that a checkpoint brings back."""
+
+from copy import deepcopy
+from dataclasses import replace
+
+import pytest
+import torch
+
+from parameterize.config import NetworkConfig, TrainConfig
+from parameterize.training.network import InverseMap
+from parameterize.training.optimizer import TrainingOptimizer
+
+SMALL = NetworkConfig(width=16, modules=2, frequencies=3)
+
+
+def made(config=None, seed=0):
+    network = InverseMap(SMALL, torch.Generator().manual_seed(seed))
+    torch.nn.init.normal_(network.last.weight, generator=torch.Generator().manual_seed(seed))
+    return network, TrainingOptimizer(network, config or TrainConfig())
+
+
+def stepped(network, optimizer, count, share=1.0):
+    points = torch.rand(40, 3, generator=torch.Generator().manual_seed(5))
+    for _ in range(count):
+        optimizer.clear()
+        (network(points) - 2.0 * points).square().sum().backward()
+        optimizer.step(share)
+
+
+def test_steps_of_hidden_matrices_have_singular_values_that_are_alike():
+    network, optimizer = made()
+    before = network.residual[0].linear.weight.detach().clone()
+    stepped(network, optimizer, 1)
+    gradient = torch.linalg.svdvals(network.residual[0].linear.weight.grad)
+    step = torch.linalg.svdvals(network.residual[0].linear.weight.detach() - before)
+    assert gradient[0] > 10.0 * gradient[4]
+    assert step[0] < 3.0 * step[4]
+
+
+def test_every_parameter_moves_and_a_share_of_the_rate_moves_it_by_that_share():
+    moves = []
+    for share in (1.0, 0.25):
+        network, optimizer = made()
+        before = deepcopy(network)
+        stepped(network, optimizer, 1, share)
+        pairs = zip(network.parameters(), before.parameters(), strict=True)
+        moves.append([float((now - then).detach().norm()) for now, then in pairs])
+    assert min(moves[0]) > 0.0
+    assert moves[1] == pytest.approx([0.25 * move for move in moves[0]], rel=1e-2)
+
+
+def test_without_a_rate_for_matrices_adam_trains_all():
+    network, optimizer = made(replace(TrainConfig(), matrix_rate=0.0))
+    other, _ = made()
+    adam = torch.optim.Adam(other.parameters(), lr=TrainConfig().learning_rate)
+    points = torch.rand(40, 3, generator=torch.Generator().manual_seed(5))
+    stepped(network, optimizer, 3)
+    for _ in range(3):
+        adam.zero_grad()
+        (other(points) - 2.0 * points).square().sum().backward()
+        adam.step()
+    assert all(torch.equal(a, b) for a, b in zip(network.parameters(), other.parameters(), strict=True))
+
+
+def test_restored_moments_go_on_bit_for_bit():
+    network, optimizer = made()
+    stepped(network, optimizer, 5)
+    other, fresh = made(seed=1)
+    other.load_state_dict(network.state_dict())
+    fresh.restore({name: value.clone() for name, value in optimizer.tensors().items()})
+    stepped(network, optimizer, 3)
+    stepped(other, fresh, 3)
+    assert all(torch.equal(a, b) for a, b in zip(network.parameters(), other.parameters(), strict=True))
