@@ -166,7 +166,7 @@ class Trainer:
         self.network.load_state_dict(run.best)
 
     def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
-        """Take one Adam step; nothing of the state changes before the loss is known."""
+        """Take one step of the optimiser; nothing of the state changes before the loss is known."""
         self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
         optimizer.clear()
         loss, folded, terms = self.objective(stage, boundary, self.generator)
