@@ -104,7 +104,7 @@ class SplineConfig:
     firm_rounds: int = 4  # after these the surface gives way at unproved spans
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most
-    usual_steps: tuple[int, ...] = (15, 20, 8, 6, 6, 6)  # of the rounds of most runs: tells the time left
+    usual_steps: tuple[int, ...] = (18, 18, 14, 6, 6, 6)  # of the rounds of most runs: tells the time left
     least_steps: int = 6  # a round: what unfolds a few spans hardly lowers the energy of the whole
     slides: int = 2  # of the boundary parameters after each step
     relaxations: int = 1  # sweeps over the triangles that these flipped

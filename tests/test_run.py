@@ -191,10 +191,7 @@ def longer(surface):
 def test_a_hard_shape_is_trained_longer_and_an_easy_one_is_not(surface, undisturbed, longer):
     stages = longer.history["stage"]
     counts = [(stages == stage.name).sum() for stage in tiny_config().stages]
-    assert counts == [
-        3 * STEPS[0],
-        *(2 * steps for steps in STEPS[1:]),
-    ]  # a look first, then twice the steps
+    assert counts == [3 * STEPS[0], *(2 * steps for steps in STEPS[1:])]
     easy = parameterize(surface, hard_config(easy_loss=1e6), seed=3, device="cpu")
     same_result(undisturbed, easy)
 

@@ -49,12 +49,6 @@ class InverseMap(nn.Module):
         nn.init.zeros_(self.last.weight)
         nn.init.zeros_(self.last.bias)
 
-    @property
-    def matrices(self) -> list[Tensor]:
-        """Return the weights of the hidden layers."""
-        hidden = [self.first, *(module.linear for module in self.residual if isinstance(module, ResidualModule))]
-        return [layer.weight for layer in hidden]
-
     def encode(self, x: Tensor) -> Tensor:
         """Return x, sin(n k x) / (n k), cos(n k x) / (n k) for n = 1..N: (m, 3) -> (m, 6 N + 3)."""
         nk = self.multiples * self.scale  # (N,)

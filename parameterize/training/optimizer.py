@@ -17,8 +17,10 @@ class TrainingOptimizer:
     """Muon and Adam side by side, with one schedule."""
 
     def __init__(self, network: InverseMap, config: TrainConfig) -> None:
-        hidden = network.matrices if config.matrix_rate else []
-        others = [p for p in network.parameters() if all(p is not matrix for matrix in hidden)]
+        hidden, others = list[Tensor](), list[Tensor]()
+        for p in network.parameters():
+            is_hidden = config.matrix_rate > 0.0 and p.ndim == 2 and p is not network.last.weight
+            (hidden if is_hidden else others).append(p)
         self._parts: dict[str, torch.optim.Optimizer] = {"adam": torch.optim.Adam(others, lr=config.learning_rate)}
         if hidden:
             self._parts["muon"] = torch.optim.Muon(hidden, lr=config.matrix_rate, weight_decay=0.0)
