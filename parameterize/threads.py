@@ -3,8 +3,8 @@
 import functools
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any, TypeVar
 
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
@@ -20,14 +20,33 @@ def default_threads() -> int:
 
 
 def in_parallel(task: Callable[[Piece], Result], pieces: Sequence[Piece], threads: int | None = None) -> list[Result]:
-    """Run the task on every piece and return the results in their order; the first exception raised comes through."""
-    threads = threads or default_threads()
-    if threads == 1 or len(pieces) < 2:
+    """Run the task on every piece and return the results in their order; the first exception raised comes through.
+
+    The calling thread works, too: it would else wait, and small pieces are done before another thread wakes up.
+    """
+    threads = min(threads or default_threads(), len(pieces))
+    if threads < 2:
         return [task(piece) for piece in pieces]
-    return list(_pool(threads, os.getpid()).map(task, pieces))
+    results: list[Any] = [None] * len(pieces)
+    numbers = iter(range(len(pieces)))  # shared: every thread takes the next one
+
+    def work() -> None:
+        for number in numbers:
+            results[number] = task(pieces[number])
+
+    pool = _pool(threads, os.getpid())
+    helpers = [pool.submit(work) for _ in range(threads - 1)]
+    try:
+        work()
+    finally:
+        late = [helper for helper in helpers if not helper.cancel()]  # one that has not begun is not waited for
+        wait(late)
+    for helper in late:
+        helper.result()
+    return results
 
 
 @functools.cache
 def _pool(threads: int, _process: int) -> ThreadPoolExecutor:
-    """Return the threads of this process: a copy that fork makes of it has none of them."""
-    return ThreadPoolExecutor(threads)
+    """Return the further threads of this process: a copy that fork makes of it has none of them."""
+    return ThreadPoolExecutor(threads - 1)

@@ -18,14 +18,6 @@ from parameterize.run import choose_device, corner_vertices, parameterize
 from parameterize.training.trainer import start_map
 
 
-@pytest.fixture(scope="module", autouse=True)
-def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
 @pytest.fixture(scope="module")
 def surface():
     return small_surface()

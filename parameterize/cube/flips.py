@@ -1,26 +1,32 @@
 """Layout of a closed surface on the boundary of the cube: places (n, 3) of its points, orientation of its triangles."""
 
+import numba
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
 from ..config import LAYOUT, LayoutConfig
 from .cube import snap
 
+_ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
     """Return (p0 - c) . ((p1 - p0) x (p2 - p0)) of triangles (m, 3), c the cube's centre, and its rounding error: (m,).
 
     The product is positive where a triangle faces outwards, seen from the centre. On a common face of the cube two of
     the three components of the cross product vanish exactly.
     """
-    p0, p1, p2 = np.moveaxis(places[faces], 1, 0)  # (m, 3) each
-    a, b = p1 - p0, p2 - p0
-    ahead = a[:, [1, 2, 0]] * b[:, [2, 0, 1]]
-    behind = a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
-    triple = np.sum((p0 - 0.5) * (ahead - behind), axis=1)
-    noise = 8.0 * np.finfo(np.float64).eps * np.sum(np.abs(p0 - 0.5) * (np.abs(ahead) + np.abs(behind)), axis=1)
+    triple, noise = np.zeros(len(faces)), np.zeros(len(faces))
+    for t in range(len(faces)):
+        p0, p1, p2 = places[faces[t, 0]], places[faces[t, 1]], places[faces[t, 2]]
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            ahead = (p1[d] - p0[d]) * (p2[e] - p0[e])
+            behind = (p1[e] - p0[e]) * (p2[d] - p0[d])
+            triple[t] += (p0[c] - 0.5) * (ahead - behind)
+            noise[t] += _ROUNDING * abs(p0[c] - 0.5) * (abs(ahead) + abs(behind))
     return triple, noise
 
 

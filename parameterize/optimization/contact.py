@@ -18,7 +18,7 @@ from ..arrays import Array, IntArray
 from ..quality.distances import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_normals
-from .cg import Operator
+from .pieces import PiecewiseOperator
 from .sliding import SlidingParameters
 from .tensor_product import ControlRows
 
@@ -48,7 +48,7 @@ class ContactPenalty:
         shortfall = (self.gap - self.distances(control)).clamp_min(0.0)
         return self.share * float(shortfall.square().sum()), self._pull(-2.0 * self.share * shortfall, control)
 
-    def curvature(self, control: Tensor, dtype: torch.dtype) -> Operator:
+    def curvature(self, control: Tensor, dtype: torch.dtype) -> PiecewiseOperator:
         """Return the second derivative at `control` as an operator."""
         scale = 2.0 * self.share * (self.distances(control) < self.gap).to(dtype)
         first, second = self.first.to(dtype), self.second.to(dtype)
@@ -57,7 +57,7 @@ class ContactPenalty:
         def product(x: Tensor) -> Tensor:
             return single._pull(scale * single.distances(x), x)
 
-        return product
+        return PiecewiseOperator([product], lambda parts, _: parts[0])
 
     def distances(self, control: Tensor) -> Tensor:
         """Return (F(p) - F(q)) . n, negative where p lies behind the sheet of q: (k,)."""

@@ -8,6 +8,7 @@ Few coefficients fall short of the floor. A coefficient is linear in each of the
 derivative is read from the product of the other two: one row of 3 (p + 1)^3 numbers in the span's Bezier points.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numba
@@ -21,7 +22,7 @@ from ..arrays import Array, IntArray
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
 from ..threads import in_parallel
-from .cg import Operator
+from .pieces import PiecewiseOperator
 
 _BLOCK = 32  # spans at a time: what they need fits into the cache
 
@@ -42,6 +43,11 @@ class _Spans:
     def some(self, chosen: NDArray[np.bool_]) -> "_Spans":
         """Return the chosen ones of these spans (k,)."""
         return _Spans(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    def to(self, dtype: type[np.floating]) -> "_Spans":
+        """Return the same spans in another precision."""
+        volumes, shares, weights, back = (a.astype(dtype) for a in (self.volumes, self.shares, self.weights, self.back))
+        return _Spans(self.first, volumes, shares, weights, back)
 
     def bezier_points(self, control: Tensor) -> Array:
         """Return the Bezier points (k, 3, p + 1, p + 1, p + 1)."""
@@ -123,16 +129,20 @@ class SpanBarrier:
             [(first, pushed) for _, first, pushed in parts], control
         )
 
-    def curvature(self, control: Tensor) -> Operator:
+    def curvature(self, control: Tensor) -> PiecewiseOperator:
         """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
-        pieces = in_parallel(lambda spans: self._short_rows(control, spans, np.float32), self._pieces)
 
-        def part(piece: _Rows, x: Tensor) -> tuple[IntArray, Array]:
-            changes = _changes(piece.rows, piece.starts, piece.spans.bezier_points(x))
-            pulled = _combine(piece.rows, piece.starts, 2.0 * piece.shares * changes, piece.spans.back)
-            return piece.spans.first, pulled
+        def piece(spans: _Spans) -> Callable[[Tensor], tuple[IntArray, Array]]:
+            found = self._short_rows(control, spans, np.float32)
+            near = found.spans.to(np.float32)
 
-        return lambda x: _collected(in_parallel(lambda piece: part(piece, x), pieces), x)
+            def product(x: Tensor) -> tuple[IntArray, Array]:
+                rows, shares = (found.rows, found.starts), 2.0 * found.shares
+                return near.first, _squared(x.numpy(), near.first, near.weights, near.back, *rows, shares)
+
+            return product
+
+        return PiecewiseOperator(in_parallel(piece, self._pieces), _collected)
 
     def _short_rows(self, control: Tensor, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
         """Return the coefficients that fall short on some spans."""
@@ -241,6 +251,15 @@ def _combine(rows: Array, starts: IntArray, factors: Array, back: Array) -> Arra
         for c in range(3):
             _along_axes(windows[s, c], back[s, 0], back[s, 1], back[s, 2])
     return windows.reshape(spans, 3, n, n, n)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _squared(
+    control: Array, first: IntArray, weights: Array, back: Array, rows: Array, starts: IntArray, shares: Array
+) -> Array:
+    """Multiply control points by the rows of each span, their shares (r,) and the rows' transpose: as `_combine`."""
+    changes = _changes(rows, starts, _bezier_points(control, first, weights))
+    return _combine(rows, starts, shares * changes, back)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -1,5 +1,7 @@
 """Distortion of a spline map, with a penalty on det J at the quadrature points."""
 
+from collections.abc import Callable
+
 import numba
 import numpy as np
 import torch
@@ -8,13 +10,11 @@ from torch import Tensor
 from ..arrays import Array
 from ..config import SplineConfig
 from ..threads import in_parallel
-from .cg import Operator
+from .pieces import PiecewiseOperator
 from .polar import closest_rotation, cofactor_and_determinant, least_eigenvalue
-from .tensor_product import GaussGrid
+from .tensor_product import SYMMETRIC, GaussGrid
 
 _LEAST_DET = 0.03  # in the metric of the damping
-_BLOCK = 256  # points at a time: their matrices stay in the cache
-_ENTRY = np.array([[max(a, b) * (max(a, b) + 1) // 2 + min(a, b) for b in range(9)] for a in range(9)])
 
 
 class DistortionEnergy:
@@ -58,7 +58,7 @@ class DistortionEnergy:
         energies, folded, pulled = zip(*in_parallel(part, self._grid.planes()), strict=True)
         return sum(energies), self._grid.collect(list(pulled), control), sum(folded)
 
-    def curvature(self, control: Tensor, penalty: float, damping: float = 0.0) -> Operator:
+    def curvature(self, control: Tensor, penalty: float, damping: float = 0.0) -> PiecewiseOperator:
         """Return a positive semidefinite second derivative at `control`, as an operator in single precision.
 
         damping: times the squared change of J relative to J, to be added: det J bends most where it is small.
@@ -69,7 +69,7 @@ class DistortionEnergy:
         """
         rough, config = control.float(), self._config
 
-        def matrices(planes: slice) -> tuple[slice, Array]:
+        def piece(planes: slice) -> Callable[[Tensor], tuple[int, Array]]:
             jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).float()
             rotation = closest_rotation(jacobian)
             cofactors, det = cofactor_and_determinant(jacobian)
@@ -80,20 +80,9 @@ class DistortionEnergy:
             scale = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess)
             held = 2.0 * damping * weights * _relative(cofactors, det)
             parts = rotation, _turning(rotation, jacobian), pull.flatten(0, 1), push.flatten(0, 1), scale, held
-            return planes, _matrices(*(p.contiguous().numpy() for p in parts))
+            return self._grid.squared(_matrices(*(p.contiguous().numpy() for p in parts)), planes)
 
-        pieces = in_parallel(matrices, self._grid.planes())
-
-        def product(x: Tensor) -> Tensor:
-            def part(piece: tuple[slice, Array]) -> tuple[int, Array]:
-                planes, matrix = piece
-                change = self._grid.jacobian(x, planes)
-                dual = _times_matrices(matrix, change.numpy().reshape(9, -1))
-                return self._grid.adjoint(torch.from_numpy(dual.reshape(change.shape)), planes)
-
-            return self._grid.collect(in_parallel(part, pieces), x)
-
-        return product
+        return PiecewiseOperator(in_parallel(piece, self._grid.planes()), self._grid.collect)
 
     def _weights(self, planes: slice) -> Tensor:
         return torch.from_numpy(self._grid.weights[planes].ravel())
@@ -120,7 +109,7 @@ def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale: Array, held: Array) -> Array:
-    """Return the symmetric matrices of the second derivative in the nine entries of J: (45, m), see _ENTRY.
+    """Return the symmetric matrices of the second derivative in the nine entries of J: (45, m), see SYMMETRIC.
 
     scale (I - B softness B^T) + pull pull^T + push push^T + held I; B^T d is the sum of R_k x d_k over the rows k.
     """
@@ -138,24 +127,9 @@ def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale:
                 soft[a, s, i] = softness[s, before, i] * turn[a, before, i]
                 soft[a, s, i] += softness[s, behind, i] * turn[a, behind, i]
         for b in range(a + 1):
-            row = out[_ENTRY[a, b]]
+            row = out[SYMMETRIC[a, b]]
             for i in range(m):
                 turned = soft[a, 0, i] * turn[b, 0, i] + soft[a, 1, i] * turn[b, 1, i] + soft[a, 2, i] * turn[b, 2, i]
                 row[i] = scale[i] * ((a == b) - turned) + pull[a, i] * pull[b, i] + push[a, i] * push[b, i]
                 row[i] += (a == b) * held[i]
-    return out
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _times_matrices(matrices: Array, vectors: Array) -> Array:
-    """Multiply symmetric matrices, entries (45,) above m points, by vectors (9, m)."""
-    out = np.zeros_like(vectors)
-    for begin in range(0, vectors.shape[1], _BLOCK):
-        end = begin + _BLOCK
-        for a in range(9):
-            total = out[a, begin:end]
-            for b in range(9):
-                entries, vector = matrices[_ENTRY[a, b], begin:end], vectors[b, begin:end]
-                for i in range(total.size):
-                    total[i] += entries[i] * vector[i]
     return out

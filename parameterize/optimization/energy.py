@@ -17,8 +17,9 @@ from .determinant_penalty import SpanBarrier
 from .distortion import DistortionEnergy
 from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
+from .pieces import weighted_sum
 from .surface_distance import SurfaceFit
-from .tensor_product import BendingOperator, grams
+from .tensor_product import bending_operator, grams
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
 Knots = tuple[Array, Array, Array]
@@ -36,8 +37,9 @@ class SplineEnergy:
         self.penalty = config.penalties[0]
         self._distortion = DistortionEnergy(knots, config)
         mass, slope, curve = grams(knots, config.degree)
-        self._bending = BendingOperator(mass, slope, curve, 2.0 * config.fairness)
-        self._rough_bending = self._bending.to(_ROUGH)
+        self._bending, self._rough_bending = (
+            bending_operator(mass, slope, curve, 2.0 * config.fairness, dtype) for dtype in (torch.float64, _ROUGH)
+        )
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient)
         rough = tuple(2.0 * k + 2.0 * config.fairness * h for k, h in zip(slope, curve, strict=True))
         for matrix in rough:
@@ -112,16 +114,19 @@ class SplineEnergy:
         surface, anchors = self.surface.hessian(_ROUGH), self.anchors.fit.hessian(_ROUGH)
         distortion = self._distortion.curvature(control, self.penalty, damping)
         barrier = self.barrier.curvature(control)
-        facing = torch.zeros_like if self._facing is None else self._facing.curvature(control, _ROUGH)
-        contact = torch.zeros_like if self._contact is None else self._contact.curvature(control, _ROUGH)
-
-        def hessian(x: Tensor) -> Tensor:
-            inner = distortion(x) + self._rough_bending(x) + self.penalty * (barrier(x) + facing(x))
-            outer = surface(x) + config.anchors * anchors(x) + config.contact * contact(x)
-            return inner + config.vertex * outer
-
+        terms = [
+            (1.0, distortion),
+            (1.0, self._rough_bending),
+            (self.penalty, barrier),
+            (config.vertex, surface),
+            (config.vertex * config.anchors, anchors),
+        ]
+        if self._facing is not None:
+            terms.append((self.penalty, self._facing.curvature(control, _ROUGH)))
+        if self._contact is not None:
+            terms.append((config.vertex * config.contact, self._contact.curvature(control, _ROUGH)))
         direction, _ = conjugate_gradients(
-            hessian,
+            weighted_sum(terms),
             right.to(_ROUGH),
             self._precondition,
             tolerance=config.tolerance,

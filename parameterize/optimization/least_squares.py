@@ -8,7 +8,8 @@ from torch import Tensor
 from ..arrays import Array
 from ..spline.bspline import basis_derivatives, sparse_rows, window_numbers
 from .cg import FastDiagonalization, conjugate_gradients
-from .tensor_product import BendingOperator, ControlRows, grams
+from .pieces import weighted_sum
+from .tensor_product import ControlRows, bending_operator, grams
 
 
 def fit_pairs(
@@ -26,16 +27,13 @@ def fit_pairs(
     least squares on G(F(x)) = x. Where no sample lies, the smoothing term alone decides.
     """
     rows = ControlRows.of(_collocation_3d(parameters, knots, degree))
-    scale = torch.as_tensor(weights)[:, None]
     mass, slope, curve = grams(knots, degree)
-    smooth = BendingOperator(mass, slope, curve, fairness)
+    smooth = bending_operator(mass, slope, curve, fairness)
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
     shape = (3, *(len(k) - degree - 1 for k in knots))
 
-    def operator(x: Tensor) -> Tensor:
-        return rows.adjoint(scale * rows(x), x) + smooth(x)
-
-    right = rows.adjoint(scale * torch.as_tensor(points), torch.zeros(shape))
+    operator = weighted_sum([(1.0, rows.squared(weights[:, None, None] * np.eye(3))), (1.0, smooth)])
+    right = rows.adjoint(torch.as_tensor(weights[:, None] * points), torch.zeros(shape))
     control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
     return control
 

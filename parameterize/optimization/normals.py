@@ -13,7 +13,7 @@ from torch import Tensor
 
 from ..cube.cube import axis_and_side
 from ..spline.bspline import sparse_rows
-from .cg import Operator
+from .pieces import PiecewiseOperator
 from .polar import cross
 from .surface_distance import SurfaceFit
 from .tensor_product import ControlRows
@@ -39,7 +39,7 @@ class FacingPenalty:
         gradient = self._pull(-2.0 * self.weights * shortfall, by_a, by_b, control)
         return float(self.weights @ shortfall.square()), gradient
 
-    def curvature(self, control: Tensor, dtype: torch.dtype) -> Operator:
+    def curvature(self, control: Tensor, dtype: torch.dtype) -> PiecewiseOperator:
         """Return the Gauss-Newton part of the second derivative at `control`."""
         single = self._to(dtype)
         by_a, by_b, size = single._slopes(control.to(dtype))
@@ -49,7 +49,7 @@ class FacingPenalty:
             a, b = (rows(x).T for rows in single.tangents)
             return single._pull(scale * ((by_a * a).sum(0) + (by_b * b).sum(0)), by_a, by_b, x)
 
-        return product
+        return PiecewiseOperator([product], lambda parts, _: parts[0])
 
     def _slopes(self, control: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return (t_a x t_b) . n, last, after its derivatives in t_a and t_b: (3, k) each."""

@@ -135,17 +135,23 @@ class SlidingParameters:
         self._keep(places, nearest_faces(places), moved)
 
     def _keep(self, parameters: Array, cube_faces: IntArray, chosen: NDArray[np.bool_]) -> None:
-        """Take these parameters for the chosen points."""
+        """Take these parameters for the chosen points; the basis functions of the others need not be found again."""
+        known = self.window
         self.place(
             np.where(chosen[:, None], parameters, self.parameters), np.where(chosen, cube_faces, self.cube_faces)
         )
+        self.window = known.with_points(chosen, self._window(parameters[chosen], cube_faces[chosen]))
 
     @cached_property
     def window(self) -> "FaceWindow":
         """The basis functions that are not zero at the points."""
-        knots, parameters, faces = tuple(self.knots), self.parameters, self.cube_faces
-        pieces = [slice(begin, begin + _POINTS) for begin in range(0, max(len(faces), 1), _POINTS)]
-        found = in_parallel(lambda piece: _face_windows(knots, self.degree, parameters[piece], faces[piece]), pieces)
+        return self._window(self.parameters, self.cube_faces)
+
+    def _window(self, parameters: Array, faces: IntArray) -> "FaceWindow":
+        knots = tuple(self.knots)
+        found = in_parallel(
+            lambda piece: _face_windows(knots, self.degree, parameters[piece], faces[piece]), _pieces(len(faces))
+        )
         return FaceWindow(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
     @cached_property
@@ -169,8 +175,20 @@ class FaceWindow:
 
     def derivatives(self, control: Tensor) -> tuple[Array, Array, Array]:
         """Return F and its tangents t_a and t_b at the points: (N, 3) each."""
-        value, along_a, along_b = _tangents(self.indices, self.in_a, self.in_b, control.reshape(3, -1).numpy())
+        flat, windows = control.reshape(3, -1).numpy(), (self.indices, self.in_a, self.in_b)
+        found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), _pieces(len(self.indices)))
+        value, along_a, along_b = np.concatenate(found, axis=1)
         return value, along_a, along_b
+
+    def with_points(self, chosen: NDArray[np.bool_], other: "FaceWindow") -> "FaceWindow":
+        """Return this window with the chosen points (N,) replaced by those of another one."""
+        replaced = FaceWindow(self.indices.copy(), self.in_a.copy(), self.in_b.copy())
+        replaced.indices[chosen], replaced.in_a[chosen], replaced.in_b[chosen] = other.indices, other.in_a, other.in_b
+        return replaced
+
+
+def _pieces(points: int) -> list[slice]:
+    return [slice(begin, begin + _POINTS) for begin in range(0, max(points, 1), _POINTS)]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ..arrays import Array
 from ..surface.geometry import vertex_normals
-from .cg import Operator
+from .pieces import PiecewiseOperator
 from .sliding import SlidingParameters
 
 
@@ -62,10 +62,10 @@ class SurfaceFit:
         pulled = (self._metric @ residual[:, :, None])[:, :, 0]
         return float((residual * pulled).sum()), 2.0 * self.places.rows.adjoint(pulled, control)
 
-    def hessian(self, dtype: torch.dtype) -> Operator:
+    def hessian(self, dtype: torch.dtype) -> PiecewiseOperator:
         """Return the second derivative of the energy, parameters held, as an operator on (3, n_u, n_v, n_w)."""
         rows, metric = self.places.rows.to(dtype), 2.0 * self._metric.to(dtype)
-        return lambda direction: rows.squared(metric.numpy(), direction)
+        return rows.squared(metric.numpy())
 
     def residuals(self, control: Tensor) -> Array:
         """Return F(p) - v: (N, 3)."""

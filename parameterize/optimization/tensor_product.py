@@ -4,7 +4,9 @@ Control points are held as (3, n_u, n_v, n_w), component first. Pieces of work r
 added in their order, so that the number of threads changes no bit.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numba
@@ -16,10 +18,14 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..spline.bspline import collocation, gauss_points
 from ..threads import in_parallel
+from .pieces import PiecewiseOperator
 
 _END_SPANS = 1
 _ROWS = 4096  # of a sparse matrix in a piece of work
 _PLANES = 4  # of quadrature points in one
+_POINTS = 256  # at a time: their matrices stay in the cache
+# Where entry (a, b) of symmetric 9 x 9 matrices stands among their 45 different ones.
+SYMMETRIC = np.array([[max(a, b) * (max(a, b) + 1) // 2 + min(a, b) for b in range(9)] for a in range(9)])
 
 
 def along(matrix: Tensor, field: Tensor, axis: int) -> Tensor:
@@ -60,18 +66,25 @@ class ControlRows:
         """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
         flat, count = np.ascontiguousarray(dual.numpy()), like.numel() // 3
         found = in_parallel(lambda piece: _spread(piece, self.columns, self.values, flat, count), self._pieces())
-        return torch.from_numpy(sum(found[1:], start=found[0])).view(like.shape)
+        return _summed(found, like)
 
-    def squared(self, metric: Array, field: Tensor) -> Tensor:
-        """Apply the rows, matrices (N, 3, 3) on what they yield, and the transpose of the rows."""
-        flat = field.reshape(3, -1).numpy()
-        found = in_parallel(lambda piece: _squared(piece, self.columns, self.values, metric, flat), self._pieces())
-        return torch.from_numpy(sum(found[1:], start=found[0])).view(field.shape)
+    def squared(self, metric: Array) -> PiecewiseOperator:
+        """Return the rows, then matrices (N, 3, 3) on what they yield, then the transpose of the rows."""
+
+        def product(piece: tuple[int, IntArray], field: Tensor) -> Array:
+            return _squared(piece, self.columns, self.values, metric, field.reshape(3, -1).numpy())
+
+        return PiecewiseOperator([partial(product, piece) for piece in self._pieces()], _summed)
 
     def _pieces(self) -> list[tuple[int, IntArray]]:
         """Return where the rows of each piece lie: the number of the first, and its entries' places (m + 1,)."""
         count = max(len(self.starts) - 1, 1)
         return [(begin, self.starts[begin : begin + _ROWS + 1]) for begin in range(0, count, _ROWS)]
+
+
+def _summed(parts: list[Array], like: Tensor) -> Tensor:
+    """Add parts (3, n), in their order, to control points of the shape of `like`."""
+    return torch.from_numpy(sum(parts[1:], start=parts[0])).view(like.shape)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -104,17 +117,25 @@ def _spread(piece: tuple[int, IntArray], columns: IntArray, values: Array, dual:
 def _squared(piece: tuple[int, IntArray], columns: IntArray, values: Array, metric: Array, field: Array) -> Array:
     """Multiply the transpose of some rows by metrics (N, 3, 3) times the rows times a field (3, n): (3, n)."""
     begin, starts = piece
-    out, at = np.zeros_like(field), np.empty(3, field.dtype)
+    out, zero = np.zeros_like(field), field.dtype.type(0.0)
     for row in range(len(starts) - 1):
-        for c in range(3):
-            at[c] = 0.0
-            for entry in range(starts[row], starts[row + 1]):
-                at[c] += values[entry] * field[c, columns[entry]]
-        for c in range(3):
-            m = metric[begin + row, c]
-            pulled = m[0] * at[0] + m[1] * at[1] + m[2] * at[2]
-            for entry in range(starts[row], starts[row + 1]):
-                out[c, columns[entry]] += values[entry] * pulled
+        x, y, z = zero, zero, zero
+        for entry in range(starts[row], starts[row + 1]):
+            column, value = columns[entry], values[entry]
+            x += value * field[0, column]
+            y += value * field[1, column]
+            z += value * field[2, column]
+        m = metric[begin + row]
+        x, y, z = (
+            m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
+            m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
+            m[2, 0] * x + m[2, 1] * y + m[2, 2] * z,
+        )
+        for entry in range(starts[row], starts[row + 1]):
+            column, value = columns[entry], values[entry]
+            out[0, column] += value * x
+            out[1, column] += value * y
+            out[2, column] += value * z
     return out
 
 
@@ -156,17 +177,27 @@ class GaussGrid:
     def jacobian(self, control: Tensor, planes: slice) -> Tensor:
         """Return J (component, direction, point) on some planes: (3, n_u, n_v, n_w) -> (3, 3, m)."""
         field = np.ascontiguousarray(control.numpy())
-        (first, values, slopes), *across = self._bands[field.dtype][0]
-        band = first[planes], values[planes], slopes[planes]
-        return torch.from_numpy(_jacobian((band, *across), field))
+        return torch.from_numpy(_jacobian(self._forward(planes, field.dtype), field))
 
     def adjoint(self, dual: Tensor, planes: slice) -> tuple[int, Array]:
         """Apply the transpose of `jacobian`: the first layer of control points, and what all layers get from it."""
         field = np.ascontiguousarray(dual.numpy())
-        forward, (_, *across) = self._bands[field.dtype]
-        first, values, slopes = (part[planes] for part in forward[0])
-        band = first - first[0], values, slopes
-        return int(first[0]), _jacobian_adjoint((band, *across), field)
+        layer, backward = self._backward(planes, field.dtype)
+        return layer, _jacobian_adjoint(backward, field)
+
+    def squared(self, matrices: Array, planes: slice) -> Callable[[Tensor], tuple[int, Array]]:
+        """Return `jacobian`, then symmetric matrices (45, m) on its nine entries, see SYMMETRIC, then `adjoint`."""
+        forward, (layer, backward) = self._forward(planes, matrices.dtype), self._backward(planes, matrices.dtype)
+        return lambda control: (layer, _squared_jacobian(forward, backward, matrices, control.numpy()))
+
+    def _forward(self, planes: slice, dtype: Any) -> tuple[Band, ...]:
+        (first, values, slopes), *across = self._bands[dtype][0]
+        return (first[planes], values[planes], slopes[planes]), *across
+
+    def _backward(self, planes: slice, dtype: Any) -> tuple[int, tuple[Band, ...]]:
+        """Return the first layer of control points of these planes, and the bands that lead there from it on."""
+        (first, values, slopes), *_ = self._forward(planes, dtype)
+        return int(first[0]), ((first - first[0], values, slopes), *self._bands[dtype][1][1:])
 
     def collect(self, parts: list[tuple[int, Array]], like: Tensor) -> Tensor:
         """Add what the pieces of work give to the layers of control points, in their order."""
@@ -255,6 +286,31 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
     return out
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _times_matrices(matrices: Array, vectors: Array) -> Array:
+    """Multiply symmetric matrices, entries (45,) above m points, by vectors (9, m)."""
+    out = np.zeros_like(vectors)
+    for begin in range(0, vectors.shape[1], _POINTS):
+        end = begin + _POINTS
+        for a in range(9):
+            total = out[a, begin:end]
+            for b in range(9):
+                entries, vector = matrices[SYMMETRIC[a, b], begin:end], vectors[b, begin:end]
+                for i in range(total.size):
+                    total[i] += entries[i] * vector[i]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _squared_jacobian(
+    forward: tuple[Band, Band, Band], backward: tuple[Band, Band, Band], matrices: Array, control: Array
+) -> Array:
+    """Apply `_jacobian`, symmetric matrices (45, points) and `_jacobian_adjoint`: all layers (3, layers, n_v, n_w)."""
+    change = _jacobian(forward, control)
+    dual = _times_matrices(matrices, change.reshape(9, change.shape[2]))
+    return _jacobian_adjoint(backward, dual.reshape(change.shape))
+
+
 def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
     """Return Gauss points and weights (m,): `outer` on the first and last span, `inner` on the others."""
     fine, coarse = gauss_points(knots, outer), gauss_points(knots, inner)
@@ -279,30 +335,25 @@ def grams(knots: tuple[Array, ...], degree: int) -> list[tuple[Tensor, ...]]:
     return [tuple(gram(k, degree, d) for k in knots) for d in range(3)]
 
 
-@dataclass(frozen=True, eq=False)
-class BendingOperator:
-    """x -> weight * H x with x^T H x = int |Hessian F|^2 (exact)."""
+def bending_operator(
+    mass: tuple[Tensor, ...],
+    slope: tuple[Tensor, ...],
+    curve: tuple[Tensor, ...],
+    weight: float,
+    dtype: torch.dtype = torch.float64,
+) -> PiecewiseOperator:
+    """Return x -> weight * H x with x^T H x = int |Hessian F|^2 (exact); a piece of work is one component of F."""
+    m0, m1, m2 = (m.to(dtype) for m in mass)
+    k0, k1, k2 = (k.to(dtype) for k in slope)
+    h0, h1, h2 = (h.to(dtype) for h in curve)
 
-    mass: tuple[Tensor, ...]
-    slope: tuple[Tensor, ...]
-    curve: tuple[Tensor, ...]
-    weight: float
-
-    def to(self, dtype: torch.dtype) -> "BendingOperator":
-        """Return the same in another precision."""
-        mass, slope, curve = (tuple(m.to(dtype) for m in part) for part in (self.mass, self.slope, self.curve))
-        return BendingOperator(mass, slope, curve, self.weight)
-
-    def __call__(self, x: Tensor) -> Tensor:
-        """Apply the operator: (3, n_u, n_v, n_w) -> the same shape."""
-        return torch.cat(in_parallel(self._bend, torch.split(x, 1)))
-
-    def _bend(self, x: Tensor) -> Tensor:
-        """Apply it to one component (1, n_u, n_v, n_w)."""
-        (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = self.mass, self.slope, self.curve
+    def bend(component: int, control: Tensor) -> Tensor:
+        x = control[component : component + 1]
         xm, xk, xh = along(m2, x, 3), along(k2, x, 3), along(h2, x, 3)
         mm = along(m1, xm, 2)
         first = along(k1, xm, 2) + along(m1, xk, 2)
         second = along(h1, xm, 2) + along(m1, xh, 2) + 2.0 * along(k1, xk, 2)
-        result = along(self.weight * h0, mm, 1) + along(m0, self.weight * second, 1)
-        return result + along(2.0 * self.weight * k0, first, 1)
+        result = along(weight * h0, mm, 1) + along(m0, weight * second, 1)
+        return result + along(2.0 * weight * k0, first, 1)
+
+    return PiecewiseOperator([partial(bend, component) for component in range(3)], lambda parts, _: torch.cat(parts))

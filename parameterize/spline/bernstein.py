@@ -63,10 +63,11 @@ def add_products(a: Array, b: Array, sign: float, out: Array) -> None:
                                 total[k] += sign * left[k] * right[k]
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def cross_products(a: Array, b: Array) -> Array:
     """Return the cross products of vectors (3, n_0, n_1, n_2, k) and (3, m_0, m_1, m_2, k) in scaled Bernstein form."""
-    sizes = (n + m - 1 for n, m in zip(a.shape[1:4], b.shape[1:4], strict=True))
-    products = np.zeros((3, *sizes, a.shape[4]))
+    n_0, n_1, n_2 = a.shape[1] + b.shape[1] - 1, a.shape[2] + b.shape[2] - 1, a.shape[3] + b.shape[3] - 1
+    products = np.zeros((3, n_0, n_1, n_2, a.shape[4]))
     for c in range(3):
         add_products(a[(c + 1) % 3], b[(c + 2) % 3], 1.0, products[c])
         add_products(a[(c + 2) % 3], b[(c + 1) % 3], -1.0, products[c])

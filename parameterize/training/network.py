@@ -9,7 +9,8 @@ from torch import Tensor, nn
 from ..config import NetworkConfig
 from ..threads import in_parallel
 
-_PIECE = 1024  # points that a thread takes at a time
+_PIECE = 1024  # points that a thread takes at a time, at most
+_SHARES = 4  # their number is a multiple of this, so that as many threads end together
 
 
 class ResidualModule(nn.Module):
@@ -75,14 +76,14 @@ class _InPieces(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, network: nn.Module, points: Tensor, *parameters: Tensor) -> Tensor:
         """Map the points and keep what the way back needs."""
-        size = _PIECE if points.device.type == "cpu" else len(points)
+        count = _SHARES * -(-len(points) // (_SHARES * _PIECE)) if points.device.type == "cpu" else 1
 
         def part(piece: Tensor) -> Tensor:
             with torch.enable_grad():
                 mapped: Tensor = network(piece)
             return mapped
 
-        ctx.pieces, ctx.parameters = in_parallel(part, torch.split(points, size)), parameters
+        ctx.pieces, ctx.parameters = in_parallel(part, torch.tensor_split(points, count)), parameters
         return torch.cat([piece.detach() for piece in ctx.pieces])
 
     @staticmethod
