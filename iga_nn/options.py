@@ -6,6 +6,7 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, fields
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
@@ -90,6 +91,7 @@ class MapOptions(SurfaceOptions):
         """Return the configuration of these options. Raises InputError for values that cannot be run."""
         from parameterize.config import preset
 
+        self._check_kinds()
         if self.seed < 0:
             raise InputError(f"seed {self.seed}: must not be negative")
         if not 0.0 < self.steps_factor <= MAX_STEPS_FACTOR:
@@ -104,6 +106,17 @@ class MapOptions(SurfaceOptions):
                 if getattr(self, name) != getattr(MapOptions, name):
                     raise InputError(f"{name.replace('_', ' ')}: has a meaning with --control-points auto alone")
             return config.with_control_points(self.control_points)
+
+    def _check_kinds(self) -> None:
+        """Raise InputError for values of another kind, which the command line refuses before."""
+        counts = ["seed", "max_control_points", *(["control_points"] if self.control_points != "auto" else [])]
+        for names, kind, words in (
+            (counts, Integral, "a whole number"),
+            (["steps_factor", "tolerance"], Real, "a number"),
+        ):
+            for name in names:
+                if not isinstance(value := getattr(self, name), kind) or isinstance(value, bool):
+                    raise InputError(f"{name.replace('_', ' ')}: must be {words}, got {value!r:.80}")
 
     @property
     def most_control_points(self) -> int:

@@ -6,6 +6,7 @@ Lengths are in units of the domain scaled to volume 1. Loss weights are those of
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Literal
 
 Target = Literal["S(2)", "S(1)", "cube"]
@@ -106,12 +107,12 @@ class SplineConfig:
     steps: int = 60  # a round, at most
     usual_steps: tuple[int, ...] = (18, 18, 14, 6, 6, 6)  # of the rounds of most runs: tells the time left
     least_steps: int = 6  # a round: what unfolds a few spans hardly lowers the energy of the whole
-    slides: int = 2  # of the boundary parameters after each step
+    slides: int = 3  # of the boundary parameters after each step
     relaxations: int = 1  # sweeps over the triangles that these flipped
     last_slides: int = 20  # before the boundary map is made, and again after `last_sweeps`
     last_sweeps: int = 600  # over the triangles that the last slides flipped, at most
     first_gain: float = 8e-3  # the first round ends once a step lowers the energy by less than this share of it
-    gain: float = 7e-4  # likewise the later ones
+    gain: float = 5e-4  # likewise the later ones
     memory: int = 4  # differences of Newton steps from which the next place is guessed
     damping: float = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
     damping_growth: float = 3.0  # factor after each further one, and divisor after a full step
@@ -223,7 +224,10 @@ class Config:
         return replace(self, refinement=RefinementConfig(tolerance, max_control_points))
 
     def with_control_points(self, n: int) -> Config:
-        """Return the same options with n x n x n control points."""
+        """Return the same options with n x n x n control points. Raises ValueError for too few, or no whole number."""
+        if not isinstance(n, Integral) or n <= self.spline.degree:
+            fewest = self.spline.degree + 1
+            raise ValueError(f"degree {self.spline.degree} needs at least {fewest} control points, got {n!r:.80}")
         return replace(self, spline=replace(self.spline, control_points=n))
 
 

@@ -105,10 +105,11 @@ def convergence(
     >>> [row.report.dofs for row in rows], round(rows[-1].rate_l2)
     ([125, 343, 1331], 4)
     """
-    if not isinstance(refine, Iterable):
+    levels = list(refine) if isinstance(refine, Iterable) else []
+    if not levels:
         raise ValueError(f"refine must be levels such as range(3), got {refine!r:.80}")
     solve = partial(solve_problem, volume, problem, degree=degree, certified=certified, tolerance=tolerance)
-    reports = [solve(refine=level).report for level in refine]
+    reports = [solve(refine=level).report for level in levels]
     found = rates(reports)
     l2, h1 = ([None, *found.get(name, [None] * len(reports))] for name in ("l2", "h1"))
     return Convergence(ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports))

@@ -6,8 +6,8 @@ import torch
 from volumes import bent, mapped
 
 from parameterize.certificate.boundary import check_boundary
-from parameterize.optimization.cg import conjugate_gradients
 from parameterize.optimization.contact import contact_penalty
+from parameterize.optimization.operators import conjugate_gradients
 
 GAP = 1e-3
 TURNS = 1.5

@@ -3,9 +3,9 @@ import pytest
 import torch
 
 from parameterize.optimization.normals import FacingPenalty, facing_penalty
+from parameterize.optimization.operators import ControlRows
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
-from parameterize.optimization.tensor_product import ControlRows
 from parameterize.spline.bspline import greville, open_uniform_knots, sparse_rows
 from parameterize.surface.geometry import vertex_normals
 

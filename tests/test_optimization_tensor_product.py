@@ -3,9 +3,9 @@ import pytest
 import torch
 from scipy.sparse import csr_array
 
-from parameterize.optimization.cg import FastDiagonalization, conjugate_gradients
+from parameterize.optimization.operators import ControlRows, conjugate_gradients
 from parameterize.optimization.tensor_product import (
-    ControlRows,
+    FastDiagonalization,
     GaussGrid,
     along,
     bending_operator,

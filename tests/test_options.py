@@ -52,6 +52,9 @@ def test_auto_takes_its_limits_to_the_map():
         ({"control_points": "auto", "max_control_points": 101}, "max control points 101: at least 30, at most 100"),
         ({"control_points": 3}, "control points 3: at least 4, at most 100"),
         ({"tolerance": 1e-3}, "tolerance: has a meaning with --control-points auto alone"),
+        ({"control_points": "many"}, "control points: must be a whole number, got 'many'"),
+        ({"seed": True}, "seed: must be a whole number, got True"),
+        ({"steps_factor": None}, "steps factor: must be a number, got None"),
         ({"max_control_points": 40}, "max control points: has a meaning with --control-points auto alone"),
     ],
 )

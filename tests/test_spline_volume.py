@@ -47,6 +47,14 @@ def test_jacobian_and_hessian_agree_with_differences():
     np.testing.assert_array_equal(hessian, np.swapaxes(hessian, 2, 3))
 
 
+def test_points_outside_of_the_cube_are_refused():
+    volume = make_volume()
+    assert np.isfinite(volume([[1.0 + 1e-12, 0.0, 0.5]])).all()
+    for outside in ([1.5, 0.0, 0.0], [0.0, -1e-6, 0.0]):
+        with pytest.raises(ValueError, match="points are parameters from 0 to 1"):
+            volume([[0.5, 0.5, 0.5], outside])
+
+
 def test_grid_agrees_with_points():
     volume = make_volume()
     u, v, w = np.linspace(0, 1, 4), np.array([0.3]), np.linspace(0.1, 0.9, 3)

@@ -43,6 +43,12 @@ def test_full_order_on_the_cube(degree):
     assert rows[2].rate_h1 == pytest.approx(degree, abs=0.1)
 
 
+@pytest.mark.parametrize("refine", [[], 2])
+def test_a_study_without_levels_is_refused(refine):
+    with pytest.raises(ValueError, match="refine must be levels such as"):
+        convergence(benchmark_volume(2), WAVE, refine=refine)
+
+
 @pytest.mark.parametrize(("degree", "tolerance"), [(2, 0.1), (3, 0.1), (4, 0.1)])
 def test_full_order_on_the_twisted_map(degree, tolerance):
     """The n = 4 tricubic map refined exactly to 8, 16, 32 elements; degree 4 keeps it C^2 at its own knots."""

@@ -18,12 +18,12 @@ from ..arrays import Array, IntArray
 from ..quality.distances import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_normals
-from .pieces import PiecewiseOperator
+from .operators import ControlRows, PiecewiseOperator
 from .sliding import SlidingParameters
-from .tensor_product import ControlRows
 
 _SAMPLES = 110  # a direction and cube face
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
+_REACH = 0.05  # the domain has volume 1
 _ACCURACY = 2.0  # of the fast winding number
 _NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
@@ -33,7 +33,7 @@ class ContactPenalty:
     """Mean over the boundary's samples of (gap - (F(p) - F(q)) . n)_+^2; only the k samples p in contact count.
 
     first, second: rows that yield F(p) and F(q). normals (k, 3): the boundary's at q, outwards. share: of one sample.
-    spans (2 k, 3): where p and q lie.
+    spans (2 k, 3): where p and q lie. near (m,): the samples that a few more Newton steps may bring into contact.
     """
 
     first: ControlRows
@@ -42,6 +42,7 @@ class ContactPenalty:
     share: float
     gap: float
     spans: IntArray
+    near: IntArray
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
@@ -68,16 +69,21 @@ class ContactPenalty:
         return self.first.adjoint(along, like) - self.second.adjoint(along, like)
 
 
-def contact_penalty(knots: tuple[Array, Array, Array], degree: int, control: Tensor, gap: float) -> ContactPenalty:
+def contact_penalty(
+    knots: tuple[Array, Array, Array], degree: int, control: Tensor, gap: float, near: IntArray | None = None
+) -> ContactPenalty:
     """Return the penalty for the boundary of F at these control points; it is empty where no two sheets are near.
 
-    gap: how far apart sheets must be, in units of the control points (3, n_u, n_v, n_w).
+    gap: how far apart sheets must be, in units of the control points (3, n_u, n_v, n_w). near: look at these samples
+    alone, those of a penalty a few steps before; looking at all of them takes longer than a Newton step.
     """
     boundary = SampledBoundary.of(
         BSplineVolume((degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy()), _SAMPLES
     )
     normals = vertex_normals(boundary.points, boundary.triangles)
-    touching = _in_another_sheet(boundary.points + gap * normals, boundary)
+    asked = np.arange(len(boundary.points)) if near is None else near
+    touching = asked[_in_another_sheet(boundary.points[asked] + gap * normals[asked], boundary)]
+    near = _around(boundary.points, touching) if near is None else near
     touching, facing = _facing_samples(boundary.points, normals, touching)
     first, second = (
         SlidingParameters(knots, degree, boundary.parameters[chosen], _NO_TRIANGLES) for chosen in (touching, facing)
@@ -89,11 +95,21 @@ def contact_penalty(knots: tuple[Array, Array, Array], degree: int, control: Ten
         1.0 / len(boundary.points),
         gap,
         np.concatenate([first.spans(), second.spans()]),
+        near,
     )
 
 
+def _around(points: Array, touching: IntArray) -> IntArray:
+    """Return which points lie within _REACH of one that touches: (m,)."""
+    if not touching.size:
+        return touching
+    return np.flatnonzero(np.isfinite(cKDTree(points[touching]).query(points, distance_upper_bound=_REACH)[0]))
+
+
 def _in_another_sheet(outside: Array, boundary: SampledBoundary) -> IntArray:
-    """Return which points just outside of the boundary it winds around all the same: (k,)."""
+    """Return which points (m, 3) just outside of the boundary it winds around all the same: (k,)."""
+    if not len(outside):
+        return np.zeros(0, dtype=np.int64)
     winding = igl.FastWindingNumberBVH()
     winding.init(boundary.points, boundary.triangles)
     return np.flatnonzero(winding.winding_number(outside, _ACCURACY) > 0.5)

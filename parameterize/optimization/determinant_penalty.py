@@ -22,7 +22,7 @@ from ..arrays import Array, IntArray
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
 from ..threads import in_parallel
-from .pieces import PiecewiseOperator
+from .operators import PiecewiseOperator
 
 _BLOCK = 32  # spans at a time: what they need fits into the cache
 

@@ -10,7 +10,7 @@ from torch import Tensor
 from ..arrays import Array
 from ..config import SplineConfig
 from ..threads import in_parallel
-from .pieces import PiecewiseOperator
+from .operators import PiecewiseOperator
 from .polar import closest_rotation, cofactor_and_determinant, least_eigenvalue
 from .tensor_product import SYMMETRIC, GaussGrid
 

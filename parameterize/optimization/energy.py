@@ -11,15 +11,14 @@ from torch import Tensor
 
 from ..arrays import Array, IntArray
 from ..config import SplineConfig
-from .cg import FastDiagonalization, conjugate_gradients
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import SpanBarrier
 from .distortion import DistortionEnergy
 from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
-from .pieces import weighted_sum
+from .operators import conjugate_gradients, weighted_sum
 from .surface_distance import SurfaceFit
-from .tensor_product import bending_operator, grams
+from .tensor_product import FastDiagonalization, bending_operator, grams
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
 Knots = tuple[Array, Array, Array]
@@ -57,8 +56,11 @@ class SplineEnergy:
 
     def watch_contact(self, control: Tensor) -> IntArray:
         """Push apart, from now on, the sheets of F's boundary that hardly are at `control`; return their spans."""
-        self._contact = contact_penalty(self._knots, self.config.degree, control, self.config.gap)
+        self._contact = self._contact_at(control)
         return self._contact.spans
+
+    def _contact_at(self, control: Tensor, near: IntArray | None = None) -> ContactPenalty:
+        return contact_penalty(self._knots, self.config.degree, control, self.config.gap, near)
 
     def slide(self, control: Tensor) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
@@ -67,7 +69,7 @@ class SplineEnergy:
         self.surface.places.relax(self.config.relaxations)
         self.watch_facing(control)
         if self._contact is not None:
-            self.watch_contact(control)
+            self._contact = self._contact_at(control, self._contact.near)
 
     def give_way(self, spans: IntArray, factor: float) -> None:
         """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""

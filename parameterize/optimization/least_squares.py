@@ -7,9 +7,8 @@ from torch import Tensor
 
 from ..arrays import Array
 from ..spline.bspline import basis_derivatives, sparse_rows, window_numbers
-from .cg import FastDiagonalization, conjugate_gradients
-from .pieces import weighted_sum
-from .tensor_product import ControlRows, bending_operator, grams
+from .operators import ControlRows, conjugate_gradients, weighted_sum
+from .tensor_product import FastDiagonalization, bending_operator, grams
 
 
 def fit_pairs(

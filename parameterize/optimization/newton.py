@@ -148,6 +148,8 @@ class _Rounds:
             energy.give_way(energy.watch_contact(self.control), config.contact_way)
         elif self.certified:
             self.polished += 1
+            if self.parting:
+                energy.watch_contact(self.control)
             if self.settled:
                 energy.take_back(config.giving_way)
         if self.polished or (self.near and self.number < config.patient_rounds):
@@ -205,8 +207,6 @@ class _Rounds:
         self.best_places = tensors["best_parameters"].numpy(), tensors["best_cube_faces"].numpy()
         self.number, self.parting, self.polished = (int(state[name]) for name in ("number", "parting", "polished"))
         self.certified = bool(state["certified"])
-        if self.parting:
-            energy.watch_contact(self.control)
         history.rows[:] = [tuple(row) for row in state["history"]]
 
 

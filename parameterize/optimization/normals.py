@@ -13,10 +13,9 @@ from torch import Tensor
 
 from ..cube.cube import axis_and_side
 from ..spline.bspline import sparse_rows
-from .pieces import PiecewiseOperator
+from .operators import ControlRows, PiecewiseOperator
 from .polar import cross
 from .surface_distance import SurfaceFit
-from .tensor_product import ControlRows
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from ..cube.flips import new_flips, unflip, untangle
 from ..spline.bspline import breakpoints, fill_basis, sparse_rows
 from ..threads import in_parallel
 from .determinant_penalty import with_neighbours
-from .tensor_product import ControlRows
+from .operators import ControlRows
 
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from ..arrays import Array
 from ..surface.geometry import vertex_normals
-from .pieces import PiecewiseOperator
+from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
 
 

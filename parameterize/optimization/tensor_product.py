@@ -1,27 +1,24 @@
-"""Tensor-product splines: sparse rows, Jacobians on a grid by banded matrices, 1-D matrices, the bending operator.
+"""Tensor-product splines: Jacobians on a grid by banded matrices, 1-D matrices, the bending operator, fast inverses.
 
-Control points are held as (3, n_u, n_v, n_w), component first. Pieces of work run on all threads; their results are
-added in their order, so that the number of threads changes no bit.
+See operators.py for how control points are held, and how pieces of work are added.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from copy import copy
 from functools import partial
 from typing import Any
 
 import numba
 import numpy as np
 import torch
-from scipy.sparse import csr_array
 from torch import Tensor
 
 from ..arrays import Array, IntArray
 from ..spline.bspline import collocation, gauss_points
 from ..threads import in_parallel
-from .pieces import PiecewiseOperator
+from .operators import PiecewiseOperator
 
 _END_SPANS = 1
-_ROWS = 4096  # of a sparse matrix in a piece of work
 _PLANES = 4  # of quadrature points in one
 _POINTS = 256  # at a time: their matrices stay in the cache
 # Where entry (a, b) of symmetric 9 x 9 matrices stands among their 45 different ones.
@@ -34,109 +31,6 @@ def along(matrix: Tensor, field: Tensor, axis: int) -> Tensor:
     if not after:
         return field @ matrix.T
     return (matrix @ field.reshape(-1, field.shape[axis], after.numel())).view(*before, len(matrix), *after)
-
-
-@dataclass(frozen=True, eq=False)
-class ControlRows:
-    """A sparse matrix (N, n_u n_v n_w) that applies to control points (3, n_u, n_v, n_w), and its transpose.
-
-    Row i has the entries values[starts[i] : starts[i + 1]] in these columns.
-    """
-
-    starts: IntArray
-    columns: IntArray
-    values: Array
-
-    @classmethod
-    def of(cls, rows: csr_array) -> "ControlRows":
-        """Take the rows of a scipy matrix."""
-        return cls(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data)
-
-    def to(self, dtype: torch.dtype) -> "ControlRows":
-        """Return the same rows in another precision."""
-        return ControlRows(self.starts, self.columns, torch.from_numpy(self.values).to(dtype).numpy())
-
-    def __call__(self, control: Tensor) -> Tensor:
-        """Return the values (N, 3) at control points."""
-        field = control.reshape(3, -1).numpy()
-        found = in_parallel(lambda piece: _times(piece, self.columns, self.values, field), self._pieces())
-        return torch.from_numpy(np.concatenate(found))
-
-    def adjoint(self, dual: Tensor, like: Tensor) -> Tensor:
-        """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
-        flat, count = np.ascontiguousarray(dual.numpy()), like.numel() // 3
-        found = in_parallel(lambda piece: _spread(piece, self.columns, self.values, flat, count), self._pieces())
-        return _summed(found, like)
-
-    def squared(self, metric: Array) -> PiecewiseOperator:
-        """Return the rows, then matrices (N, 3, 3) on what they yield, then the transpose of the rows."""
-
-        def product(piece: tuple[int, IntArray], field: Tensor) -> Array:
-            return _squared(piece, self.columns, self.values, metric, field.reshape(3, -1).numpy())
-
-        return PiecewiseOperator([partial(product, piece) for piece in self._pieces()], _summed)
-
-    def _pieces(self) -> list[tuple[int, IntArray]]:
-        """Return where the rows of each piece lie: the number of the first, and its entries' places (m + 1,)."""
-        count = max(len(self.starts) - 1, 1)
-        return [(begin, self.starts[begin : begin + _ROWS + 1]) for begin in range(0, count, _ROWS)]
-
-
-def _summed(parts: list[Array], like: Tensor) -> Tensor:
-    """Add parts (3, n), in their order, to control points of the shape of `like`."""
-    return torch.from_numpy(sum(parts[1:], start=parts[0])).view(like.shape)
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _times(piece: tuple[int, IntArray], columns: IntArray, values: Array, field: Array) -> Array:
-    """Multiply rows of a sparse matrix by a field (3, n): (m, 3)."""
-    _, starts = piece
-    out = np.zeros((len(starts) - 1, 3), field.dtype)
-    for row in range(len(out)):
-        for entry in range(starts[row], starts[row + 1]):
-            column, value = columns[entry], values[entry]
-            for c in range(3):
-                out[row, c] += value * field[c, column]
-    return out
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _spread(piece: tuple[int, IntArray], columns: IntArray, values: Array, dual: Array, count: int) -> Array:
-    """Multiply the transpose of some rows by what all rows have (N, 3): (3, count)."""
-    begin, starts = piece
-    out = np.zeros((3, count), dual.dtype)
-    for row in range(len(starts) - 1):
-        for entry in range(starts[row], starts[row + 1]):
-            column, value = columns[entry], values[entry]
-            for c in range(3):
-                out[c, column] += value * dual[begin + row, c]
-    return out
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _squared(piece: tuple[int, IntArray], columns: IntArray, values: Array, metric: Array, field: Array) -> Array:
-    """Multiply the transpose of some rows by metrics (N, 3, 3) times the rows times a field (3, n): (3, n)."""
-    begin, starts = piece
-    out, zero = np.zeros_like(field), field.dtype.type(0.0)
-    for row in range(len(starts) - 1):
-        x, y, z = zero, zero, zero
-        for entry in range(starts[row], starts[row + 1]):
-            column, value = columns[entry], values[entry]
-            x += value * field[0, column]
-            y += value * field[1, column]
-            z += value * field[2, column]
-        m = metric[begin + row]
-        x, y, z = (
-            m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
-            m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
-            m[2, 0] * x + m[2, 1] * y + m[2, 2] * z,
-        )
-        for entry in range(starts[row], starts[row + 1]):
-            column, value = columns[entry], values[entry]
-            out[0, column] += value * x
-            out[1, column] += value * y
-            out[2, column] += value * z
-    return out
 
 
 Band = tuple[IntArray, Array, Array]  # of two matrices: first columns (m,), entries from there on (m, k) each
@@ -357,3 +251,41 @@ def bending_operator(
         return result + along(2.0 * weight * k0, first, 1)
 
     return PiecewiseOperator([partial(bend, component) for component in range(3)], lambda parts, _: torch.cat(parts))
+
+
+class FastDiagonalization:
+    """Inverse of A_0 x M x M + M x A_1 x M + M x M x A_2 + shift * M x M x M (Lynch, Rice, Thomas 1964).
+
+    matrices: three symmetric A_d (n, n); mass: three M_d. Three generalised eigenproblems, then products only.
+    """
+
+    def __init__(self, matrices: tuple[Tensor, ...], mass: tuple[Tensor, ...], shift: float = 0.0) -> None:
+        vectors, values = [], []
+        for a, m in zip(matrices, mass, strict=True):
+            factor = torch.linalg.cholesky(m)
+            half = torch.linalg.solve_triangular(factor, a, upper=False)
+            value, vector = torch.linalg.eigh(torch.linalg.solve_triangular(factor, half.T, upper=False))
+            vectors.append(torch.linalg.solve_triangular(factor.T, vector, upper=True))
+            values.append(value)
+        self._vectors = tuple(vectors)
+        u, v, w = values
+        self._inverse = 1.0 / (u[:, None, None] + v[:, None] + w + shift)
+
+    def to(self, dtype: torch.dtype) -> "FastDiagonalization":
+        """Return the same in another precision."""
+        other = copy(self)
+        other._vectors, other._inverse = tuple(v.to(dtype) for v in self._vectors), self._inverse.to(dtype)
+        return other
+
+    def __call__(self, residual: Tensor) -> Tensor:
+        """Apply the inverse: (3, n_u, n_v, n_w) -> the same shape."""
+        return torch.cat(in_parallel(self._solve, torch.split(residual, 1)))
+
+    def _solve(self, residual: Tensor) -> Tensor:
+        """Apply it to one component (1, n_u, n_v, n_w)."""
+        for axis, vectors in enumerate(self._vectors, start=1):
+            residual = along(vectors.T, residual, axis)
+        residual = residual * self._inverse
+        for axis, vectors in enumerate(self._vectors, start=1):
+            residual = along(vectors, residual, axis)
+        return residual

@@ -15,6 +15,8 @@ from scipy.sparse import csr_array
 
 from ..arrays import Array, IntArray
 
+_ROUNDING = 1e-9  # by which a parameter may lie outside of the cube
+
 
 def open_uniform_knots(n_control_points: int, degree: int) -> Array:
     """Return the open knot vector on [0, 1] with equal spans, shape (n_control_points + degree + 1,).
@@ -210,12 +212,15 @@ def evaluate_at(
     """Evaluate a trivariate spline, or one of its partial derivatives, at points (m, 3).
 
     coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
+    Raises ValueError for points of another shape, or outside the unit cube by more than rounding.
     """
     from scipy.interpolate import NdBSpline
 
     where = np.atleast_2d(np.asarray(points, dtype=np.float64))
     if where.ndim != 2 or where.shape[1] != 3:
         raise ValueError(f"points must have shape (m, 3), got {where.shape}")
+    if np.any(outside := (np.abs(where - 0.5) > 0.5 + _ROUNDING).any(axis=1)):
+        raise ValueError(f"points are parameters from 0 to 1, got {where[outside][0].tolist()}")
     spline = NdBSpline(tuple(knots), coefficients, tuple(degrees))
     return np.asarray(spline(where, nu=tuple(derivative)))
 

@@ -1,0 +1,174 @@
+"""Linear operators on control points: sums made of pieces of work, sparse rows, and conjugate gradients.
+
+Control points are held as (3, n_u, n_v, n_w), component first. Pieces of work run on all threads; their results are
+added in their order, so that the number of threads changes no bit.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numba
+import numpy as np
+import torch
+from scipy.sparse import csr_array
+from torch import Tensor
+
+from ..arrays import Array, IntArray
+from ..threads import in_parallel
+
+Operator = Callable[[Tensor], Tensor]
+_ROWS = 4096  # of a sparse matrix in a piece of work
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewiseOperator:
+    """x -> add(what every piece makes of x, x); `add` takes these in the order of the pieces."""
+
+    pieces: list[Callable[[Tensor], Any]]
+    add: Callable[[list[Any], Tensor], Tensor]
+
+    def __call__(self, x: Tensor) -> Tensor:
+        """Apply the operator to control points: (3, n_u, n_v, n_w) -> the same shape."""
+        return self.add(in_parallel(lambda piece: piece(x), self.pieces), x)
+
+
+def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOperator:
+    """Return the sum of operators times their weights: one call runs all their pieces."""
+
+    def add(found: list[Any], x: Tensor) -> Tensor:
+        total, begin = torch.zeros_like(x), 0
+        for weight, operator in terms:
+            end = begin + len(operator.pieces)
+            total.add_(operator.add(found[begin:end], x), alpha=weight)
+            begin = end
+        return total
+
+    return PiecewiseOperator([piece for _, operator in terms for piece in operator.pieces], add)
+
+
+def conjugate_gradients(
+    operator: Operator, right: Tensor, precondition: Operator, *, tolerance: float, max_iterations: int
+) -> tuple[Tensor, int]:
+    """Solve operator(x) = right from x = 0 until |r| <= tolerance |right|; returns x and the iterations done."""
+    x = torch.zeros_like(right)
+    residual = right.clone()
+    goal = tolerance * float(right.norm())
+    direction = precondition(residual)
+    product = float((residual * direction).sum())
+    for iteration in range(max_iterations):
+        if float(residual.norm()) <= goal:
+            return x, iteration
+        image = operator(direction)
+        step = product / float((direction * image).sum())
+        x += step * direction
+        residual -= step * image
+        scaled = precondition(residual)
+        new_product = float((residual * scaled).sum())
+        direction = scaled + (new_product / product) * direction
+        product = new_product
+    return x, max_iterations
+
+
+@dataclass(frozen=True, eq=False)
+class ControlRows:
+    """A sparse matrix (N, n_u n_v n_w) that applies to control points (3, n_u, n_v, n_w), and its transpose.
+
+    Row i has the entries values[starts[i] : starts[i + 1]] in these columns.
+    """
+
+    starts: IntArray
+    columns: IntArray
+    values: Array
+
+    @classmethod
+    def of(cls, rows: csr_array) -> "ControlRows":
+        """Take the rows of a scipy matrix."""
+        return cls(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data)
+
+    def to(self, dtype: torch.dtype) -> "ControlRows":
+        """Return the same rows in another precision."""
+        return ControlRows(self.starts, self.columns, torch.from_numpy(self.values).to(dtype).numpy())
+
+    def __call__(self, control: Tensor) -> Tensor:
+        """Return the values (N, 3) at control points."""
+        field = control.reshape(3, -1).numpy()
+        found = in_parallel(lambda piece: _times(piece, self.columns, self.values, field), self._pieces())
+        return torch.from_numpy(np.concatenate(found))
+
+    def adjoint(self, dual: Tensor, like: Tensor) -> Tensor:
+        """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
+        flat, count = np.ascontiguousarray(dual.numpy()), like.numel() // 3
+        found = in_parallel(lambda piece: _spread(piece, self.columns, self.values, flat, count), self._pieces())
+        return _summed(found, like)
+
+    def squared(self, metric: Array) -> PiecewiseOperator:
+        """Return the rows, then matrices (N, 3, 3) on what they yield, then the transpose of the rows."""
+
+        def product(piece: tuple[int, IntArray], field: Tensor) -> Array:
+            return _squared(piece, self.columns, self.values, metric, field.reshape(3, -1).numpy())
+
+        return PiecewiseOperator([partial(product, piece) for piece in self._pieces()], _summed)
+
+    def _pieces(self) -> list[tuple[int, IntArray]]:
+        """Return where the rows of each piece lie: the number of the first, and its entries' places (m + 1,)."""
+        count = max(len(self.starts) - 1, 1)
+        return [(begin, self.starts[begin : begin + _ROWS + 1]) for begin in range(0, count, _ROWS)]
+
+
+def _summed(parts: list[Array], like: Tensor) -> Tensor:
+    """Add parts (3, n), in their order, to control points of the shape of `like`."""
+    return torch.from_numpy(sum(parts[1:], start=parts[0])).view(like.shape)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _times(piece: tuple[int, IntArray], columns: IntArray, values: Array, field: Array) -> Array:
+    """Multiply rows of a sparse matrix by a field (3, n): (m, 3)."""
+    _, starts = piece
+    out = np.zeros((len(starts) - 1, 3), field.dtype)
+    for row in range(len(out)):
+        for entry in range(starts[row], starts[row + 1]):
+            column, value = columns[entry], values[entry]
+            for c in range(3):
+                out[row, c] += value * field[c, column]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _spread(piece: tuple[int, IntArray], columns: IntArray, values: Array, dual: Array, count: int) -> Array:
+    """Multiply the transpose of some rows by what all rows have (N, 3): (3, count)."""
+    begin, starts = piece
+    out = np.zeros((3, count), dual.dtype)
+    for row in range(len(starts) - 1):
+        for entry in range(starts[row], starts[row + 1]):
+            column, value = columns[entry], values[entry]
+            for c in range(3):
+                out[c, column] += value * dual[begin + row, c]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _squared(piece: tuple[int, IntArray], columns: IntArray, values: Array, metric: Array, field: Array) -> Array:
+    """Multiply the transpose of some rows by metrics (N, 3, 3) times the rows times a field (3, n): (3, n)."""
+    begin, starts = piece
+    out, zero = np.zeros_like(field), field.dtype.type(0.0)
+    for row in range(len(starts) - 1):
+        x, y, z = zero, zero, zero
+        for entry in range(starts[row], starts[row + 1]):
+            column, value = columns[entry], values[entry]
+            x += value * field[0, column]
+            y += value * field[1, column]
+            z += value * field[2, column]
+        m = metric[begin + row]
+        x, y, z = (
+            m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
+            m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
+            m[2, 0] * x + m[2, 1] * y + m[2, 2] * z,
+        )
+        for entry in range(starts[row], starts[row + 1]):
+            column, value = columns[entry], values[entry]
+            out[0, column] += value * x
+            out[1, column] += value * y
+            out[2, column] += value * z
+    return out
