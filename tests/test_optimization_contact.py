@@ -56,6 +56,17 @@ def test_gradient_and_curvature_are_those_of_the_energy():
     assert after - 2.0 * energy + before == pytest.approx(bend, rel=0.3)  # some samples enter or leave
 
 
+def test_looking_near_the_last_contact_finds_what_looking_everywhere_does():
+    before, control = contact(spring(-1e-2)), control_of(spring(-8e-3))
+    everywhere = contact(spring(-8e-3))
+    near = contact_penalty(spring(-8e-3).knots, 3, control, GAP, before.near)
+    assert 0 < len(before.near) < 0.9 * 6 * 110**2
+    assert np.array_equal(near.spans, everywhere.spans)
+    assert near.energy_and_gradient(control)[0] == everywhere.energy_and_gradient(control)[0] > 0.0
+    nothing = contact_penalty(spring(-8e-3).knots, 3, control, GAP, before.near[:0])
+    assert nothing.energy_and_gradient(control)[0] == 0.0
+
+
 def test_turns_that_overlap_are_parted():
     volume = spring(-1e-2)
     assert check_boundary(volume).injective is False

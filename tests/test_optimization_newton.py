@@ -252,5 +252,5 @@ def test_a_boundary_that_meets_itself_is_pushed_apart_before_the_polish(monkeypa
     optimize(wavy_control(0.0), KNOTS, fit, config, history=History(), checkpoints=checkpoints)
     assert len(saved) == rounds
     assert len(taken_back) == rounds - 1 - min(sum(meets), config.parting)
-    assert len(contacts) == min(sum(meets), config.parting)
+    assert len(contacts) == (rounds - 1 if meets[0] else 0)  # of all rounds after the first: sheets must stay apart
     assert np.all(fit.yielding == 1.0)
