@@ -244,7 +244,7 @@ def _stages(steps: tuple[int, int, int, int, int]) -> tuple[StageConfig, ...]:
 
 
 PRESETS = {
-    "fast": Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((60, 40, 60, 20, 40)), SplineConfig()),
+    "fast": Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((90, 60, 90, 30, 60)), SplineConfig()),
     "paper": Config(
         "paper",
         NetworkConfig(width=512, modules=6),
@@ -282,7 +282,7 @@ def preset(name: str) -> Config:
     >>> import iga_nn
     >>> config = iga_nn.preset("fast").scaled(0.5).with_control_points(20)
     >>> config.spline.control_points, config.stages[0].steps
-    (20, 30)
+    (20, 45)
     """
     if name not in PRESETS:
         raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")
