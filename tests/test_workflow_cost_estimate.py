@@ -19,6 +19,7 @@ from iga_nn.workflow.cost_estimate import Forecast, available_memory_mb, forecas
 from parameterize.config import preset
 
 CPU = torch.device("cpu")
+PACKAGES = str(Path(iga_nn.__file__).resolve().parents[1])
 QUICK = ["--steps-factor", "0.05", "--control-points", "8"]
 
 
@@ -48,6 +49,24 @@ def test_the_calibration_takes_less_than_a_second_and_no_random_numbers():
     assert torch.equal(torch.get_rng_state(), before)
 
 
+def test_measuring_leaves_one_thread_an_operation_to_the_threads_that_help():
+    """They keep torch's setting of their first operation: with more, bits would depend on who takes a piece."""
+    script = """
+import threading, torch, iga_nn
+from iga_nn.workflow.cost_estimate import forecast
+from parameterize.config import preset
+from parameterize.optimization.newton import one_thread_an_operation
+from parameterize.threads import in_parallel
+forecast(iga_nn.sample("cube"), preset("fast").with_control_points(8), device=torch.device("cpu"))
+barrier = threading.Barrier(2, timeout=10.0)
+with one_thread_an_operation():
+    print(in_parallel(lambda _: barrier.wait() * 0 + torch.get_num_threads(), range(2), 2))
+"""
+    env = os.environ | {"OMP_NUM_THREADS": "2", "NUMBA_NUM_THREADS": "2", "PYTHONPATH": PACKAGES}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=env)
+    assert done.stdout.split() == ["[1,", "1]"]
+
+
 def test_a_small_run_takes_what_was_said(in_folder):
     """In processor seconds, and resident memory, of a process of its own: other programs may keep this one waiting."""
     script = f"""
@@ -65,7 +84,7 @@ usage = resource.getrusage(resource.RUSAGE_SELF)
 print(json.dumps([*said.seconds, said.memory_mb, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1000.0]))
 """
     one = dict.fromkeys(("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-    path = {"PYTHONPATH": str(Path(iga_nn.__file__).resolve().parents[1])}
+    path = {"PYTHONPATH": PACKAGES}
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, env=os.environ | one | path
     )

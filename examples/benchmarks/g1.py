@@ -329,9 +329,9 @@ DISTANCE_COLUMNS: dict[str, Format] = {
     "mesh_to_spline_max": "{:.3g}".format,
     "flipped_triangles": str,
 }
-TIME_COLUMNS: dict[str, Format] = {
-    **dict.fromkeys(("seconds", *(f"seconds_{s}" for s in ("train", "fit", "optimize", "certify"))), "{:.1f}".format),
-}
+TIME_COLUMNS: dict[str, Format] = dict.fromkeys(
+    ("seconds", *(f"seconds_{s}" for s in ("train", "fit", "optimize", "certify"))), "{:.1f}".format
+)
 SOLVE_COLUMNS: dict[str, Format] = {
     "exact": str,
     "l2_relative_refine_0": "{:.2e}".format,

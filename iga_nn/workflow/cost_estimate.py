@@ -74,10 +74,13 @@ def forecast(
     unknowns: of the largest problem that is solved afterwards. A second start, where the first is not certified, takes
     as long again.
     """
+    from parameterize.optimization.newton import one_thread_an_operation
+
     spline, vertices = config.spline, len(surface.vertices)
     points = _training_points(surface, config)
-    one_pass = _pass_seconds(config, device, clock)
-    product = _product_seconds(spline, clock) + CALLS * one_pass
+    with one_thread_an_operation():  # as the run does: a helping thread keeps what it begins with
+        one_pass = _pass_seconds(config, device, clock)
+        product = _product_seconds(spline, clock) + CALLS * one_pass
     once = FIT * product + (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
     step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
     low, high = (

@@ -23,7 +23,7 @@ from .sliding import SlidingParameters
 
 _SAMPLES = 110  # a direction and cube face
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
-_REACH = 0.05  # the domain has volume 1
+_REACH = 0.05  # from a contact, in a domain of volume 1: what the steps of a round look at
 _ACCURACY = 2.0  # of the fast winding number
 _NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 

@@ -44,11 +44,6 @@ class _Spans:
         """Return the chosen ones of these spans (k,)."""
         return _Spans(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
-    def to(self, dtype: type[np.floating]) -> "_Spans":
-        """Return the same spans in another precision."""
-        volumes, shares, weights, back = (a.astype(dtype) for a in (self.volumes, self.shares, self.weights, self.back))
-        return _Spans(self.first, volumes, shares, weights, back)
-
     def bezier_points(self, control: Tensor) -> Array:
         """Return the Bezier points (k, 3, p + 1, p + 1, p + 1)."""
         points: Array = _bezier_points(np.ascontiguousarray(control.numpy()), self.first, self.weights)
@@ -134,11 +129,11 @@ class SpanBarrier:
 
         def piece(spans: _Spans) -> Callable[[Tensor], tuple[IntArray, Array]]:
             found = self._short_rows(control, spans, np.float32)
-            near = found.spans.to(np.float32)
+            first, rows, shares = found.spans.first, (found.rows, found.starts), 2.0 * found.shares
+            weights, back = found.spans.weights.astype(np.float32), found.spans.back.astype(np.float32)
 
             def product(x: Tensor) -> tuple[IntArray, Array]:
-                rows, shares = (found.rows, found.starts), 2.0 * found.shares
-                return near.first, _squared(x.numpy(), near.first, near.weights, near.back, *rows, shares)
+                return first, _squared(x.numpy(), first, weights, back, *rows, shares)
 
             return product
 

@@ -104,7 +104,11 @@ def optimize(
 
 @contextmanager
 def one_thread_an_operation() -> Iterator[None]:
-    """Most tensors here are small: handing them to a second thread costs more than it saves (up to 4 times)."""
+    """Most tensors here are small: handing them to a second thread costs more than it saves (up to 4 times).
+
+    A thread of `in_parallel` begins with torch's setting at its first operation and keeps it. All torch work in pieces
+    belongs under this: else such a thread splits its sums, and bits depend on which thread takes a piece.
+    """
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
