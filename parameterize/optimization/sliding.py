@@ -17,7 +17,7 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..config import LAYOUT, LayoutConfig
 from ..cube.cube import axis_and_side, damped_fit, face_number, nearest_faces, tangent_axes
-from ..cube.flips import new_flips, unflip, untangle
+from ..cube.flips import flipped, new_flips, unflip, untangle
 from ..spline.bspline import breakpoints, fill_basis, sparse_rows
 from ..threads import in_parallel
 from .determinant_penalty import with_neighbours
@@ -117,7 +117,10 @@ class SlidingParameters:
         for _ in range(slides):
             other.slide(control, points, longest)
         other.unflip()
-        other.relax(sweeps)  # where flips are left
+        relaxed = copy(other)
+        relaxed.relax(sweeps)  # where flips are left
+        if not flipped(relaxed.parameters, self.triangles).any():
+            other = relaxed
         for _ in range(slides):
             other.slide(control, points, longest, keep_layout=True)
         return other
