@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from ..config import NetworkConfig
 from ..threads import in_parallel
 
-_PIECE = 1024  # points that a thread takes at a time, at most
+_PIECE = 2048  # points that a thread takes at a time, at most
 _SHARES = 4  # their number is a multiple of this, so that as many threads end together
 
 
