@@ -189,7 +189,12 @@ def solve_notices(
         notices.append(
             f"det J < 0 at {assembled.folded} of {assembled.points} Gauss points: solved with |det J| instead"
         )
-    if not result.converged:
+    if result.indefinite:
+        notices.append(
+            f"no convergence: after {result.iterations} iterations the matrix turned out not to be positive definite, "
+            "as with a negative reaction; in a law of one's own, set `symmetric = False`, and GMRES solves it"
+        )
+    elif not result.converged:
         parameters, point, scaled = worst_place(volume, space)
         cube, where = (
             ", ".join(f"{axis}={value:.4g}" for axis, value in zip(axes, place, strict=True))

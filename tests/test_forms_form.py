@@ -214,6 +214,26 @@ def test_a_law_that_does_not_run_on_jets_needs_its_source():
     assert report.converged and report.error_estimate is None
 
 
+class Helmholtz(iga_nn.Form):
+    """A reaction so negative that the matrix is not positive definite."""
+
+    def flux(self, u, grad, x):
+        return grad
+
+    def react(self, u, grad, x):
+        return -400.0 * u
+
+
+def test_an_indefinite_law_is_named_and_solved_once_it_says_not_symmetric():
+    problem = iga_nn.Problem(Helmholtz(), exact=WAVE)
+    report = iga_nn.solve(benchmark_volume(6), problem, refine=1).report
+    assert not report.converged and "set `symmetric = False`" in report.notices[-1]
+    law = Helmholtz()
+    law.symmetric = False
+    report = iga_nn.solve(benchmark_volume(6), iga_nn.Problem(law, exact=WAVE), refine=1).report
+    assert report.converged and report.errors.l2 < 1e-5
+
+
 def test_constants_left_open_are_refused_where_no_mean_is_known():
     class Flow(ConvectionDiffusion):
         def react(self, u, grad, x):

@@ -16,11 +16,15 @@ Vector = Any  # a NumPy array or a torch tensor: anything with their arithmetic,
 
 @dataclass(frozen=True, eq=False)
 class LinearResult:
-    """The last iterate, and |r| / |b| before the first and after every iteration."""
+    """The last iterate, and |r| / |b| before the first and after every iteration.
+
+    indefinite: whether a direction has shown that the matrix is not positive definite.
+    """
 
     x: Vector
     residuals: tuple[float, ...]
     converged: bool
+    indefinite: bool = False
 
     @property
     def iterations(self) -> int:
@@ -66,7 +70,7 @@ def conjugate_gradients(
         product = operator(p)
         curvature = dot(p, product)
         if not (rz > 0.0 and curvature > 0.0):  # NaN included
-            break
+            return LinearResult(x, tuple(residuals), False, math.isfinite(rz * curvature))
         step = rz / curvature
         x += step * p
         product *= step
