@@ -326,6 +326,8 @@ def _check_count(name: str, count: int, fewest: int) -> None:
 
 def check_space(refine: Sequence[int], degree: int | None) -> None:
     """Raise InputError for levels or a degree that cannot be run."""
+    if not isinstance(refine, Sequence) or not all(isinstance(level, Integral) for level in refine):
+        raise InputError(f"refine {refine!r:.80}: give a tuple of whole numbers such as (0, 1)")
     if not refine or min(refine) < 0 or len(set(refine)) != len(refine):
         raise InputError(f"refine {refine}: give distinct levels, 0 or larger")
     _check_level(max(refine))

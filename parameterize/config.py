@@ -6,7 +6,7 @@ Lengths are in units of the domain scaled to volume 1. Loss weights are those of
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Literal
 
 Target = Literal["S(2)", "S(1)", "cube"]
@@ -72,6 +72,7 @@ class SplineConfig:
 
     control_points: int = 30
     degree: int = 3
+    most_points: int = 30_000  # of the surface, where its mesh has fewer: else its long edges are cut less finely
     fit_cell: float = 0.035  # lattice of inverse samples
     fit_fairness: float = 1e-7
     boundary_share: float = 0.2  # weight of the surface's samples in the first fit; those inside have the rest of 1
@@ -204,8 +205,8 @@ class Config:
 
         With fewer steps every shape looks hard after the first stage: none is trained longer then.
         """
-        if not 0.0 < factor <= 100.0:
-            raise ValueError(f"steps factor must be positive and at most 100, got {factor}")
+        if not isinstance(factor, Real) or not 0.0 < factor <= 100.0:
+            raise ValueError(f"steps factor must be a positive number, at most 100, got {factor!r:.80}")
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
         train = self.train if factor >= 1.0 else replace(self.train, most_effort=1.0)
@@ -225,9 +226,11 @@ class Config:
 
     def with_control_points(self, n: int) -> Config:
         """Return the same options with n x n x n control points. Raises ValueError for too few, or no whole number."""
-        if not isinstance(n, Integral) or n <= self.spline.degree:
+        if not isinstance(n, Integral):
+            raise ValueError(f"the number of control points must be a whole number, got {n!r:.80}")
+        if n <= self.spline.degree:
             fewest = self.spline.degree + 1
-            raise ValueError(f"degree {self.spline.degree} needs at least {fewest} control points, got {n!r:.80}")
+            raise ValueError(f"degree {self.spline.degree} needs at least {fewest} control points, got {n}")
         return replace(self, spline=replace(self.spline, control_points=n))
 
 

@@ -2,11 +2,11 @@
 
 import hashlib
 import logging
-import operator
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from .arrays import Array, IntArray
 from .certificate.boundary import check_boundary
 from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
-from .config import Config, preset
+from .config import Config, SplineConfig, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
 from .cube.cutting import subdivide_long_edges
 from .cube.edge_paths import PathError, choose_corners
@@ -135,7 +135,7 @@ def parameterize(
     Raises
     ------
     TypeError
-        For a surface or config of another type.
+        For a surface, config or seed of another type.
     ValueError
         For a negative seed, bad corners or a device that is not there.
     CheckpointError
@@ -165,8 +165,7 @@ def parameterize(
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     spline = config.spline
     knots = (open_uniform_knots(spline.control_points, spline.degree),) * 3
-    longest = 1.0 / (spline.control_points - spline.degree)  # a span's length: no triangle larger than that
-    vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
+    vertices, faces = _surface_points(surface, spline)
     own, history, seconds = len(surface.vertices), History(), dict[str, float]()
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
     task = _Task(vertices, own, faces, config, knots, seed, place, dtype, given, seconds, report)
@@ -193,14 +192,26 @@ def parameterize(
     )
 
 
+def _surface_points(surface: Surface, spline: SplineConfig) -> tuple[Array, IntArray]:
+    """Return the surface at volume 1, its edges cut: into a span's length, or longer where those were too many."""
+    longest = 1.0 / (spline.control_points - spline.degree)
+    while True:
+        vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
+        if len(vertices) <= max(spline.most_points, len(surface.vertices)):
+            return vertices, faces
+        longest *= 1.25
+
+
 def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config, int]:
     if not isinstance(surface, Surface):
         raise TypeError(f"surface must be a Surface, got {surface!r:.80}; read one with load_surface(path)")
     if config is not None and not isinstance(config, Config):
         raise TypeError(f"config must be a Config, got {config!r:.80}; take one from preset('fast')")
-    if operator.index(seed) < 0:
+    if not isinstance(seed, Integral):
+        raise TypeError(f"seed must be a whole number, got {seed!r:.80}")
+    if seed < 0:
         raise ValueError(f"seed must not be negative, got {seed}")
-    return config or preset("fast"), operator.index(seed)
+    return config or preset("fast"), int(seed)
 
 
 def choose_device(name: str) -> torch.device:

@@ -20,7 +20,7 @@ class SpaceOptions:
     quadrature: of the operator: "spline", Gauss rules of the spline space, as many points as the map and the law need;
         "gauss", `degree` Gauss points a span; "gauss+1", one more. Errors have degree + 2 points a span in any case.
 
-    Raises ValueError for a `refine` that is no whole number, and for fewer threads than one.
+    Raises ValueError for a `refine` or a degree that is no whole number, and for fewer threads than one.
     """
 
     refine: int = 0
@@ -32,6 +32,8 @@ class SpaceOptions:
     def __post_init__(self) -> None:
         if not isinstance(self.refine, int | np.integer):
             raise ValueError(f"refine must be a whole number, 0 or more, got {self.refine!r:.80}")
+        if self.degree is not None and not isinstance(self.degree, int | np.integer):
+            raise ValueError(f"degree must be a whole number, 1 or more, got {self.degree!r:.80}")
         if self.threads is not None and self.threads < 1:
             default = default_threads()
             raise ValueError(f"threads must be at least 1, got {self.threads}; leave it out for {default}")

@@ -60,7 +60,7 @@ def test_a_row_has_the_figures_of_its_report(batch, done):
 def test_states_and_counts(batch):
     assert [each.state for each in batch.rows] == ["refused", "certified", "not certified", "waiting"]
     assert batch.summary == "4 surfaces: 1 certified, 1 not certified, 1 refused, 1 waiting"
-    assert batch.rows[0].told() == "b<i>.obj: refused, b<i>.obj: not a surface, sorry"
+    assert batch.rows[0].told() == "b<i>.obj: refused, not a surface, sorry"
     assert batch.rows[1].told().startswith("cube.obj: certified, ARAP mean ")
 
 
@@ -68,7 +68,7 @@ def test_the_csv_has_all_digits_and_the_json_all_verdicts(batch):
     rows = list(csv.DictReader(io.StringIO(batch.as_csv())))
     assert [each["folder"] for each in rows] == ["b<i>", "cube", "folded", "later"]
     assert float(rows[1]["arap_mean"]) == batch.rows[1].figures()["arap_mean"] and rows[0]["arap_mean"] == ""
-    assert rows[0]["line"] == "b<i>.obj: not a surface, sorry"
+    assert rows[0]["line"] == "not a surface, sorry"
     known = batch.as_dict()
     assert known["counts"] == {"certified": 1, "not certified": 1, "refused": 1, "waiting": 1}
     assert known["surfaces"][1]["arap"] == batch.rows[1].report["parameterization"]["arap"]

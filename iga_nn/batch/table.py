@@ -46,7 +46,8 @@ class Row:
         if how.report is not None:
             return replace(self, state=_verdict(how.report), line="", report=how.report)
         state: State = "refused" if how.state == "refused" else "failed" if how.state == "failed" else "waiting"
-        return replace(self, state=state, line=printable(how.line.replace(self.entry.mesh, self.entry.name)))
+        line = how.line.replace(self.entry.mesh, self.entry.name).removeprefix(f"{self.entry.name}: ")
+        return replace(self, state=state, line=printable(line))
 
     def verdict(self) -> dict[str, Any]:
         """Return what decides whether the result is used, as `iga-nn run --json` prints it; empty without a result."""

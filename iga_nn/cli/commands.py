@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, Token, convert
 
 from ..batch.options import WorkerOptions
 from ..errors import InputError, expected_errors, input_errors, one_line
@@ -34,12 +35,20 @@ from .progress import shown_batch, shown_progress
 if TYPE_CHECKING:
     from ..workflow.output_folder import Outcome
 
+
+def _converted(kind: Any, tokens: Sequence[Token]) -> Any:
+    """Convert an argument as cyclopts does, but refuse a fraction for a whole number: it would be rounded."""
+    if int in (kind, *get_args(kind)) and (wrong := [token for token in tokens if "." in token.value]):
+        raise InputError(f"must be a whole number, got {wrong[0].value}")
+    return convert(kind, tokens)
+
+
 app = App(
     name="iga-nn",
     help="From a closed surface mesh to a solved PDE on a certified trivariate B-spline.",
     version=f"iga-nn {__version__}",
     suppress_keyboard_interrupt=False,
-    default_parameter=Parameter(negative=(), consume_multiple=True),
+    default_parameter=Parameter(negative=(), consume_multiple=True, converter=_converted),
 )
 run_app = App(name="run", help="Parameterize a surface and solve a problem on its volume.")
 solve_app = App(name="solve", help="Solve a problem on a volume.")

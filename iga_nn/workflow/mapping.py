@@ -63,6 +63,7 @@ def map_surface(
     """
     given = _prepare(state, mesh, options, equation, unknowns)
     result = _train(given, options, progress, state.folder / CHECKPOINT)
+    state.begin("map", "solution")
     state.seconds.update(result.seconds)
     _write(state, given, result, command, options)
     _draw(state, given, result)
@@ -72,12 +73,15 @@ def map_surface(
 def _prepare(
     state: RunFolder, mesh: str | Path, options: MapOptions, equation: Equation | None, unknowns: int
 ) -> _Given:
-    """Read the surface and the corners, check the problem's data on it, and announce what the run will take.
+    """Check the options, read the surface and the corners, check the problem's data on it, and announce what the run will take.
 
-    The folder is cleared once all of them are accepted.
+    The folder is cleared once all of them are accepted; where a run is resumed, only when its map is there: the
+    checkpoint may be refused.
     """
     from parameterize.run import choose_device, corner_vertices
 
+    with input_errors():
+        config, device = options.config(), choose_device(options.device)
     with state.timed("load"):
         surface = resolve(str(mesh), **options.reading())
         corners = read_corners(options.corners, _frame(surface)) if options.corners else None
@@ -85,15 +89,16 @@ def _prepare(
     for notice in surface.notices:
         log.warning("%s: %s", surface.name, notice)
     with input_errors():
-        device = choose_device(options.device)
         marks = None if corners is None else surface.vertices[corner_vertices(surface, corners)]
     if equation is not None:
         _check_data(equation, surface)
-    if options.resume and not has_checkpoint(state.folder):
+    is_resumed = options.resume and has_checkpoint(state.folder)
+    if options.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
-    state.begin("map", "solution")
+    if not is_resumed:
+        state.begin("map", "solution")
     with state.timed("load"):
-        expected = forecast(surface, options.config(), device=device, unknowns=unknowns)
+        expected = forecast(surface, config, device=device, unknowns=unknowns)
     _announce(expected)
     return _Given(surface, corners, marks, expected)
 

@@ -94,6 +94,9 @@ def run(
     if problem not in PROBLEMS:
         raise InputError(f"problem {problem!r}: choose one of {', '.join(PROBLEMS)}")
     mapping, options = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
+    for name, value, kind in (("mapping", mapping, MapOptions), (problem, options, PROBLEMS[problem])):
+        if not isinstance(value, kind):
+            raise InputError(f"{name} must be {kind.__name__}(...), got {value!r:.80}")
     if others := [name for name, value in given.items() if value is not None]:
         raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
     equation, unknowns = checked(mapping, options)

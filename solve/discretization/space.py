@@ -1,5 +1,6 @@
 """The trial space: tensor-product splines on a volume's own knots, refined and raised in degree."""
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from parameterize.spline.bspline import apply_along, breakpoints, insert_knots, 
 from parameterize.spline.volume import BSplineVolume
 
 Window = tuple[slice, slice, slice]
+
+MOST_ELEMENTS = 1e9  # of a trial space: no computer solves on so many, and halving on and on would not end
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,10 +149,13 @@ def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = Non
     """Return the trial space of a volume: every span halved `refine` times, in a degree, by default the map's own.
 
     It is as smooth as the map at the map's own knots, and as its degree allows at the knots that halving adds.
-    Raises ValueError for a negative `refine` or a degree below 1.
+    Raises ValueError for a negative `refine`, one that gives more than MOST_ELEMENTS, or a degree below 1.
     """
     if refine < 0:
         raise ValueError(f"refine must be 0 or more (each level halves every span), got {refine}")
+    elements = math.prod((len(breakpoints(knots)) - 1) << int(refine) for knots in volume.knots)
+    if elements > MOST_ELEMENTS:
+        raise ValueError(f"refine {refine} gives {elements:.1e} elements, more than {MOST_ELEMENTS:.0e}: lower it")
     if degree is not None and degree < 1:
         raise ValueError(f"degree must be at least 1, got {degree}; leave it out for the map's own degree")
     degrees = volume.degrees if degree is None else (degree,) * 3

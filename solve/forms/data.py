@@ -55,7 +55,7 @@ class Datum:
     def __call__(self, x: Array) -> Array:
         """Return values (c, ...) at points (3, ...).
 
-        Raises ExpressionError where they are not finite, ValueError where a function's result has another shape.
+        Raises ExpressionError where they are not finite, ValueError where a function's result has another shape or kind.
         """
         each = x.shape[1:] if len(self.entries) == self.components else (self.components, *x.shape[1:])
         parts = []
@@ -63,7 +63,9 @@ class Datum:
             if isinstance(entry, Expression):
                 found = entry(*np.asarray(x))
             else:
-                found = np.asarray(entry.at(x) if isinstance(entry, SplineField) else entry(x), dtype=np.float64)
+                found = np.asarray(entry.at(x) if isinstance(entry, SplineField) else entry(x))
+                if found.dtype.kind not in "iuf":
+                    raise ValueError(f"{self.name} must return real numbers, got {found.dtype}")
             found = found[0] if found.shape == (1, *each) else found  # one component, written as (c, ...)
             try:
                 found = np.broadcast_to(found, each)
@@ -96,7 +98,8 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
         if isinstance(entry, SplineField) and entry.coefficients.shape[3:] != wanted:
             raise ValueError(f"{name}: the field must have {components if wanted else 1} component(s) here")
         if not isinstance(entry, str) and not callable(entry):
-            raise ValueError(f"{name} must be a number, a formula, a function of x or a field, got {entry!r}")
+            of = "x, y, z" if of_coordinates else "points x"
+            raise ValueError(f"{name} must be a number, a formula, a function of {of} or a field, got {entry!r:.80}")
     try:
         parsed = [Expression(entry) if isinstance(entry, str) else entry for entry in entries]
     except ExpressionError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -64,10 +65,10 @@ class Elasticity(LawWithData):
     labels = {"source": "force", "boundary": "displacement", "neumann": "traction"}  # noqa: RUF012
 
     def __post_init__(self) -> None:
-        if not (self.young > 0.0 and np.isfinite(self.young)):
-            raise ValueError(f"young must be positive and finite, got {self.young}")
-        if not -1.0 < self.poisson_ratio < 0.5:
-            raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {self.poisson_ratio}")
+        if not (isinstance(self.young, Real) and self.young > 0.0 and np.isfinite(self.young)):
+            raise ValueError(f"young must be a positive and finite number, got {self.young!r:.80}")
+        if not (isinstance(self.poisson_ratio, Real) and -1.0 < self.poisson_ratio < 0.5):
+            raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {self.poisson_ratio!r:.80}")
         self._set({"exact": self.exact, "source": self.force, "boundary": self.displacement}, self.traction, {})
         if not self.dirichlet:
             raise ValueError("traction on all six faces leaves the body free to move: leave one face to displacement")
