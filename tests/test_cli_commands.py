@@ -297,6 +297,9 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--quadrature", "simpson"], "quadrature"),
         (["run", "poisson", "cube", "--preset", "slow"], "preset"),
         (["run", "poisson", "cube", "--seed", "-1"], "seed"),
+        (["run", "poisson", "cube", "--seed", "1.5"], "seed: must be a whole number, got 1.5"),
+        (["run", "poisson", "cube", "--control-points", "6.4"], "control-points: must be a whole number"),
+        (["solve", "poisson", "good.npz", "--refine", "0", "1.5"], "refine: must be a whole number, got 1.5"),
         (["run", "poisson", "cube", "--control-points", "3"], "control points"),
         (["run", "poisson", "cube", "--control-points", "100000"], "at most 100"),
         (["run", "poisson", "cube", "--steps-factor", "0"], "factor"),
@@ -543,14 +546,30 @@ def test_checkpoint_of_another_run_is_said(formula_training, in_folder, capsys):
     assert "another run" in one_line(capsys.readouterr().err)
 
 
-def test_ctrl_c_in_the_middle_of_a_training_leaves_a_checkpoint(in_folder):
+def test_a_refused_checkpoint_costs_no_file(formula_training, in_folder, capsys, monkeypatch):
+    formula_training()
+    with monkeypatch.context() as patched:
+        patched.setattr("solve.solve_problem", lambda *_, **__: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            main(["run", "poisson", "cube"])
+    before = sorted(Path("cube").iterdir())
+    Path("cube/checkpoint").mkdir()
+    Path("cube/checkpoint/spline.safetensors").touch()
+    formula_training(error=CheckpointError("belongs to another run"))
+    assert main(["run", "poisson", "cube", "--seed", "3", "--resume"]) == 2
+    assert sorted(Path("cube").iterdir()) == sorted([*before, Path("cube/checkpoint")])
+    assert Path("cube/volume.npz") in before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_in_the_middle_of_a_training_leaves_a_checkpoint(in_folder, number):
     command = [sys.executable, "-m", "iga_nn", "parameterize", "bean"]
     environment = os.environ | {"PYTHONPATH": str(Path(iga_nn.__file__).resolve().parents[1])}
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as running:
         for line in running.stderr:
             if "step" in line:
                 break
-        running.send_signal(signal.SIGINT)
+        running.send_signal(number)
         rest = running.stderr.read()
     assert running.returncode == 130
     assert "--resume" in one_line(rest)

@@ -262,6 +262,21 @@ def test_levels_that_are_no_numbers_are_refused(refine):
         iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(), refine=refine)
 
 
+@pytest.mark.parametrize(
+    ("how", "says"),
+    [({"refine": 50}, "refine 50 gives .* elements"), ({"degree": 2.5}, "degree must be a whole number")],
+)
+def test_spaces_that_cannot_be_made_are_refused(how, says):
+    with pytest.raises(ValueError, match=says):
+        iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="x"), **how)
+
+
+@pytest.mark.parametrize("source", [lambda x, y, z: 1j * x, lambda x, y, z: "x"])
+def test_data_that_are_no_real_numbers_are_refused(source):
+    with pytest.raises(ValueError, match="source must return real numbers"):
+        iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(source=source))
+
+
 def test_a_study_of_one_level_is_refused():
     with pytest.raises(ValueError, match=r"refine must be levels such as range\(3\), got 1"):
         iga_nn.convergence(benchmark_volume(2), iga_nn.Poisson(), refine=1)

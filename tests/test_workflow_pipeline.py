@@ -140,6 +140,20 @@ def test_options_of_another_problem_are_refused():
         iga_nn.run("poisson", "cube", elasticity=ElasticityOptions())
 
 
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"mapping": {"seed": 1}}, "mapping must be MapOptions"),
+        ({"poisson": iga_nn.Poisson(exact="x")}, "poisson must be PoissonOptions"),
+        ({"poisson": PoissonOptions(refine=1)}, "refine 1: give a tuple of whole numbers"),
+        ({"poisson": PoissonOptions(refine=(0.5,))}, "give a tuple of whole numbers"),
+    ],
+)
+def test_options_of_another_type_are_refused(given, says, in_folder):
+    with pytest.raises(InputError, match=says):
+        iga_nn.run("poisson", "cube", **given)
+
+
 def test_config_follows_the_options():
     config = MapOptions(preset="paper", steps_factor=0.1, control_points=12).config()
     assert config.name == "paper" and config.spline.control_points == 12

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 def _converted(kind: Any, tokens: Sequence[Token]) -> Any:
     """Convert an argument as cyclopts does, but refuse a fraction for a whole number: it would be rounded."""
     if int in (kind, *get_args(kind)) and (wrong := [token for token in tokens if "." in token.value]):
-        raise InputError(f"must be a whole number, got {wrong[0].value}")
+        raise CycloptsError(msg=f"{wrong[0].keyword}: must be a whole number, got {wrong[0].value}")
     return convert(kind, tokens)
 
 

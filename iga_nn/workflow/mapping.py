@@ -73,7 +73,7 @@ def map_surface(
 def _prepare(
     state: RunFolder, mesh: str | Path, options: MapOptions, equation: Equation | None, unknowns: int
 ) -> _Given:
-    """Check the options, read the surface and the corners, check the problem's data on it, and announce what the run will take.
+    """Check the options, read the surface and the corners, check the problem's data, and announce what the run takes.
 
     The folder is cleared once all of them are accepted; where a run is resumed, only when its map is there: the
     checkpoint may be refused.

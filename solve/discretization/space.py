@@ -14,7 +14,7 @@ from parameterize.spline.volume import BSplineVolume
 
 Window = tuple[slice, slice, slice]
 
-MOST_ELEMENTS = 1e9  # of a trial space: no computer solves on so many, and halving on and on would not end
+MOST_ELEMENTS = 1e12  # of a trial space: no computer solves on so many, and halving on and on would not end
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ class Datum:
     def __call__(self, x: Array) -> Array:
         """Return values (c, ...) at points (3, ...).
 
-        Raises ExpressionError where they are not finite, ValueError where a function's result has another shape or kind.
+        Raises ExpressionError where they are not finite, ValueError where a function returns another shape or kind.
         """
         each = x.shape[1:] if len(self.entries) == self.components else (self.components, *x.shape[1:])
         parts = []
