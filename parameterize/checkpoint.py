@@ -17,7 +17,7 @@ from torch import Tensor
 
 from .files import save_bytes
 
-FORMAT = 4
+FORMAT = 5
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
 

@@ -74,7 +74,8 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the penalty on them and their neighbours grows further, and after
-    `firm_rounds` the surface data near them loses weight. Where the boundary of a certified map meets itself, further
+    `firm_rounds` the surface data near them loses weight; where a large share of all spans is unproved then, the
+    rounds end. Where the boundary of a certified map meets itself, further
     rounds push it apart, and the surface data there lose weight. Once the map is certified, a few more rounds take back
     what the data has lost, step by step, as far as they can. Anchors along the cube's edges draw F to the surface in
     those last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
@@ -131,13 +132,14 @@ class _Rounds:
     certified: bool = False  # whether a round on these knots has ended with a certified map
     parting: int = 0  # rounds in which the boundary of a certified map that meets itself is pushed apart
     polished: int = 0  # rounds after that, or after the map was certified for the first time
+    lost: bool = False  # whether so much is still folded that letting single spans give way cannot mend it
 
     @property
     def finished(self) -> bool:
         """Whether no round is left, or the last polish has left nothing to take back."""
         config = self.energy.config
         polished = self.polished == config.polish or (self.polished > 0 and self.settled and not self.energy.yields)
-        return self.number >= config.rounds or polished
+        return self.number >= config.rounds or polished or self.lost
 
     @property
     def settled(self) -> bool:
@@ -173,12 +175,15 @@ class _Rounds:
         if self.number == 0 or found.faults <= self.best.faults:
             places = self.energy.surface.places
             self.best, self.best_places = found, (places.parameters, places.cube_faces)
-        self.energy.barrier.activate(unproved)
+        many = len(unproved) > config.watched * math.prod(len(breakpoints(k)) - 1 for k in self.knots)
+        if not many:
+            self.energy.barrier.activate(unproved)
         if self.number >= config.patient_rounds and len(unproved):
             self.energy.barrier.stiffen(unproved, config.span_growth, config.span_most)
         if self.number >= config.firm_rounds and not self.polished and len(unproved):
             self.energy.give_way(unproved, config.giving_way)
         self.number += 1
+        self.lost = many and self.number >= config.firm_rounds
 
     def save(self, checkpoints: Checkpoints, history: History) -> None:
         """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
@@ -196,7 +201,7 @@ class _Rounds:
             "span_weights": torch.as_tensor(self.energy.barrier.weights),
         }
         counts = {"number": self.number, "parting": self.parting, "polished": self.polished}
-        state = counts | {"certified": self.certified, "history": history.rows}
+        state = counts | {"certified": self.certified, "lost": self.lost, "history": history.rows}
         checkpoints.save(_CHECKPOINT, tensors, state)
 
     def restore(self, tensors: dict[str, Tensor], state: dict[str, Any], history: History) -> None:
@@ -210,7 +215,7 @@ class _Rounds:
         self.best = Optimized.of(tensors["best"], self.knots, energy.config)
         self.best_places = tensors["best_parameters"].numpy(), tensors["best_cube_faces"].numpy()
         self.number, self.parting, self.polished = (int(state[name]) for name in ("number", "parting", "polished"))
-        self.certified = bool(state["certified"])
+        self.certified, self.lost = bool(state["certified"]), bool(state["lost"])
         history.rows[:] = [tuple(row) for row in state["history"]]
 
 
