@@ -91,7 +91,7 @@ class SplineConfig:
     sharp: tuple[float, ...] = (0.0, 30.0)  # degrees, one a try of the first start: lower edges count as smooth
     min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
-    watched: float = 0.05  # share of the spans: where more are not proved, the Gauss points have to unfold most first
+    most_watched: int = 1000  # spans: where more are not proved, the Gauss points have to unfold most of them first
     min_facing: float = 0.1  # likewise (t_a x t_b) . n of the boundary's tangents and the mesh's normals
     facing_margin: float = 3.0  # times `min_facing`: points below may fall under it in the next step and are watched
     gap: float = 1e-3  # sheets of a boundary that meets itself are pushed so far apart

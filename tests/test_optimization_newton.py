@@ -204,6 +204,17 @@ def test_a_folded_start_is_unfolded():
     assert mean_arap(as_volume(found.control)) < mean_arap(as_volume(start))
 
 
+@pytest.mark.parametrize(("most", "rounds"), [(0, 3), (1000, 5)])
+def test_a_try_with_too_much_folded_is_given_up(monkeypatch, most, rounds):
+    """Nothing is mended here; where single spans cannot be watched, the try ends once the surface would give way."""
+    monkeypatch.setattr(newton, "_descend", lambda control, *_: control)
+    checkpoints, saved = Checkpoints(None, {}, resume=False), []
+    monkeypatch.setattr(checkpoints, "save", lambda *state: saved.append(state))
+    config = replace(CONFIG, rounds=5, firm_rounds=3, most_watched=most)
+    optimize(wavy_control(0.6), KNOTS, surface_fit(), config, history=History(), checkpoints=checkpoints)
+    assert len(saved) == rounds and saved[-1][2]["lost"] == (most == 0)
+
+
 def test_what_gave_way_counts_again_once_the_map_is_certified():
     start, fit, history = wavy_control(0.08), surface_fit(), History()
     fit.give_way(np.full(len(fit.points), 0.05))

@@ -74,8 +74,8 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the penalty on them and their neighbours grows further, and after
-    `firm_rounds` the surface data near them loses weight; where a large share of all spans is unproved then, the
-    rounds end. Where the boundary of a certified map meets itself, further
+    `firm_rounds` the surface data near them loses weight; where more than `most_watched` are unproved then,
+    the rounds end. Where the boundary of a certified map meets itself, further
     rounds push it apart, and the surface data there lose weight. Once the map is certified, a few more rounds take back
     what the data has lost, step by step, as far as they can. Anchors along the cube's edges draw F to the surface in
     those last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
@@ -175,7 +175,7 @@ class _Rounds:
         if self.number == 0 or found.faults <= self.best.faults:
             places = self.energy.surface.places
             self.best, self.best_places = found, (places.parameters, places.cube_faces)
-        many = len(unproved) > config.watched * math.prod(len(breakpoints(k)) - 1 for k in self.knots)
+        many = len(unproved) > config.most_watched
         if not many:
             self.energy.barrier.activate(unproved)
         if self.number >= config.patient_rounds and len(unproved):
