@@ -241,6 +241,17 @@ def test_corner_points_take_the_nearest_vertices(surface):
     assert corner_vertices(surface, np.arange(8, dtype=np.int32)).tolist() == list(range(8))
 
 
+@pytest.mark.parametrize("most", [300, 2000])
+def test_long_edges_give_so_many_points_at_most(surface, most):
+    spline = replace(tiny_config().spline, control_points=30)
+    vertices, faces = run._surface_points(surface, replace(spline, most_points=most))
+    assert len(vertices) <= max(most, len(surface.vertices))
+    edges = np.linalg.norm(vertices[faces] - vertices[faces[:, [1, 2, 0]]], axis=2)
+    spans = 27 * edges.max()  # the length of the longest one
+    assert spans > 1.0 and len(run._surface_points(surface, spline)[0]) > 2000
+    assert np.array_equal(vertices[: len(surface.vertices)], surface.unit_vertices)
+
+
 def test_devices():
     with pytest.raises(ValueError, match="'tpu'.*auto, cpu or cuda"):
         choose_device("tpu")
