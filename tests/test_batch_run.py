@@ -123,7 +123,7 @@ def test_a_batch_survives_what_happens_to_it(tmp_path):
     assert same[0] == same[1]
     assert (tmp_path / "out" / "first" / "volume.npz").stat().st_mtime_ns == written
     assert rows["hungry"]["state"] == "failed" and "out of memory" in rows["hungry"]["line"]
-    assert rows["open"]["state"] == "refused" and rows["open"]["line"].startswith("parts/open.obj: ")
+    assert rows["open"]["state"] == "refused" and rows["open"]["line"].startswith("open surface: ")
 
     (parts / "hungry.obj").rename(parts / "modest.obj")
     (parts / "open.obj").write_text(obj())

@@ -125,7 +125,7 @@ def test_a_shape_that_cannot_be_made_is_a_row(formula, monkeypatch):
     monkeypatch.setitem(shapes, "TRIES", 0)
     assert stress.main(formula) == 0
     (row,) = rows()
-    assert row["error"] == "000-bumpy: intersects itself even after 0 tries"
+    assert row["error"] == "intersects itself even after 0 tries"
 
 
 def test_bad_arguments_are_one_line(tmp_path, capsys):
