@@ -72,7 +72,7 @@ class SplineConfig:
 
     control_points: int = 30
     degree: int = 3
-    most_points: int = 30_000  # of the surface, where its mesh has fewer: else its long edges are cut less finely
+    most_points: int = 30_000  # added where long edges of the mesh are cut: else they are cut less finely
     fit_cell: float = 0.035  # lattice of inverse samples
     fit_fairness: float = 1e-7
     boundary_share: float = 0.2  # weight of the surface's samples in the first fit; those inside have the rest of 1

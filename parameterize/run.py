@@ -193,11 +193,11 @@ def parameterize(
 
 
 def _surface_points(surface: Surface, spline: SplineConfig) -> tuple[Array, IntArray]:
-    """Return the surface at volume 1, its edges cut: into a span's length, or longer where those were too many."""
+    """Return the surface at volume 1, its long edges cut to a span's length; less finely where that adds too much."""
     longest = 1.0 / (spline.control_points - spline.degree)
     while True:
         vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
-        if len(vertices) <= max(spline.most_points, len(surface.vertices)):
+        if len(vertices) - len(surface.vertices) <= spline.most_points:
             return vertices, faces
         longest *= 1.25
 

@@ -52,7 +52,7 @@ def test_zero_right_hand_side_needs_no_iteration():
 def test_stops_where_the_matrix_is_not_positive(value):
     result = conjugate_gradients(lambda p: value * p, np.ones(4), identity)
     assert not result.converged
-    assert result.iterations == 0
+    assert result.iterations == 0 and result.indefinite == (value < 0.0)
     assert np.all(result.x == 0.0)
 
 

@@ -63,7 +63,7 @@ def map_surface(
     """
     given = _prepare(state, mesh, options, equation, unknowns)
     result = _train(given, options, progress, state.folder / CHECKPOINT)
-    state.begin("map", "solution")
+    state.begin("map", "solution")  # what was left until the checkpoint of a resumed run was accepted
     state.seconds.update(result.seconds)
     _write(state, given, result, command, options)
     _draw(state, given, result)

@@ -13,7 +13,7 @@ from ..spline.bspline import real_array
 from ..spline.volume import FACE_NAMES, BSplineVolume
 from .cube import damped_fit, snap
 from .cutting import CutMesh, cut_along_rays
-from .flips import flipped, orientation, untangle
+from .flips import orientation, untangle_whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +129,7 @@ def boundary_map(
     Parameters come from closest points of the volume's boundary, which may turn a few triangles over where the spline
     smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
     """
-    placed = untangle(parameters, faces, layout)
-    if flipped(placed, faces).any():
-        placed = parameters
+    placed = untangle_whole(parameters, faces, layout)
     for number in range(layout.nudges):
         cut = cut_along_rays(placed, faces, layout.same)
         spread = snap(cut.carry(placed))

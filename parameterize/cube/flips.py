@@ -98,6 +98,15 @@ def untangle(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) 
     return snap(0.5 + direction)
 
 
+def untangle_whole(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) -> Array:
+    """Untangle, or return the parameters as they are where flips would be left.
+
+    Rings of neighbours that join round after round spread what cannot be untangled over a whole limb of the surface.
+    """
+    untangled = untangle(parameters, faces, layout)
+    return parameters if flipped(untangled, faces).any() else untangled
+
+
 def _directions(parameters: Array) -> Array:
     """Return unit vectors from the cube's centre to its points (n, 3)."""
     direction = parameters - 0.5

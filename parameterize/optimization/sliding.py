@@ -17,7 +17,7 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..config import LAYOUT, LayoutConfig
 from ..cube.cube import axis_and_side, damped_fit, face_number, nearest_faces, tangent_axes
-from ..cube.flips import flipped, new_flips, unflip, untangle
+from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints, fill_basis, sparse_rows
 from ..threads import in_parallel
 from .determinant_penalty import with_neighbours
@@ -117,10 +117,7 @@ class SlidingParameters:
         for _ in range(slides):
             other.slide(control, points, longest)
         other.unflip()
-        relaxed = copy(other)
-        relaxed.relax(sweeps)  # where flips are left
-        if not flipped(relaxed.parameters, self.triangles).any():
-            other = relaxed
+        other._move(untangle_whole(other.parameters, self.triangles, replace(self.layout, sweeps=sweeps)))
         for _ in range(slides):
             other.slide(control, points, longest, keep_layout=True)
         return other

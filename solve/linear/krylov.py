@@ -18,7 +18,7 @@ Vector = Any  # a NumPy array or a torch tensor: anything with their arithmetic,
 class LinearResult:
     """The last iterate, and |r| / |b| before the first and after every iteration.
 
-    indefinite: whether a direction has shown that the matrix is not positive definite.
+    indefinite: whether a direction has shown that the matrix, or the preconditioner, is not positive definite.
     """
 
     x: Vector
@@ -70,7 +70,7 @@ def conjugate_gradients(
         product = operator(p)
         curvature = dot(p, product)
         if not (rz > 0.0 and curvature > 0.0):  # NaN included
-            return LinearResult(x, tuple(residuals), False, math.isfinite(rz * curvature))
+            return LinearResult(x, tuple(residuals), False, rz < 0.0 or curvature < 0.0)
         step = rz / curvature
         x += step * p
         product *= step
