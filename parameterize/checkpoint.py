@@ -17,7 +17,7 @@ from torch import Tensor
 
 from .files import save_bytes
 
-FORMAT = 5
+FORMAT = 6
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
 
@@ -44,12 +44,6 @@ class Checkpoints:
         """Return the checkpoints of another start of the run, in files of their own; the first start is number 0."""
         other = copy(self)
         other._suffix = f"-{start}" if start else ""
-        return other
-
-    def of_try(self, number: int) -> "Checkpoints":
-        """Return the checkpoints of another try of the spline stage, in files of their own; the first is number 0."""
-        other = copy(self)
-        other._suffix += f"-try{number}" if number else ""
         return other
 
     def of_refinement(self, number: int) -> "Checkpoints":

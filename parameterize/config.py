@@ -61,9 +61,22 @@ class TrainConfig:
     min_det: float = 0.1  # alpha of the bijectivity term
     wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
     whiten: bool = True  # start from the affine map that makes the domain as wide in all directions, not the identity
-    turn: float = 45.0  # degrees by which that map is turned for each further start
     det_floor: float = 0.5  # share of `min_det` at which the distortion term holds smaller determinants
+    lost_loss: float | None = 30.0  # where the last stage ends with a larger loss, the map is grown at once
     edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
+
+
+@dataclass(frozen=True)
+class GrowthConfig:
+    """How F grows from a cube into the solid, where the training fails: rounds before those of the spline stage."""
+
+    shares: tuple[float, ...] = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)  # of `vertex`
+    steps: int = 12  # a round, at most
+    penalty: float = 2500.0  # on det J, in these rounds and all later ones
+    reach: float = 0.03  # surface points farther from F than this do not slide, and draw F in all directions
+    rounds: int = 12  # of the spline stage, after these
+    patient_rounds: int = 2  # in place of the spline stage's
+    firm_rounds: int = 6  # likewise
 
 
 @dataclass(frozen=True)
@@ -88,7 +101,6 @@ class SplineConfig:
     near_share: float = 0.99  # the anchors act from the first round on if at least this share of them is near
     given_corner: float = 0.5  # share of `anchors` that holds a corner given by the user, in all directions
     tangential: float = 2e-4  # share of `vertex` for the distance within the tangent plane
-    sharp: tuple[float, ...] = (0.0, 30.0)  # degrees, one a try of the first start: lower edges count as smooth
     min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
     most_watched: int = 1000  # spans: where more are not proved, the Gauss points have to unfold most of them first
@@ -107,6 +119,7 @@ class SplineConfig:
     firm_rounds: int = 4  # after these the surface gives way at unproved spans
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most
+    growth: GrowthConfig | None = None  # where F grows into the solid
     usual_steps: tuple[int, ...] = (18, 18, 14, 6, 6, 6)  # of the rounds of most runs: tells the time left
     least_steps: int = 6  # a round: what unfolds a few spans hardly lowers the energy of the whole
     slides: int = 3  # of the boundary parameters after each step
@@ -163,6 +176,12 @@ class LayoutConfig:
     settle_damping: float = 1e-3  # of these, against parallel directions
     settle_margin: float = 1e-2  # share that a cut keeps from the ends of its edge
     undo_rounds: int = 10  # in which such steps are undone at flipped triangles, at most
+    least_share: float = 0.25  # that the line which halves a surface keeps from the ends of the edges it divides
+    sphere_steps: int = 150  # of Newton's method for the layout on the sphere, at most
+    sphere_damping: float = 1e-8  # of these, as a share of the mean diagonal entry
+    sphere_gain: float = 1e-3  # the steps end once one lowers the energy by less than this share
+    turns: int = 100  # of the cube in that layout, from which the best is taken
+    edge_width: float = 0.06  # from the cube's edges, within which the surface should not be hollow
 
 
 LAYOUT = LayoutConfig()
@@ -182,8 +201,9 @@ class Config:
     spline : SplineConfig
         Fit and optimisation, `control_points` a direction and `degree` among them.
     layout : LayoutConfig
+    growth : GrowthConfig
     starts : int
-        A map that is not certified is tried anew with the cube rotated, so many times in all.
+        The tries in all: where the trained map is not certified, others are grown from a cube.
 
     Examples
     --------
@@ -198,20 +218,22 @@ class Config:
     stages: tuple[StageConfig, ...]
     spline: SplineConfig
     layout: LayoutConfig = LAYOUT
-    starts: int = 2  # a map that is not certified is tried anew with the cube turned, so many times in all
+    growth: GrowthConfig = GrowthConfig()
+    starts: int = 3  # a map that is not certified is grown instead, from other layouts: so many tries in all
     refinement: RefinementConfig | None = None  # the control points of `spline` are all there are where it is None
 
     def scaled(self, factor: float) -> Config:
         """Return the same options with `factor` (at most 100) times as many steps in every stage, at least one each.
 
-        With fewer steps every shape looks hard after the first stage: none is trained longer then.
+        With fewer steps every shape looks hard: none is trained longer then, and none counts as lost.
         """
         if not isinstance(factor, Real) or not 0.0 < factor <= 100.0:
             raise ValueError(f"steps factor must be a positive number, at most 100, got {factor!r:.80}")
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
-        train = self.train if factor >= 1.0 else replace(self.train, most_effort=1.0)
-        return replace(self, train=train, stages=stages, spline=spline)
+        train = self.train if factor >= 1.0 else replace(self.train, most_effort=1.0, lost_loss=None)
+        growth = replace(self.growth, steps=max(1, round(factor * self.growth.steps)))
+        return replace(self, train=train, stages=stages, spline=spline, growth=growth)
 
     def refined(self, tolerance: float, max_control_points: int) -> Config:
         """Return the same options with knots inserted until a tolerance is met, see RefinementConfig.

@@ -20,10 +20,11 @@ from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, SplineConfig, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
-from .cube.cutting import subdivide_long_edges
+from .cube.cutting import subdivide_finely
 from .cube.edge_paths import PathError, choose_corners
 from .cube.flips import flipped, untangle
 from .cube.tutte import Layout, lay_out
+from .growth import first_cube, growing, surface_on_cube
 from .optimization.least_squares import fit_pairs
 from .optimization.newton import Optimized, one_thread_an_operation, optimize
 from .optimization.sliding import SlidingParameters
@@ -165,18 +166,11 @@ def parameterize(
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     spline = config.spline
     knots = (open_uniform_knots(spline.control_points, spline.degree),) * 3
-    vertices, faces = _surface_points(surface, spline)
     own, history, seconds = len(surface.vertices), History(), dict[str, float]()
+    vertices, faces = subdivide_finely(surface.unit_vertices, surface.faces, own, spline)
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
-    task = _Task(vertices, own, faces, config, knots, seed, place, dtype, given, seconds, report)
-    found, fit = _attempt(task, 0, checkpoints)
-    for start in range(1, config.starts if given is None else 1):
-        if not any(found.faults):
-            break
-        _log.warning("%s; trying again with the cube rotated", _fault(found))
-        other = _attempt(task, start, checkpoints.of_start(start))
-        if other[0].faults < found.faults:
-            found, fit = other
+    task = _Task(surface, vertices, own, faces, config, knots, seed, place, dtype, given, seconds, report)
+    found, fit = _best_attempt(task, checkpoints)
     told = None
     if config.refinement is not None:
         with _timed(seconds, "refine"):
@@ -190,16 +184,6 @@ def parameterize(
     return Parameterization(
         volume, boundary, certificate, quality, history.arrays(), seconds, place.type, seed, config, told
     )
-
-
-def _surface_points(surface: Surface, spline: SplineConfig) -> tuple[Array, IntArray]:
-    """Return the surface at volume 1, its long edges cut to a span's length; less finely where that adds too much."""
-    longest = 1.0 / (spline.control_points - spline.degree)
-    while True:
-        vertices, faces = subdivide_long_edges(surface.unit_vertices, surface.faces, longest)
-        if len(vertices) - len(surface.vertices) <= spline.most_points:
-            return vertices, faces
-        longest *= 1.25
 
 
 def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config, int]:
@@ -248,8 +232,9 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """What all starts share: the surface at volume 1 with its long edges cut, options, knots, and where to compute."""
+    """What all attempts share: the surface, itself and at volume 1 with long edges cut; options, knots, the place."""
 
+    surface: Surface
     vertices: Array
     own: int  # vertices of the surface itself, the first ones
     faces: IntArray
@@ -263,19 +248,33 @@ class _Task:
     report: dict[str, Any]  # history and progress, as Trainer and optimize take them
 
 
-def _attempt(task: _Task, start: int, checkpoints: Checkpoints) -> tuple[Optimized, SurfaceFit]:
-    """Train, fit and optimise from one start; return what was found and where the surface lies on its boundary.
+_Attempt = tuple[Optimized, SurfaceFit]
 
-    Where the first start is not certified, or meets itself, its control points are optimised once more with boundary
-    data that hold along the normal alone where the mesh is smooth: F slides freely, which helps some shapes.
-    """
+
+def _best_attempt(task: _Task, checkpoints: Checkpoints) -> _Attempt:
+    """Train a map; where it is lost or not certified, grow others. Return the first without faults, or the best."""
+    starts = task.config.starts if task.given_corners is None else 1
+    best = _trained(task, checkpoints, give_up=starts > 1)
+    for start in range(1, starts):
+        if best is not None and not any(best[0].faults):
+            break
+        fault = "the training is too far from a cube" if best is None else _fault(best[0])
+        _log.warning("%s; growing a map from a cube instead", fault)
+        other = _grown(task, start, checkpoints.of_start(start))
+        if best is None or other[0].faults < best[0].faults:
+            best = other
+    assert best is not None
+    return best
+
+
+def _trained(task: _Task, checkpoints: Checkpoints, *, give_up: bool) -> _Attempt | None:
+    """Train the network, fit F to it and optimise F. With `give_up`, return None where the last loss is too high."""
     with _timed(task.seconds, "train"), one_thread_an_operation():
         trainer = Trainer(
             task.vertices,
             task.faces,
             task.config,
             seed=task.seed,
-            start=start,
             device=task.device,
             dtype=task.dtype,
             given_corners=task.given_corners,
@@ -283,34 +282,46 @@ def _attempt(task: _Task, start: int, checkpoints: Checkpoints) -> tuple[Optimiz
             **task.report,
         )
         network = trainer.run()
-    tries: list[tuple[Optimized, SurfaceFit]] = []
-    for number, sharp in enumerate(task.config.spline.sharp if start == 0 else task.config.spline.sharp[:1]):
-        if tries:
-            _log.warning("%s; trying again with the boundary free to slide", _fault(tries[0][0]))
-        with _timed(task.seconds, "fit"), one_thread_an_operation():
-            fit = _surface_fit(network, trainer.corners, task, sharp)
-            control = _first_spline(network, fit, task)
-        with _timed(task.seconds, "optimize"):
-            kept, spline = checkpoints.of_try(number), task.config.spline
-            tries.append((optimize(control, task.knots, fit, spline, checkpoints=kept, **task.report), fit))
-        if not any(tries[-1][0].faults):
-            break
-    return min(tries, key=lambda found: found[0].faults)
+    limit = task.config.train.lost_loss
+    if give_up and limit is not None and trainer.last_loss > limit:
+        return None
+    with _timed(task.seconds, "fit"), one_thread_an_operation():
+        mapped = map_points(network, task.vertices, task.device, task.dtype)
+        fit = _surface_fit(_layout(mapped, trainer.corners, task), task)
+        control = _first_spline(network, fit, task)
+    return _optimized(control, fit, task.config.spline, task, checkpoints)
+
+
+def _grown(task: _Task, start: int, checkpoints: Checkpoints) -> _Attempt:
+    """Lay the surface on the cube, turned otherwise at every start, and let F grow from a cube towards it."""
+    config = task.config
+    with _timed(task.seconds, "fit"), one_thread_an_operation():
+        generator = np.random.default_rng([task.seed, start])
+        mesh = task.surface.unit_vertices, task.surface.faces
+        layout = surface_on_cube(*mesh, config.spline, config.layout, generator)
+        fit = _surface_fit(layout, task)
+        control = first_cube(layout, task.own, task.knots, config.spline.degree)
+    return _optimized(control, fit, growing(config.spline, config.growth), task, checkpoints)
+
+
+def _optimized(
+    control: torch.Tensor, fit: SurfaceFit, spline: SplineConfig, task: _Task, checkpoints: Checkpoints
+) -> _Attempt:
+    with _timed(task.seconds, "optimize"):
+        return optimize(control, task.knots, fit, spline, checkpoints=checkpoints, **task.report), fit
 
 
 def _fault(found: Optimized) -> str:
     return "the boundary meets itself" if found.meets_itself else "not certified"
 
 
-def _surface_fit(network: InverseMap, corners: IntArray | None, task: _Task, sharp: float) -> SurfaceFit:
+def _surface_fit(layout: Layout, task: _Task) -> SurfaceFit:
     """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
     spline = task.config.spline
-    mapped = map_points(network, task.vertices, task.device, task.dtype)
-    layout = _layout(mapped, corners, task)
     return SurfaceFit(
         SlidingParameters(task.knots, spline.degree, layout.places, layout.faces, task.config.layout),
         layout.vertices,
-        vertex_quadrics(layout.vertices, layout.faces, spline.tangential, sharp),
+        vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
         vertex_weights(layout.vertices, layout.faces, task.own),
         given_corners=None if task.given_corners is None else task.vertices[task.given_corners],
     )

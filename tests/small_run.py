@@ -4,21 +4,22 @@ from dataclasses import replace
 
 from shapes import rounded_cube, turned
 
-from parameterize.config import NetworkConfig, preset
+from parameterize.config import GrowthConfig, NetworkConfig, preset
 from parameterize.surface.surface import surface_from_arrays
 
 STEPS = (6, 4, 8, 4, 8)
 
 
 def shortened(config):
-    """The same way with a small network, few samples and few steps: one start, one try of two rounds."""
+    """The same way with a small network, few samples and few steps: one start of two rounds."""
     return replace(
         config,
         starts=1,
         network=NetworkConfig(width=16, modules=1, frequencies=3),
-        train=replace(config.train, cell=0.2, triangles=200, most_effort=1.0),
+        train=replace(config.train, cell=0.2, triangles=200, most_effort=1.0, lost_loss=None),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
-        spline=replace(config.spline, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2, sharp=(0.0,)),
+        spline=replace(config.spline, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2),
+        growth=GrowthConfig(shares=(0.1, 1.0), steps=3, rounds=2),
     )
 
 

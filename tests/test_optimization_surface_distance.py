@@ -47,24 +47,23 @@ def test_energy_is_quadratic_with_the_given_gradient_and_hessian():
 
 def test_quadrics_measure_along_the_normal_of_a_sphere():
     vertices, faces = ball(1500)
-    quadrics = vertex_quadrics(vertices, faces, 0.02, 30.0)
+    quadrics = vertex_quadrics(vertices, faces, 0.02)
     along = np.einsum("ni,nij,nj->n", vertices, quadrics, vertices)
     assert along == pytest.approx(1.02, abs=0.01)
-    assert np.linalg.eigvalsh(quadrics)[:, :2] == pytest.approx(0.02, abs=1e-12)  # free along the surface
+    assert np.linalg.eigvalsh(quadrics)[:, :2] == pytest.approx(0.02, abs=0.01)  # nearly free along the surface
 
 
-@pytest.mark.parametrize(("angle", "held"), [(20.0, False), (40.0, True)])
-def test_quadrics_hold_across_an_edge_that_is_sharp(angle, held):
+@pytest.mark.parametrize("angle", [20.0, 40.0])
+def test_quadrics_hold_across_an_edge(angle):
     rise = np.tan(np.radians(0.5 * angle))
     vertices = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.5, -rise], [1.0, 0.5, -rise]])
-    quadrics = vertex_quadrics(vertices, np.array([[0, 1, 2], [1, 0, 3]]), 0.0, 30.0)
-    across = np.sin(np.radians(0.5 * angle)) ** 2
-    assert np.linalg.eigvalsh(quadrics[0])[1] == pytest.approx(across if held else 0.0, abs=1e-12)
+    quadrics = vertex_quadrics(vertices, np.array([[0, 1, 2], [1, 0, 3]]), 0.0)
+    assert np.linalg.eigvalsh(quadrics[0])[1] == pytest.approx(np.sin(np.radians(0.5 * angle)) ** 2, abs=1e-12)
 
 
 def test_quadrics_at_the_corner_of_a_cube_hold_in_all_directions():
     cube = sample("cube")
-    quadrics = vertex_quadrics(cube.vertices, cube.faces, 0.0, 30.0)
+    quadrics = vertex_quadrics(cube.vertices, cube.faces, 0.0)
     corner = np.flatnonzero((cube.vertices == cube.vertices.min(axis=0)).all(axis=1))
     assert np.linalg.eigvalsh(quadrics[corner[0]]).min() > 0.2
     middle = np.linalg.norm(cube.vertices - cube.vertices.mean(axis=0) - [0.0, 0.0, 0.5], axis=1).argmin()

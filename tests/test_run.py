@@ -14,6 +14,7 @@ from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.cube.cube import CORNERS
+from parameterize.cube.cutting import subdivide_finely
 from parameterize.run import choose_device, corner_vertices, parameterize
 from parameterize.training.trainer import start_map
 
@@ -162,7 +163,7 @@ def test_checkpoint_of_another_run_is_refused(surface, tmp_path):
 
     with pytest.raises(CheckpointError, match=r"\(surface differ"):
         resume(replace(small_surface(3.0), sha256=surface.sha256))  # as another body of the same file
-    with pytest.raises(CheckpointError, match=r"\(config\.spline\.steps, config\.stages differ"):
+    with pytest.raises(CheckpointError, match=r"\(config\.growth\.steps, config\.spline\.steps, config\.stages differ"):
         resume(options=config.scaled(2.0))
     with pytest.raises(CheckpointError, match=r"\(seed differ"):
         resume(seed=1)
@@ -243,12 +244,12 @@ def test_corner_points_take_the_nearest_vertices(surface):
 
 @pytest.mark.parametrize("most", [300, 2000])
 def test_long_edges_add_so_many_points_at_most(surface, most):
-    spline = replace(tiny_config().spline, control_points=30)
-    vertices, faces = run._surface_points(surface, replace(spline, most_points=most))
+    spline, own = replace(tiny_config().spline, control_points=30), len(surface.vertices)
+    vertices, faces = subdivide_finely(surface.unit_vertices, surface.faces, own, replace(spline, most_points=most))
     assert 0 < len(vertices) - len(surface.vertices) <= most
     edges = np.linalg.norm(vertices[faces] - vertices[faces[:, [1, 2, 0]]], axis=2)
     spans = 27 * edges.max()  # the length of the longest one
-    assert spans > 1.0 and len(run._surface_points(surface, spline)[0]) > 2000
+    assert spans > 1.0 and len(subdivide_finely(surface.unit_vertices, surface.faces, own, spline)[0]) > 2000
     assert np.array_equal(vertices[: len(surface.vertices)], surface.unit_vertices)
 
 
@@ -290,50 +291,38 @@ def test_a_seed_of_any_size_is_taken(surface):
             parameterize(surface, tiny_config(), seed=seed, device="cpu", progress=interrupt)
 
 
-def test_a_map_not_certified_is_tried_anew_with_the_cube_turned(surface, monkeypatch):
-    """Of two starts the one with fewer unproved spans is kept."""
+def test_a_map_not_certified_is_grown_from_a_cube(surface, monkeypatch, tmp_path):
+    """Of three attempts the one with fewest unproved spans is kept; two are grown, from cubes turned otherwise."""
     optimize, seen = run.optimize, []
 
-    def spoiled(control, *args, **options):
-        found = optimize(control, *args, **options)
-        unproved = np.zeros((5 if len(seen) == 0 else 2, 3), dtype=np.int64)
-        seen.append(replace(found, certificate=replace(found.certificate, verdict="undecided", unproved=unproved)))
-        return seen[-1]
+    def spoiled(control, knots, fit, config, **options):
+        found = optimize(control, knots, fit, config, **options)
+        unproved = np.zeros(((5, 2, 3)[len(seen) % 3], 3), dtype=np.int64)
+        found = replace(found, certificate=replace(found.certificate, verdict="undecided", unproved=unproved))
+        seen.append((found, config.growth, control))
+        return found
 
     monkeypatch.setattr(run, "optimize", spoiled)
-    result = parameterize(surface, replace(tiny_config(), starts=2), seed=3, device="cpu")
-    assert len(seen) == 2 and not torch.equal(seen[0].control, seen[1].control)
-    kept = np.moveaxis(seen[1].control.numpy(), 0, -1)
-    assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
-    assert (result.history["stage"] == "cube").sum() == 2 * STEPS[2]
-    parameterize(surface, tiny_config(), seed=3, device="cpu")
-    assert len(seen) == 3
-
-
-def test_the_first_start_is_tried_once_more_with_a_boundary_that_slides_freely(surface, monkeypatch, tmp_path):
-    """The network is trained once; the second try keeps checkpoints of its own."""
-    optimize, seen = run.optimize, []
-
-    def spoiled(control, knots, fit, *args, **options):
-        found = optimize(control, knots, fit, *args, **options)
-        unproved = np.zeros((2 - len(seen), 3), dtype=np.int64)
-        verdict = "undecided" if len(unproved) else "certified"
-        seen.append((fit, replace(found, certificate=replace(found.certificate, verdict=verdict, unproved=unproved))))
-        return seen[-1][1]
-
-    monkeypatch.setattr(run, "optimize", spoiled)
-    config = tiny_config()
-    config = replace(config, spline=replace(config.spline, sharp=(0.0, 30.0, 60.0, 90.0)))
+    config = replace(tiny_config(), starts=3)
     result = parameterize(surface, config, seed=3, device="cpu", checkpoint_dir=tmp_path)
-    assert len(seen) == 3  # the third is certified
-    held = [float(np.trace(fit._quadrics, axis1=1, axis2=2).sum()) for fit, _ in seen]
-    assert held[0] > held[1] > held[2]
-    assert np.array_equal(
-        result.volume.control_points, surface.from_unit(np.moveaxis(seen[2][1].control.numpy(), 0, -1))
-    )
-    assert (result.history["stage"] == "cube").sum() == STEPS[2]
+    assert [growth for _, growth, _ in seen] == [None, config.growth, config.growth]
+    assert not torch.equal(seen[1][2], seen[2][2])
+    kept = np.moveaxis(seen[1][0].control.numpy(), 0, -1)
+    assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
+    assert (result.history["stage"] == "cube").sum() == STEPS[2]  # trained once
     names = sorted(path.name for path in tmp_path.glob("*.safetensors"))
-    assert names == ["spline-try1.safetensors", "spline-try2.safetensors", "spline.safetensors", "training.safetensors"]
+    assert names == ["spline-1.safetensors", "spline-2.safetensors", "spline.safetensors", "training.safetensors"]
+    parameterize(surface, tiny_config(), seed=3, device="cpu")
+    assert len(seen) == 4
+
+
+def test_a_lost_training_is_not_followed_by_a_spline_stage(surface, caplog):
+    config = tiny_config()
+    config = replace(config, starts=2, train=replace(config.train, lost_loss=0.0))
+    result = parameterize(surface, config, seed=3, device="cpu")
+    assert "the training is too far from a cube; growing a map from a cube instead" in caplog.text
+    alone = parameterize(surface, replace(config, starts=1), seed=3, device="cpu")
+    assert not np.array_equal(result.volume.control_points, alone.volume.control_points)
 
 
 @pytest.mark.parametrize("meets", [[True, False], [False], [True, True]])
@@ -356,11 +345,10 @@ def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monk
     assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
 
 
-@pytest.mark.parametrize("start", [0, 1, 2])
-def test_the_start_map_makes_a_cloud_round(start):
+def test_the_start_map_makes_a_cloud_round():
     cloud = np.random.default_rng(0).normal(size=(500, 3)) * [4.0, 1.0, 0.5]
-    matrix = start_map(cloud, start, 45.0)
+    matrix = start_map(cloud)
     assert np.linalg.det(matrix) == pytest.approx(1.0)
     spread = np.cov((cloud @ matrix.T).T)
     assert spread == pytest.approx(np.trace(spread) / 3.0 * np.eye(3), abs=1e-9)
-    assert np.allclose(matrix, matrix.T) == (start == 0)
+    assert np.allclose(matrix, matrix.T)

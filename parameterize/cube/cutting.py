@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..config import SplineConfig
 from ..surface.geometry import edge_table
 
 _PLANES = [(a, b, sign) for a, b in ((0, 1), (0, 2), (1, 2)) for sign in (1.0, -1.0)]
@@ -65,15 +66,31 @@ def cut_along_rays(mapped: Array, faces: IntArray, snap: float) -> CutMesh:
 
 
 def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tuple[Array, IntArray]:
-    """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface the same."""
+    """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface the same.
+
+    vertices: (n, 3), or with further columns, which are interpolated as well.
+    """
     while True:
         edges = edge_table(faces)[0]
         ends = vertices[edges]
-        long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > longest
+        long = np.linalg.norm((ends[:, 1] - ends[:, 0])[:, :3], axis=1) > longest
         if not long.any():
             return vertices, faces
         faces = split_edges(faces, edges[long], len(vertices))
         vertices = np.concatenate([vertices, ends[long].mean(axis=1)])
+
+
+def subdivide_finely(vertices: Array, faces: IntArray, own: int, spline: SplineConfig) -> tuple[Array, IntArray]:
+    """Cut edges that are longer than a span of the cube; less finely where that adds more points than it may.
+
+    vertices: (n, 3), at volume 1, or with further columns; the first `own` are those of the mesh.
+    """
+    longest = 1.0 / (spline.control_points - spline.degree)
+    while True:
+        points, triangles = subdivide_long_edges(vertices, faces, longest)
+        if len(points) - own <= spline.most_points:
+            return points, triangles
+        longest *= 1.25
 
 
 def _crossings(

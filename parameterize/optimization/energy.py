@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from ..arrays import Array, IntArray
-from ..config import SplineConfig
+from ..config import GrowthConfig, SplineConfig
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import SpanBarrier
 from .distortion import DistortionEnergy
@@ -33,25 +33,44 @@ class SplineEnergy:
         self._facing: FacingPenalty | None = None
         self._contact: ContactPenalty | None = None
         self._knots = knots
-        self.penalty = config.penalties[0]
+        self.penalty, self.vertex = config.penalties[0], config.vertex
+        self._grows: GrowthConfig | None = None
         self._distortion = DistortionEnergy(knots, config)
         mass, slope, curve = grams(knots, config.degree)
         self._bending, self._rough_bending = (
             bending_operator(mass, slope, curve, 2.0 * config.fairness, dtype) for dtype in (torch.float64, _ROUGH)
         )
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient)
+        self._grams = mass, slope, curve
+        self._precondition = self._preconditioner()
+
+    def _preconditioner(self) -> FastDiagonalization:
+        config, (mass, slope, curve) = self.config, self._grams
         rough = tuple(2.0 * k + 2.0 * config.fairness * h for k, h in zip(slope, curve, strict=True))
         for matrix in rough:
-            matrix[[0, -1], [0, -1]] += config.pull * config.vertex / 6.0  # the points spread over six faces
-        self._precondition = FastDiagonalization(rough, mass).to(_ROUGH)
+            matrix[[0, -1], [0, -1]] += config.pull * self.vertex / 6.0  # the points spread over six faces
+        return FastDiagonalization(rough, mass).to(_ROUGH)
 
-    def start_round(self, control: Tensor, penalty: float) -> None:
-        """Take a penalty weight, and the limit of the distortion that suits the control points."""
+    def start_round(self, control: Tensor, penalty: float, share: float | None = None) -> None:
+        """Take a penalty weight, and the limit of the distortion that suits the control points.
+
+        share: while F grows into the solid, that of the weight of the surface's data.
+        """
         self.penalty = penalty
         self._distortion.set_limit(control)
+        if share is None and self._grows is None:
+            return
+        self._grows = None if share is None else self.config.growth
+        self.vertex = self.config.vertex * (1.0 if share is None else share)
+        self._precondition = self._preconditioner()
+        reach = np.inf if self._grows is None else self._grows.reach
+        self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
     def watch_facing(self, control: Tensor) -> None:
         """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
+        if self._grows is not None:  # F is too far away for that to mean something
+            self._facing = None
+            return
         self._facing = facing_penalty(self.surface, control, self.config.min_facing, self.config.facing_margin)
 
     def watch_contact(self, control: Tensor) -> IntArray:
@@ -64,9 +83,14 @@ class SplineEnergy:
 
     def slide(self, control: Tensor) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
+        places, points, longest = self.surface.places, self.surface.points, 0.5 / max(control.shape[1:])
         for _ in range(self.config.slides):
-            self.surface.places.slide(control, self.surface.points, 0.5 / max(control.shape[1:]))
-        self.surface.places.relax(self.config.relaxations)
+            if self._grows is None:
+                places.slide(control, points, longest)
+            else:
+                places.slide(control, points, longest, keep_layout=True, reach=self._grows.reach)
+        if self._grows is None:
+            places.relax(self.config.relaxations)
         self.watch_facing(control)
         if self._contact is not None:
             self._contact = self._contact_at(control, self._contact.near)
@@ -99,8 +123,8 @@ class SplineEnergy:
         config = self.config
         off, pull = self.surface.energy_and_gradient(control)
         off_edges, pull_edges = self.anchors.fit.energy_and_gradient(control)
-        energy = config.vertex * (off + config.anchors * off_edges)
-        gradient = config.vertex * (pull + config.anchors * pull_edges)
+        energy = self.vertex * (off + config.anchors * off_edges)
+        gradient = self.vertex * (pull + config.anchors * pull_edges)
         if self._contact is not None:
             overlap, apart = self._contact.energy_and_gradient(control)
             energy += config.vertex * config.contact * overlap
@@ -120,8 +144,8 @@ class SplineEnergy:
             (1.0, distortion),
             (1.0, self._rough_bending),
             (self.penalty, barrier),
-            (config.vertex, surface),
-            (config.vertex * config.anchors, anchors),
+            (self.vertex, surface),
+            (self.vertex * config.anchors, anchors),
         ]
         if self._facing is not None:
             terms.append((self.penalty, self._facing.curvature(control, _ROUGH)))

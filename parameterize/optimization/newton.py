@@ -97,7 +97,7 @@ def optimize(
             rounds.restore(*saved, history)
         while not rounds.finished:
             rounds.begin()
-            rounds.conclude(_descend(rounds.control, energy, rounds.number, history, progress))
+            rounds.conclude(_descend(rounds, history, progress))
             rounds.save(checkpoints, history)
         surface.places.place(*rounds.best_places)
     return rounds.best
@@ -142,6 +142,17 @@ class _Rounds:
         return self.number >= config.rounds or polished or self.lost
 
     @property
+    def growing(self) -> bool:
+        """Whether the next round is one of those in which F grows into the solid."""
+        return self.number < len(self.shares)
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """The shares of the weight of the surface's data in the rounds in which F grows; none for other maps."""
+        growth = self.energy.config.growth
+        return () if growth is None else growth.shares
+
+    @property
     def settled(self) -> bool:
         """Whether the last round has ended with the best map, not with one that folds again."""
         return torch.equal(self.control, self.best.control)
@@ -162,7 +173,8 @@ class _Rounds:
             energy.anchors.aim(self.control, hold=not self.polished)
         else:
             energy.anchors.release()
-        energy.start_round(self.control, config.penalties[min(self.number, len(config.penalties) - 1)])
+        penalty = config.penalties[min(self.number, len(config.penalties) - 1)]
+        energy.start_round(self.control, penalty, self.shares[self.number] if self.growing else None)
 
     def conclude(self, control: Tensor) -> None:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
@@ -171,8 +183,9 @@ class _Rounds:
         unproved = found.certificate.unproved
         meets = ", the boundary meets itself" if found.meets_itself else ""
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
-        self.certified |= found.certificate.verdict == "certified"
-        if self.number == 0 or found.faults <= self.best.faults:
+        grown = self.number + 1 >= len(self.shares)
+        self.certified |= grown and found.certificate.verdict == "certified"
+        if self.number == 0 or not grown or found.faults <= self.best.faults:
             places = self.energy.surface.places
             self.best, self.best_places = found, (places.parameters, places.cube_faces)
         many = len(unproved) > config.most_watched
@@ -293,19 +306,15 @@ def _expected_steps(config: SplineConfig, number: int, step: int) -> int:
     return max(present - step - 1, 1) + sum(usual[number + 1 :])
 
 
-def _descend(
-    control: Tensor,
-    energy: SplineEnergy,
-    number: int,
-    history: History,
-    progress: ProgressCallback,
-) -> Tensor:
+def _descend(rounds: _Rounds, history: History, progress: ProgressCallback) -> Tensor:
     """Return the control points after one round of Newton steps with sliding boundary parameters."""
+    energy, number = rounds.energy, rounds.number
     config, steps = energy.config, energy.config.steps
-    energy.watch_facing(control)
-    point = _evaluate(control, energy)
+    most = config.growth.steps if config.growth and rounds.growing else steps
+    energy.watch_facing(rounds.control)
+    point = _evaluate(rounds.control, energy)
     lowest, waited, damping, acceleration = point.total, 0, 0.0, Acceleration(config.memory)
-    for step in range(steps):
+    for step in range(most):
         begun = time.perf_counter()
         direction = energy.newton_direction(point.control, -point.gradient, damping)
         searched = _line_search(point, direction, energy)

@@ -73,12 +73,14 @@ class SlidingParameters:
         shape = tuple(len(breakpoints(k)) - 1 for k in self.knots)
         return with_neighbours(spans, shape)[tuple(self.spans().T)]
 
-    def slide(self, control: Tensor, points: Array, max_step: float, *, keep_layout: bool = False) -> None:
+    def slide(
+        self, control: Tensor, points: Array, max_step: float, *, keep_layout: bool = False, reach: float = np.inf
+    ) -> None:
         """Take one Gauss-Newton step of every parameter towards where F's boundary is closest to its point (N, 3).
 
         A step over an edge of the cube continues on the next face; `max_step` limits a step in the parameters. Points
-        that would end up farther away stay where they are; with `keep_layout` steps that would flip a triangle are
-        shortened.
+        that would end up farther away, and those farther away than `reach`, stay where they are; with `keep_layout`
+        steps that would flip a triangle are shortened.
         """
         values, ta, tb = self.window.derivatives(control)
         residual = values - points
@@ -91,7 +93,8 @@ class SlidingParameters:
         moved[rows, b] += step[:, 1]
         before = self.parameters, self.cube_faces
         self.place(*fold_over_edges(moved, self.cube_faces))
-        stay = ((self.values(control) - points) ** 2).sum(axis=1) > (residual**2).sum(axis=1)
+        squares = (residual**2).sum(axis=1)
+        stay = (((self.values(control) - points) ** 2).sum(axis=1) > squares) | (squares > reach**2)
         self._keep(*before, stay)
         if keep_layout:
             self._hold_back(*before, moved)

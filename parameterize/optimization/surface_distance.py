@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 from ..surface.geometry import vertex_normals
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
@@ -35,6 +35,7 @@ class SurfaceFit:
         self.normals = vertex_normals(points, places.triangles)
         self._weights = weights
         self.yielding = np.ones(len(points))
+        self._held = np.zeros(len(points), dtype=bool)
         self.aim(points, quadrics)
 
     def on_knots(self, knots: tuple[Array, Array, Array]) -> "SurfaceFit":
@@ -54,7 +55,13 @@ class SurfaceFit:
         """Multiply the points' weights by `yielding` (N,), in place of earlier such factors."""
         self.yielding = yielding
         self.weights = yielding * self._weights
-        self._metric = torch.as_tensor(self.weights[:, None, None] * self._quadrics)
+        quadrics = np.where(self._held[:, None, None], np.eye(3), self._quadrics)
+        self._metric = torch.as_tensor(self.weights[:, None, None] * quadrics)
+
+    def hold(self, held: Mask) -> None:
+        """Count the distance of these points (N,) in all directions, that of the others as the quadrics say."""
+        self._held = held
+        self.give_way(self.yielding)
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """Return the sum of r^T Q r at the present parameters and its gradient (3, n_u, n_v, n_w)."""

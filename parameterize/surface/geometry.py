@@ -53,24 +53,14 @@ def vertex_normals(vertices: Array, faces: IntArray) -> Array:
     return sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
 
 
-def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float, sharp: float = 0.0) -> Array:
-    """Return the area-weighted mean of n n^T over the triangles at each vertex, plus `tangential` times I (n, 3, 3).
-
-    Eigenvalues below sin^2(sharp / 2) are left out, `sharp` in degrees: the triangles of a smooth surface, too, face in
-    slightly different directions, and what they would hold is how F slides along it. At an edge between two faces whose
-    normals differ by an angle a, the second eigenvalue is sin^2(a / 2).
-    """
+def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float) -> Array:
+    """Return the area-weighted mean of n n^T over the triangles at each vertex, plus `tangential` times I (n, 3, 3)."""
     cross = doubled_areas(vertices, faces)
     area = np.linalg.norm(cross, axis=1)
     normal = cross / np.maximum(area, 1e-300)[:, None]
     share = area[:, None, None] * normal[:, :, None] * normal[:, None, :]
     sums, total = (_summed(values, faces, len(vertices)) for values in (share, area))
-    mean = sums / np.maximum(total, 1e-300)[:, None, None]
-    if sharp > 0.0:
-        values, vectors = np.linalg.eigh(mean)
-        held = np.where(values < np.sin(0.5 * np.radians(sharp)) ** 2, 0.0, values)
-        mean = (vectors * held[:, None]) @ np.swapaxes(vectors, 1, 2)
-    return mean + tangential * np.eye(3)
+    return np.asarray(sums / np.maximum(total, 1e-300)[:, None, None] + tangential * np.eye(3))
 
 
 def vertex_weights(vertices: Array, faces: IntArray, own: int) -> Array:

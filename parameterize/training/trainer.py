@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from ..arrays import Array, IntArray
@@ -44,7 +43,7 @@ class _Run:
 class Trainer:
     """Trains G on one surface.
 
-    vertices: (n, 3), at volume 1. faces: (m, 3). given_corners: (8,) vertex numbers or None. start: see `start_map`.
+    vertices: (n, 3), at volume 1. faces: (m, 3). given_corners: (8,) vertex numbers or None.
     The random numbers of a step depend on the seed, the pass and the step alone.
     """
 
@@ -55,7 +54,6 @@ class Trainer:
         config: Config,
         *,
         seed: int,
-        start: int,
         device: torch.device,
         dtype: torch.dtype,
         given_corners: IntArray | None,
@@ -71,7 +69,7 @@ class Trainer:
         first_weights = torch.Generator().manual_seed(seed % 2**63)
         self.network = InverseMap(config.network, first_weights).to(device=device, dtype=dtype)
         if config.train.whiten:
-            first = start_map(interior_points(vertices, faces, config.train.cell), start, config.train.turn)
+            first = start_map(interior_points(vertices, faces, config.train.cell))
             self.network.affine.copy_(self._tensor(first))
         inside = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
         self.objective = Objective(self.network, inside, config.train)
@@ -104,6 +102,11 @@ class Trainer:
                 self.effort = min(max(loss / train.easy_loss, 1.0), train.most_effort)
             saved = None
         return self.network
+
+    @property
+    def last_loss(self) -> float:
+        """The loss of the last step."""
+        return float(self.history.rows[-1][2])
 
     @property
     def _passes(self) -> list[StageConfig]:
@@ -217,16 +220,10 @@ class Trainer:
         return last + 0.5 * (1.0 - last) * (1.0 + math.cos(math.pi * done))
 
 
-def start_map(points: Array, start: int, turn: float) -> Array:
-    """Return the linear map (3, 3) of determinant 1 that makes a cloud of points (m, 3) equally wide in all directions.
-
-    It is symmetric for start 0. For each later start it then turns the cloud by `turn` degrees about one of the axes
-    y, z and x, which leads the cube's edges over other parts of the surface.
-    """
+def start_map(points: Array) -> Array:
+    """Return the symmetric map (3, 3) of determinant 1 that makes a cloud (m, 3) equally wide in all directions."""
     values, vectors = np.linalg.eigh(np.cov(points.T))
-    whitening = (vectors * np.sqrt(values.prod() ** (1.0 / 3.0) / values)) @ vectors.T
-    rotation = Rotation.from_rotvec(np.radians(turn) * np.eye(3)[start % 3] * (start > 0))
-    return np.asarray(rotation.as_matrix() @ whitening)
+    return np.asarray((vectors * np.sqrt(values.prod() ** (1.0 / 3.0) / values)) @ vectors.T)
 
 
 def _part(tensors: State, prefix: str) -> State:

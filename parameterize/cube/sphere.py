@@ -1,0 +1,187 @@
+"""A one-to-one layout of a closed surface without handles on the unit sphere, with little distortion.
+
+The surface is cut in two discs along the line where the lowest vibration of its Laplacian vanishes (it has two sides:
+Courant). Each disc goes to a hemisphere (Tutte 1963), one-to-one but badly squeezed. From there Newton's method lowers
+the symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has
+no area left: no step turns a triangle over.
+"""
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from scipy.sparse import coo_array, csc_array, eye_array
+from scipy.sparse.linalg import eigsh, splu
+
+from ..arrays import Array, IntArray, Mask
+from ..config import LayoutConfig
+from ..surface.geometry import doubled_areas, edge_table
+from .cutting import split_edges
+
+_SHIFT = -1e-3  # below all eigenvalues of the Laplacian, so that it can be factorised
+_THIN = 1e-6  # area of a triangle, as a share of the mean, that counts at least
+_SHORTEST_STEP = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class SphereLayout:
+    """Surface points (n, 3), those of the mesh first, triangles (m, 3), and directions (n, 3), unit vectors."""
+
+    vertices: Array
+    faces: IntArray
+    directions: Array
+
+
+def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> SphereLayout:
+    """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
+
+    Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh.
+    """
+    vertices, faces, upper = _halves(vertices, faces, layout.least_share)
+    directions = _hemispheres(vertices, faces, upper)
+    return SphereLayout(vertices, faces, _relaxed(directions, vertices, faces, layout))
+
+
+def turned_over(directions: Array, faces: IntArray) -> Mask:
+    """Return which triangles (m, 3) of a layout (n, 3) do not face outwards, seen from the sphere's centre: (m,)."""
+    return np.asarray(np.linalg.det(directions[faces]) <= 0.0)
+
+
+def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntArray, Mask]:
+    """Split edges where the lowest vibration vanishes; return points, triangles, and which of these lie above.
+
+    Only how the mesh hangs together counts: new vertices keep the share `least` of an edge from its ends.
+    """
+    laplacian, mass = -igl.cotmatrix(vertices, faces), igl.massmatrix(vertices, faces)
+    begin = np.cos(np.arange(len(vertices)))  # else the library begins with random numbers
+    _, modes = eigsh(csc_array(laplacian), k=2, M=csc_array(mass), sigma=_SHIFT, v0=begin)
+    height = np.where(modes[:, 1] == 0.0, np.finfo(np.float64).tiny, modes[:, 1])
+    edges, _ = edge_table(faces)
+    cut = edges[height[edges[:, 0]] * height[edges[:, 1]] < 0.0]
+    start, end = height[cut].T
+    share = np.clip(start / (start - end), least, 1.0 - least)[:, None]
+    points = np.concatenate([vertices, (1.0 - share) * vertices[cut[:, 0]] + share * vertices[cut[:, 1]]])
+    faces = split_edges(faces, cut, len(vertices))
+    return points, faces, np.concatenate([height, np.zeros(len(cut))])[faces].sum(axis=1) > 0.0
+
+
+def _hemispheres(vertices: Array, faces: IntArray, upper: Mask) -> Array:
+    """Return directions (n, 3) of points (n, 3) whose triangles above and below go to the two hemispheres.
+
+    The common rim goes to the equator by its length. Every other point is the mean of its neighbours in the disc.
+    """
+    rim = np.asarray(igl.boundary_loop(faces[upper]), dtype=np.int64)
+    length = np.linalg.norm(vertices[np.roll(rim, -1)] - vertices[rim], axis=1)
+    angle = 2.0 * np.pi * (np.cumsum(length) - length) / length.sum()
+    flat = np.zeros((len(vertices), 2))
+    flat[rim] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    directions = np.zeros((len(vertices), 3))
+    for half, side in ((upper, 1.0), (~upper, -1.0)):
+        used = np.unique(faces[half])
+        inner = np.setdiff1d(used, rim)
+        edges, _ = edge_table(faces[half])
+        i, j = np.concatenate([edges, edges[:, ::-1]]).T
+        links = coo_array((np.ones(len(i)), (i, j)), shape=(len(vertices),) * 2).tocsr()
+        degrees = coo_array((links.sum(axis=1)[inner], (np.arange(len(inner)),) * 2))
+        matrix = csc_array(degrees - links[inner][:, inner])
+        flat[inner] = splu(matrix).solve(links[inner][:, rim] @ flat[rim])
+        square = (flat[used] ** 2).sum(axis=1, keepdims=True)  # stereographic
+        directions[used] = np.hstack([2.0 * flat[used], side * (1.0 - square)]) / (1.0 + square)
+    return directions
+
+
+class _Triangles:
+    """The symmetric Dirichlet energy of triangles (m, 3) of the surface, scaled to the area of the unit sphere.
+
+    With the Dirichlet energy D and the signed area a on the sphere, A on the surface: the sum of D (1 + (A / a)^2).
+    """
+
+    def __init__(self, vertices: Array, faces: IntArray) -> None:
+        self.faces = faces
+        area = 0.5 * np.linalg.norm(doubled_areas(vertices, faces), axis=1)
+        scale = 4.0 * np.pi / area.sum()
+        self._area = scale * np.maximum(area, _THIN * area.mean())
+        corners = vertices[faces]
+        sides = np.sqrt(scale) * (corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]])  # (m, 3, 3), opposite to the corners
+        self._stiffness = sides @ np.swapaxes(sides, 1, 2) / (4.0 * self._area[:, None, None])
+
+    def energies(self, directions: Array) -> Array:
+        """Return the energy of each triangle (m,)."""
+        corners = directions[self.faces]
+        ratio = self._area / (0.5 * np.linalg.det(corners))
+        return np.einsum("mij,mic,mjc->m", self._stiffness, corners, corners) * (1.0 + ratio**2)
+
+    def derivatives(self, directions: Array, tangents: Array) -> tuple[Array, Array]:
+        """Return gradient (m, 6) and second derivative (m, 6, 6), made positive, in steps along tangents (n, 3, 2)."""
+        corners, count = directions[self.faces], len(self.faces)
+        area = 0.5 * np.linalg.det(corners)[:, None, None]
+        towards = 2.0 * self._stiffness @ corners  # of the Dirichlet energy (m, 3, 3)
+        dirichlet = 0.5 * (towards * corners).sum(axis=(1, 2))[:, None, None]
+        wider = 0.5 * np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])  # of the area (m, 3, 3)
+        square = self._area[:, None, None] ** 2
+        factor, slope, bend = 1.0 + square / area**2, -2.0 * square / area**3, 6.0 * square / area**4
+        gradient = factor * towards + slope * dirichlet * wider
+        frames = tangents[self.faces]  # (m, 3, 3, 2)
+        first, second = (np.einsum("mic,mica->mia", x, frames).reshape(count, 6) for x in (towards, wider))
+        mixed = first[:, :, None] * second[:, None, :]
+        hessian = slope * (mixed + np.swapaxes(mixed, 1, 2))
+        hessian += bend * dirichlet * second[:, :, None] * second[:, None, :]
+        blocks = 2.0 * factor[..., None, None] * self._stiffness[..., None, None] * np.eye(3)
+        blocks = blocks + (slope * dirichlet)[..., None, None] * _area_bends(corners)
+        hessian += np.einsum("mica,mijcd,mjdb->miajb", frames, blocks, frames).reshape(count, 6, 6)
+        inwards = np.repeat((gradient * corners).sum(axis=2), 2, axis=1)  # the sphere is curved
+        hessian -= inwards[:, :, None] * np.eye(6)
+        values, vectors = np.linalg.eigh(hessian)
+        positive = (vectors * np.maximum(values, 0.0)[:, None]) @ np.swapaxes(vectors, 1, 2)
+        return np.einsum("mic,mica->mia", gradient, frames).reshape(count, 6), positive
+
+
+def _area_bends(corners: Array) -> Array:
+    """Return the second derivative of half the determinant of triangles' corners (m, 3, 3): (m, 3, 3, 3, 3)."""
+    bends = np.zeros((len(corners), 3, 3, 3, 3))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        x, y, z = 0.5 * corners[:, k].T
+        none = np.zeros_like(x)
+        turn = np.stack([none, z, -y, -z, none, x, y, -x, none], axis=1).reshape(-1, 3, 3)  # of x_i . (x_j x x_k)
+        bends[:, i, j], bends[:, j, i] = turn, np.swapaxes(turn, 1, 2)
+    return bends
+
+
+def _relaxed(directions: Array, vertices: Array, faces: IntArray, layout: LayoutConfig) -> Array:
+    """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls."""
+    triangles = _Triangles(vertices, faces)
+    energy = float(triangles.energies(directions).sum())
+    unknowns = (2 * faces[:, :, None] + np.arange(2)).reshape(-1, 6)
+    rows, columns = np.repeat(unknowns, 6, axis=1).ravel(), np.tile(unknowns, (1, 6)).ravel()
+    size = 2 * len(vertices)
+    for _ in range(layout.sphere_steps):
+        tangents = _tangents(directions)
+        slopes, hessians = triangles.derivatives(directions, tangents)
+        slope = np.bincount(unknowns.ravel(), slopes.ravel(), size)
+        matrix = coo_array((hessians.ravel(), (rows, columns)), shape=(size, size)).tocsc()
+        damping = layout.sphere_damping * matrix.diagonal().mean()
+        step = splu(csc_array(matrix + damping * eye_array(size))).solve(-slope)
+        move, length = np.einsum("nca,na->nc", tangents, step.reshape(-1, 2)), 1.0
+        while length > _SHORTEST_STEP:
+            trial = directions + length * move
+            trial /= np.linalg.norm(trial, axis=1, keepdims=True)
+            if not turned_over(trial, faces).any():
+                lower = float(triangles.energies(trial).sum())
+                if lower <= energy + 1e-4 * length * float(slope @ step):
+                    break
+            length *= 0.5
+        else:
+            break
+        gain, directions, energy = energy - lower, trial, lower
+        if gain < layout.sphere_gain * energy:
+            break
+    return directions
+
+
+def _tangents(directions: Array) -> Array:
+    """Return two unit vectors across each direction (n, 3): (n, 3, 2)."""
+    other = np.where(np.abs(directions[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    first = np.cross(directions, other)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(directions, first)], axis=2)

@@ -1,0 +1,61 @@
+"""A map that does not need the network: the cube grows into the solid (for shapes on which the training fails).
+
+The surface is laid on the cube one-to-one before anything else, so that the boundary never has to be untangled. The
+first map is a cube in the solid's middle. Round after round the surface's data draw it more strongly, while the
+penalties on det J act from the start: what is never folded need not be unfolded (compare Schueller, Kavan, Panozzo,
+Sorkine-Hornung, SGP 2013).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+from scipy.spatial.transform import Rotation
+from torch import Tensor
+
+from .arrays import Array, IntArray
+from .config import GrowthConfig, LayoutConfig, SplineConfig
+from .cube.cube import project_radially, snap
+from .cube.cutting import cut_along_rays, subdivide_finely
+from .cube.sphere import lay_on_sphere
+from .cube.turning import turned
+from .cube.tutte import Layout
+from .spline.bspline import greville
+from .surface.geometry import vertex_weights
+
+
+def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
+    """Return the options of a spline stage that begins with the rounds in which F grows."""
+    rounds = len(growth.shares)
+    return replace(
+        spline,
+        growth=growth,
+        penalties=(growth.penalty,),
+        rounds=rounds + growth.rounds,
+        usual_steps=(growth.steps,) * rounds + spline.usual_steps[2:],
+        patient_rounds=growth.patient_rounds,
+        firm_rounds=growth.firm_rounds,
+    )
+
+
+def surface_on_cube(
+    vertices: Array, faces: IntArray, spline: SplineConfig, options: LayoutConfig, generator: np.random.Generator
+) -> Layout:
+    """Lay a closed surface (n, 3), (m, 3) on the cube without a flipped triangle, its long edges cut.
+
+    generator: draws how the cube may be turned. Vertices of the mesh stay first.
+    """
+    sphere = turned(lay_on_sphere(vertices, faces, options), options, generator)
+    columns = np.hstack([sphere.vertices, sphere.directions])
+    columns, faces = subdivide_finely(columns, sphere.faces, len(vertices), spline)
+    points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])
+    cut = cut_along_rays(places, faces, options.path_snap)
+    return Layout(cut.carry(points), cut.faces, snap(cut.carry(places)))
+
+
+def first_cube(layout: Layout, own: int, knots: tuple[Array, Array, Array], degree: int) -> Tensor:
+    """Return control points (3, n_u, n_v, n_w) of the unit cube, turned so that it faces the surface as laid out."""
+    weights = vertex_weights(layout.vertices, layout.faces, own)
+    rotation, _ = Rotation.align_vectors(layout.vertices - 0.5, layout.places - 0.5, weights)
+    points = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1) - 0.5
+    return torch.as_tensor(np.ascontiguousarray(np.moveaxis(0.5 + points @ rotation.as_matrix().T, -1, 0)))

@@ -1,0 +1,86 @@
+"""A closed surface on the sphere: one-to-one whatever the shape, and with derivatives that are right."""
+
+import numpy as np
+import pytest
+from shapes import ball
+
+from parameterize.config import LAYOUT
+from parameterize.cube.sphere import _relaxed, _tangents, _Triangles, lay_on_sphere, turned_over
+
+
+def horseshoe(count=1200, length=7.0):
+    """A rod of radius about 0.6 whose middle line is bent to three quarters of a circle."""
+    points, faces = ball(count)
+    angle = 0.75 * np.pi * points[:, 0]
+    radius = length / 4.0 + 0.6 * points[:, 1]
+    return np.stack([radius * np.sin(angle), radius * np.cos(angle), 0.6 * points[:, 2]], axis=1), faces
+
+
+def thorn(count=1200):
+    """A ball with one long thin thorn: what a plain layout squeezes to nothing."""
+    points, faces = ball(count)
+    return points * (1.0 + 6.0 * np.exp(-40.0 * (1.0 - points[:, :1]))), faces
+
+
+@pytest.mark.parametrize("shape", [ball, horseshoe, thorn])
+def test_no_triangle_is_turned_over_and_the_mesh_stays(shape):
+    vertices, faces = shape(1200)
+    layout = lay_on_sphere(vertices, faces, LAYOUT)
+    assert not turned_over(layout.directions, layout.faces).any()
+    assert np.linalg.norm(layout.directions, axis=1) == pytest.approx(1.0)
+    assert np.array_equal(layout.vertices[: len(vertices)], vertices)
+    again = lay_on_sphere(vertices, faces, LAYOUT)
+    assert np.array_equal(again.directions, layout.directions)
+
+
+def test_the_sphere_keeps_its_areas():
+    vertices, faces = ball(800)
+    layout = lay_on_sphere(vertices, faces, LAYOUT)
+    before, after = (np.linalg.det(x[layout.faces]) for x in (layout.vertices, layout.directions))
+    assert np.median(after / before) == pytest.approx(1.0, abs=0.02)
+    assert np.percentile(after / before, [1, 99]) == pytest.approx([1.0, 1.0], abs=0.1)
+
+
+def test_a_thorn_gets_the_room_that_its_area_asks_for():
+    vertices, faces = thorn()
+    layout = lay_on_sphere(vertices, faces, LAYOUT)
+    points = layout.vertices[layout.faces]
+    cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    area, room = np.linalg.norm(cross, axis=1), np.linalg.det(layout.directions[layout.faces])
+    tip = points[:, :, 0].mean(axis=1) > 3.0
+    share, given = area[tip].sum() / area.sum(), room[tip].sum() / room.sum()
+    assert share > 0.02 and 0.3 < given / share < 3.0
+
+
+def test_first_and_second_derivatives():
+    vertices, faces = horseshoe(60)
+    layout = lay_on_sphere(vertices, faces, LAYOUT)
+    triangles, places = _Triangles(layout.vertices, layout.faces), layout.directions
+    rng, h = np.random.default_rng(0), 1e-4
+    step = rng.normal(size=(len(places), 2))
+    tangents = _tangents(places)
+
+    def energies(t):
+        moved = places + t * np.einsum("nca,na->nc", tangents, step)
+        return triangles.energies(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+
+    slopes, bends = triangles.derivatives(places, tangents)
+    local = step[layout.faces].reshape(-1, 6)
+    difference = (energies(h) - energies(-h)) / (2.0 * h)
+    assert (slopes * local).sum(axis=1) == pytest.approx(difference, rel=1e-4, abs=1e-4)
+    second = (energies(h) - 2.0 * energies(0.0) + energies(-h)) / h**2
+    positive = np.einsum("mi,mij,mj->m", local, bends, local)
+    assert (positive >= second - 1e-3 * np.abs(second).max()).all()  # negative directions are left out
+    near = np.isclose(positive, second, rtol=1e-2)
+    assert near.mean() > 0.2  # where there are none, they are equal
+
+
+def test_the_energy_falls_and_no_step_turns_a_triangle_over():
+    vertices, faces = ball(300)
+    rough = vertices + 0.03 * np.random.default_rng(1).normal(size=vertices.shape)
+    rough /= np.linalg.norm(rough, axis=1, keepdims=True)
+    assert not turned_over(rough, faces).any()
+    triangles = _Triangles(vertices, faces)
+    relaxed = _relaxed(rough, vertices, faces, LAYOUT)
+    assert triangles.energies(relaxed).sum() < triangles.energies(rough).sum()
+    assert not turned_over(relaxed, faces).any()

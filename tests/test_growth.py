@@ -1,0 +1,98 @@
+"""Maps that grow from a cube: the layout without flips, the first map, the rounds and an interruption in them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapes import ball, is_closed
+from small_run import tiny_config
+
+from parameterize import parameterize
+from parameterize.config import LAYOUT, preset
+from parameterize.cube.flips import flipped
+from parameterize.growth import first_cube, growing, surface_on_cube
+from parameterize.optimization.newton import Optimized
+from parameterize.progress import Progress
+from parameterize.spline.bspline import open_uniform_knots
+from parameterize.surface.surface import surface_from_arrays
+
+
+def bent_rod(count=900):
+    """A rod bent to a half circle: no ray from its middle line's centre tells where its points belong."""
+    points, faces = ball(count)
+    angle, radius = 0.5 * np.pi * points[:, 0], 1.6 + 0.6 * points[:, 1]
+    bent = np.stack([radius * np.sin(angle), radius * np.cos(angle), 0.6 * points[:, 2]], axis=1)
+    return surface_from_arrays(bent, faces, "rod")
+
+
+def on_cube(surface, spline, seed=0):
+    generator = np.random.default_rng(seed)
+    return surface_on_cube(surface.unit_vertices, surface.faces, spline, LAYOUT, generator)
+
+
+def test_a_bent_rod_lies_on_the_cube_without_a_flip():
+    surface, spline = bent_rod(), preset("fast").with_control_points(12).spline
+    layout = on_cube(surface, spline)
+    assert not flipped(layout.places, layout.faces).any()
+    assert is_closed(layout.faces)
+    assert np.abs(layout.places - 0.5).max(axis=1) == pytest.approx(0.5)
+    assert np.array_equal(layout.vertices[: len(surface.vertices)], surface.unit_vertices)
+    others = on_cube(surface, spline, seed=1)
+    assert not np.allclose(others.places[:100], layout.places[:100])
+
+
+def test_the_first_map_is_a_cube_that_faces_the_surface():
+    surface, spline = bent_rod(), preset("fast").with_control_points(8).spline
+    layout = on_cube(surface, spline)
+    knots = (open_uniform_knots(8, 3),) * 3
+    control = first_cube(layout, len(surface.vertices), knots, 3)
+    found = Optimized.of(control, knots, spline)
+    assert found.certificate.verdict == "certified"
+    assert found.certificate.lower_bound == pytest.approx(1.0)
+    flat = np.moveaxis(control.numpy(), 0, -1)
+    axes = np.stack([flat[-1, 0, 0] - flat[0, 0, 0], flat[0, -1, 0] - flat[0, 0, 0], flat[0, 0, -1] - flat[0, 0, 0]])
+    assert axes @ axes.T == pytest.approx(np.eye(3))
+    towards = ((layout.places - 0.5) @ axes * (layout.vertices - 0.5)).sum()
+    assert towards > ((layout.places - 0.5) @ (axes @ np.diag([-1.0, -1.0, 1.0])) * (layout.vertices - 0.5)).sum()
+
+
+def test_the_rounds_in_which_it_grows_come_first():
+    config = preset("fast")
+    spline = growing(config.spline, config.growth)
+    grown = len(config.growth.shares)
+    assert spline.rounds == grown + config.growth.rounds
+    assert spline.usual_steps[:grown] == (config.growth.steps,) * grown
+    assert list(config.growth.shares) == sorted(config.growth.shares) and config.growth.shares[-1] == 1.0
+
+
+def lost(config):
+    return replace(config, starts=2, train=replace(config.train, lost_loss=0.0))
+
+
+def test_a_bent_rod_is_certified_without_a_trained_network():
+    config = lost(tiny_config())
+    config = replace(
+        config,
+        spline=replace(preset("fast").spline, control_points=12, fit_cell=0.1),
+        growth=preset("fast").growth,
+    )
+    result = parameterize(bent_rod(), config, device="cpu")
+    assert result.certificate.verdict == "certified"
+    assert result.quality.boundary_check.injective is True
+    assert result.quality.boundary.unit.rms < 0.01
+
+
+def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path):
+    surface, config = bent_rod(300), lost(tiny_config())
+    whole = parameterize(surface, config, seed=1, device="cpu")
+
+    def interrupt(state: Progress):
+        if state.stage == "spline" and state.step > 2 * config.spline.steps:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        parameterize(surface, config, seed=1, device="cpu", checkpoint_dir=tmp_path, progress=interrupt)
+    assert (tmp_path / "spline-1.safetensors").is_file()
+    resumed = parameterize(surface, config, seed=1, device="cpu", checkpoint_dir=tmp_path, resume=True)
+    assert np.array_equal(resumed.volume.control_points, whole.volume.control_points)
+    assert np.array_equal(resumed.boundary.parameters, whole.boundary.parameters)
