@@ -79,7 +79,7 @@ def test_a_bent_rod_is_certified_without_a_trained_network():
     result = parameterize(bent_rod(), config, device="cpu")
     assert result.certificate.verdict == "certified"
     assert result.quality.boundary_check.injective is True
-    assert result.quality.boundary.unit.rms < 0.01
+    assert result.quality.boundary.unit_volume.rms < 0.01
 
 
 def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path):
