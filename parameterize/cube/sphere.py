@@ -1,16 +1,17 @@
 """A one-to-one layout of a closed surface without handles on the unit sphere, with little distortion.
 
-The surface is cut in two discs along the line where the lowest vibration of its Laplacian vanishes (it has two sides:
-Courant). Each disc goes to a hemisphere (Tutte 1963), one-to-one but badly squeezed. From there Newton's method lowers
-the symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has
-no area left: no step turns a triangle over.
+The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
+sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
+one-to-one but badly squeezed. From there Newton's method lowers the symmetric Dirichlet energy (Smith, Schaefer, ACM
+Trans. Graphics 34, 2015), which is infinite where a triangle has no area left: no step turns a triangle over.
 """
 
+import math
 from dataclasses import dataclass
 
 import igl
 import numpy as np
-from scipy.sparse import coo_array, csc_array, eye_array
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh, splu
 
 from ..arrays import Array, IntArray, Mask
@@ -18,8 +19,8 @@ from ..config import LayoutConfig
 from ..surface.geometry import doubled_areas, edge_table
 from .cutting import split_edges
 
-_SHIFT = -1e-3  # below all eigenvalues of the Laplacian, so that it can be factorised
-_THIN = 1e-6  # area of a triangle, as a share of the mean, that counts at least
+_SHIFT = -1e-6  # below all eigenvalues of the Laplacian, so that it can be factorised
+_THIN = 1e-6  # area of a triangle, and length of an edge, that counts at least, as a share of the mean
 _SHORTEST_STEP = 1e-10
 
 
@@ -44,7 +45,7 @@ def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> Sph
 
 def turned_over(directions: Array, faces: IntArray) -> Mask:
     """Return which triangles (m, 3) of a layout (n, 3) do not face outwards, seen from the sphere's centre: (m,)."""
-    return np.asarray(np.linalg.det(directions[faces]) <= 0.0)
+    return np.asarray(_volumes(directions[faces]) <= 0.0)
 
 
 def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntArray, Mask]:
@@ -52,11 +53,12 @@ def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntA
 
     Only how the mesh hangs together counts: new vertices keep the share `least` of an edge from its ends.
     """
-    laplacian, mass = -igl.cotmatrix(vertices, faces), igl.massmatrix(vertices, faces)
-    begin = np.cos(np.arange(len(vertices)))  # else the library begins with random numbers
-    _, modes = eigsh(csc_array(laplacian), k=2, M=csc_array(mass), sigma=_SHIFT, v0=begin)
-    height = np.where(modes[:, 1] == 0.0, np.finfo(np.float64).tiny, modes[:, 1])
     edges, _ = edge_table(faces)
+    length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
+    links = _links(edges, 1.0 / np.maximum(length, _THIN * length.mean()), len(vertices))
+    begin = np.cos(np.arange(len(vertices)))  # else the library begins with random numbers
+    _, modes = eigsh(_laplacian(links), k=2, sigma=_SHIFT, v0=begin)
+    height = np.where(modes[:, 1] == 0.0, np.finfo(np.float64).tiny, modes[:, 1])
     cut = edges[height[edges[:, 0]] * height[edges[:, 1]] < 0.0]
     start, end = height[cut].T
     share = np.clip(start / (start - end), least, 1.0 - least)[:, None]
@@ -80,14 +82,28 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask) -> Array:
         used = np.unique(faces[half])
         inner = np.setdiff1d(used, rim)
         edges, _ = edge_table(faces[half])
-        i, j = np.concatenate([edges, edges[:, ::-1]]).T
-        links = coo_array((np.ones(len(i)), (i, j)), shape=(len(vertices),) * 2).tocsr()
-        degrees = coo_array((links.sum(axis=1)[inner], (np.arange(len(inner)),) * 2))
-        matrix = csc_array(degrees - links[inner][:, inner])
+        links = _links(edges, np.ones(len(edges)), len(vertices))
+        matrix = csc_array(_laplacian(links)[inner][:, inner])
         flat[inner] = splu(matrix).solve(links[inner][:, rim] @ flat[rim])
         square = (flat[used] ** 2).sum(axis=1, keepdims=True)  # stereographic
         directions[used] = np.hstack([2.0 * flat[used], side * (1.0 - square)]) / (1.0 + square)
     return directions
+
+
+def _links(edges: IntArray, weights: Array, count: int) -> csr_array:
+    """Return the weights (e,) of edges (e, 2) between `count` points as a symmetric matrix."""
+    i, j = np.concatenate([edges, edges[:, ::-1]]).T
+    return csr_array(coo_array((np.tile(weights, 2), (i, j)), shape=(count, count)))
+
+
+def _laplacian(links: csr_array) -> csr_array:
+    return csr_array(diags_array(links.sum(axis=1)) - links)
+
+
+def _volumes(corners: Array) -> Array:
+    """Return the determinants of triangles' corners (m, 3, 3), from differences: triangles may be tiny."""
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray((corners[:, 0] * across).sum(axis=1))
 
 
 class _Triangles:
@@ -108,13 +124,13 @@ class _Triangles:
     def energies(self, directions: Array) -> Array:
         """Return the energy of each triangle (m,)."""
         corners = directions[self.faces]
-        ratio = self._area / (0.5 * np.linalg.det(corners))
+        ratio = self._area / (0.5 * _volumes(corners))
         return np.einsum("mij,mic,mjc->m", self._stiffness, corners, corners) * (1.0 + ratio**2)
 
     def derivatives(self, directions: Array, tangents: Array) -> tuple[Array, Array]:
         """Return gradient (m, 6) and second derivative (m, 6, 6), made positive, in steps along tangents (n, 3, 2)."""
         corners, count = directions[self.faces], len(self.faces)
-        area = 0.5 * np.linalg.det(corners)[:, None, None]
+        area = 0.5 * _volumes(corners)[:, None, None]
         towards = 2.0 * self._stiffness @ corners  # of the Dirichlet energy (m, 3, 3)
         dirichlet = 0.5 * (towards * corners).sum(axis=(1, 2))[:, None, None]
         wider = 0.5 * np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])  # of the area (m, 3, 3)
@@ -149,13 +165,16 @@ def _area_bends(corners: Array) -> Array:
 
 
 def _relaxed(directions: Array, vertices: Array, faces: IntArray, layout: LayoutConfig) -> Array:
-    """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls."""
+    """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls.
+
+    Where the hemispheres squeeze triangles to less than the numbers can tell, the directions are returned as they are.
+    """
     triangles = _Triangles(vertices, faces)
-    energy = float(triangles.energies(directions).sum())
+    energy = float(triangles.energies(directions).sum()) if not turned_over(directions, faces).any() else np.inf
     unknowns = (2 * faces[:, :, None] + np.arange(2)).reshape(-1, 6)
     rows, columns = np.repeat(unknowns, 6, axis=1).ravel(), np.tile(unknowns, (1, 6)).ravel()
     size = 2 * len(vertices)
-    for _ in range(layout.sphere_steps):
+    for _ in range(layout.sphere_steps if math.isfinite(energy) else 0):
         tangents = _tangents(directions)
         slopes, hessians = triangles.derivatives(directions, tangents)
         slope = np.bincount(unknowns.ravel(), slopes.ravel(), size)
