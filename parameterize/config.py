@@ -74,7 +74,7 @@ class GrowthConfig:
     steps: int = 12  # a round, at most
     penalty: float = 2500.0  # on det J, in these rounds and all later ones
     reach: float = 0.03  # surface points farther from F than this do not slide, and draw F in all directions
-    rounds: int = 12  # of the spline stage, after these
+    rounds: int = 20  # of the spline stage, after these, at most
     patient_rounds: int = 2  # in place of the spline stage's
     firm_rounds: int = 6  # likewise
 
