@@ -153,7 +153,7 @@ def test_a_polish_that_folds_is_mended_before_more_is_taken_back(monkeypatch):
     control, fit = wavy_control(0.0), surface_fit()
     fit.give_way(np.full(len(fit.points), 0.1))
     steps = iter(range(1, 9))
-    monkeypatch.setattr(newton, "_descend", lambda control, *_: control + 1e-6 * next(steps))
+    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control + 1e-6 * next(steps))
     optimize(control, KNOTS, fit, replace(CONFIG, rounds=9), history=History())
     assert len(taken_back) == 2 and np.all(fit.yielding == 1.0)  # 0.1, 0.4, folded, 1
 
@@ -207,7 +207,7 @@ def test_a_folded_start_is_unfolded():
 @pytest.mark.parametrize(("most", "rounds"), [(0, 3), (1000, 5)])
 def test_a_try_with_too_much_folded_is_given_up(monkeypatch, most, rounds):
     """Nothing is mended here; where single spans cannot be watched, the try ends once the surface would give way."""
-    monkeypatch.setattr(newton, "_descend", lambda control, *_: control)
+    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control)
     checkpoints, saved = Checkpoints(None, {}, resume=False), []
     monkeypatch.setattr(checkpoints, "save", lambda *state: saved.append(state))
     config = replace(CONFIG, rounds=5, firm_rounds=3, most_watched=most)
@@ -252,7 +252,7 @@ def test_a_boundary_that_meets_itself_is_pushed_apart_before_the_polish(monkeypa
     answers = iter([False, *meets])  # the first is asked of the start
     proved = certify(as_volume(wavy_control(0.0)))
     monkeypatch.setattr(Optimized, "of", lambda control, *_: Optimized(control, proved, next(answers, False)))
-    monkeypatch.setattr(newton, "_descend", lambda control, *_: control)
+    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control)
     monkeypatch.setattr(SplineEnergy, "watch_contact", lambda *_: contacts.append(1) or np.array([[0, 1, 1]]))
     original = SplineEnergy.take_back
     monkeypatch.setattr(SplineEnergy, "take_back", lambda *given: (taken_back.append(1), original(*given)))
