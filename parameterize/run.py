@@ -261,7 +261,7 @@ def _best_attempt(task: _Task, checkpoints: Checkpoints) -> _Attempt:
         fault = "the training is too far from a cube" if best is None else _fault(best[0])
         _log.warning("%s; growing a map from a cube instead", fault)
         other = _grown(task, start, checkpoints.of_start(start))
-        if best is None or other[0].faults < best[0].faults:
+        if best is None or other[0].rank < best[0].rank:
             best = other
     assert best is not None
     return best

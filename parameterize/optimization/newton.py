@@ -37,25 +37,32 @@ _SHORTEST_STEP = 1e-6
 class Optimized:
     """Control points (3, n_u, n_v, n_w) at volume 1, and what is proved of them.
 
-    meets_itself: whether the boundary of a certified map was found to meet itself; False where there is no certificate.
+    meets_itself: whether the boundary of a certified map was found to meet itself; undecided: whether neither that nor
+    the contrary was found. Both are False where there is no certificate.
     """
 
     control: Tensor
     certificate: Certificate
     meets_itself: bool
+    undecided: bool
 
     @classmethod
     def of(cls, control: Tensor, knots: Knots, config: SplineConfig) -> "Optimized":
         """Certify control points and, where that succeeds, check their boundary."""
         volume = BSplineVolume((config.degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy())
         certificate = certify(volume)
-        certified = certificate.verdict == "certified"
-        return cls(control, certificate, certified and check_boundary(volume).injective is False)
+        injective = check_boundary(volume).injective if certificate.verdict == "certified" else True
+        return cls(control, certificate, injective is False, injective is None)
 
     @property
     def faults(self) -> tuple[int, bool]:
         """What keeps the map from being one-to-one; fewer unproved spans count first."""
         return len(self.certificate.unproved), self.meets_itself
+
+    @property
+    def rank(self) -> tuple[int, bool, bool]:
+        """The faults, and whether the boundary is undecided: of two maps the one with the lower rank is better."""
+        return *self.faults, self.undecided
 
 
 def optimize(
@@ -79,8 +86,8 @@ def optimize(
     rounds push it apart, and the surface data there lose weight. Once the map is certified, a few more rounds take back
     what the data has lost, step by step, as far as they can. Anchors along the cube's edges draw F to the surface in
     those last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
-    result is the last certified map whose boundary does not meet itself, else the last certified one, else the one with
-    the fewest unproved spans.
+    result is the last certified map whose boundary is proved not to meet itself, else the last one where that is not
+    decided, else the last certified one, else the one with the fewest unproved spans.
     begun: of how many rounds `control` is the result, on other knots; watched (k, 3): spans that nearly fold there.
     A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
     """
@@ -185,7 +192,7 @@ class _Rounds:
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
         grown = self.number + 1 >= len(self.shares)
         self.certified |= grown and found.certificate.verdict == "certified"
-        if self.number == 0 or not grown or found.faults <= self.best.faults:
+        if self.number == 0 or not grown or found.rank <= self.best.rank:
             places = self.energy.surface.places
             self.best, self.best_places = found, (places.parameters, places.cube_faces)
         many = len(unproved) > config.most_watched
