@@ -119,7 +119,7 @@ class SplineConfig:
     firm_rounds: int = 4  # after these the surface gives way at unproved spans
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most
-    growth: GrowthConfig | None = None  # where F grows into the solid
+    growth: GrowthConfig | None = None  # set by `growth.growing` from Config.growth, where F grows into the solid
     usual_steps: tuple[int, ...] = (18, 18, 14, 6, 6, 6)  # of the rounds of most runs: tells the time left
     least_steps: int = 6  # a round: what unfolds a few spans hardly lowers the energy of the whole
     slides: int = 3  # of the boundary parameters after each step

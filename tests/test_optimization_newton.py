@@ -148,7 +148,7 @@ def test_a_polish_that_folds_is_mended_before_more_is_taken_back(monkeypatch):
     certified = certify(as_volume(wavy_control(0.0)))
     folded = replace(certified, verdict="folded", unproved=np.array([[1, 1, 1]]))
     answers, taken_back = iter([certified, certified, folded, certified, certified]), []
-    monkeypatch.setattr(Optimized, "of", lambda control, *_: Optimized(control, next(answers), False, False))
+    monkeypatch.setattr(Optimized, "of", lambda control, *_: Optimized(control, next(answers), True))
     original = SplineEnergy.take_back
     monkeypatch.setattr(SplineEnergy, "take_back", lambda *given: (taken_back.append(1), original(*given)))
     control, fit = wavy_control(0.0), surface_fit()
@@ -245,11 +245,11 @@ def test_interrupted_between_rounds_goes_on_to_the_same_result(tmp_path):
 def test_a_map_whose_boundary_is_decided_is_kept(monkeypatch):
     """Of certified maps that do not meet themselves the last one counts of which that is proved."""
     config, steps, seen = replace(CONFIG, rounds=10, polish=3), count(1), []
-    answers = iter([False, False, False, True])  # of the start, the first round, and the rounds of polish
+    answers = iter([True, True, True, None])  # of the start, the first round, and the rounds of polish
     proved = certify(as_volume(wavy_control(0.0)))
 
     def found(control, *_):
-        seen.append(Optimized(control, proved, False, next(answers, True)))
+        seen.append(Optimized(control, proved, next(answers, None)))
         return seen[-1]
 
     monkeypatch.setattr(Optimized, "of", found)
@@ -257,7 +257,7 @@ def test_a_map_whose_boundary_is_decided_is_kept(monkeypatch):
     fit = surface_fit()
     fit.give_way(np.full(len(fit.points), 1e-6))  # so that the polish has something to take back
     kept = optimize(wavy_control(0.0), KNOTS, fit, config, history=History())
-    assert kept is seen[2] and seen[-1].undecided
+    assert kept is seen[2] and seen[-1].injective is None
 
 
 @pytest.mark.parametrize(("meets", "rounds"), [([True, True, False], 7), ([False], 2), ([True] * 9, 7)])
@@ -270,7 +270,7 @@ def test_a_boundary_that_meets_itself_is_pushed_apart_before_the_polish(monkeypa
     contacts, taken_back = [], []
     answers = iter([False, *meets])  # the first is asked of the start
     proved = certify(as_volume(wavy_control(0.0)))
-    monkeypatch.setattr(Optimized, "of", lambda control, *_: Optimized(control, proved, next(answers, False), False))
+    monkeypatch.setattr(Optimized, "of", lambda control, *_: Optimized(control, proved, not next(answers, False)))
     monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control)
     monkeypatch.setattr(SplineEnergy, "watch_contact", lambda *_: contacts.append(1) or np.array([[0, 1, 1]]))
     original = SplineEnergy.take_back

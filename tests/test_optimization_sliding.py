@@ -46,6 +46,17 @@ def test_a_slide_is_no_longer_than_told():
     assert_on_the_cube(places)
 
 
+def test_points_beyond_reach_stay():
+    control = wavy_control()
+    start, cube_faces = on_the_cube(200)
+    points, places = start[::-1].copy(), parameters_at(start)
+    before = distances(places, control, points)
+    reach = float(np.median(before))
+    places.slide(control, points, 0.05, reach=reach)
+    moved = (places.parameters != start).any(axis=1)
+    assert moved[before < reach].mean() > 0.5 and not moved[before > reach].any()
+
+
 def test_no_slide_leads_away():
     control = wavy_control()
     start, cube_faces = on_the_cube(200)

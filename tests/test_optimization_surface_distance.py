@@ -32,6 +32,22 @@ def test_residuals_are_those_of_the_volume():
     assert energy == pytest.approx(np.einsum("ni,nij,nj->", expected, metric, expected))
 
 
+def test_points_that_are_held_count_in_all_directions():
+    parameters, _ = on_the_cube(200)
+    points = np.random.default_rng(2).normal(size=(200, 3))
+    control = wavy_control()
+    fit, metric = make_fit(points, parameters)
+    held = np.arange(200) < 80
+    fit.hold(held)
+    residual = fit.residuals(control)
+    each = np.where(
+        held, fit.weights * (residual**2).sum(axis=1), np.einsum("ni,nij,nj->n", residual, metric, residual)
+    )
+    assert fit.energy_and_gradient(control)[0] == pytest.approx(each.sum())
+    fit.hold(np.zeros(200, dtype=bool))
+    assert fit.energy_and_gradient(control)[0] == pytest.approx(along.sum())
+
+
 def test_energy_is_quadratic_with_the_given_gradient_and_hessian():
     parameters, _ = on_the_cube(200)
     fit, _ = make_fit(parameters + 0.1, parameters)

@@ -334,7 +334,7 @@ def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monk
         found = optimize(control, *args, **options)
         none = np.zeros((0, 3), dtype=np.int64)
         proved = replace(found.certificate, verdict="certified", unproved=none)
-        seen.append(replace(found, certificate=proved, meets_itself=next(answers)))
+        seen.append(replace(found, certificate=proved, injective=not next(answers)))
         return seen[-1]
 
     answers = iter(meets)

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..arrays import Array, IntArray
 from ..config import LAYOUT, LayoutConfig
-from ..surface.geometry import connected, directed_edges, edge_table
+from ..surface.geometry import connected, directed_edges, edge_table, edge_triangles
 from .cube import CORNERS, EDGES, face_number, project_radially
 from .cutting import CutMesh, cut_along_rays
 
@@ -108,9 +108,7 @@ def _distance_to_segment(points: Array, start: Array, end: Array) -> Array:
 def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntArray:
     """Return the cube face (m,) of each triangle: the paths bound six patches, each known by its four corners."""
     on_path = {tuple(sorted(pair)) for path in paths for pair in pairwise(path.tolist())}
-    sides = np.sort(directed_edges(faces), axis=1)
-    order = np.lexsort(sides.T)
-    pairs, owners = sides[order][::2], order.reshape(-1, 2) // 3  # closed mesh: every edge has two triangles
+    pairs, owners = edge_triangles(faces)
     open_sides = np.array([tuple(p) not in on_path for p in pairs.tolist()])
     patch = connected(owners[open_sides], len(faces))
     if patch.max() != 5:

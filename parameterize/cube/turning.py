@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import Array
 from ..config import LayoutConfig
-from ..surface.geometry import directed_edges, doubled_areas
+from ..surface.geometry import doubled_areas, edge_triangles
 from .cube import CORNERS, EDGES, project_radially
 from .sphere import SphereLayout
 
@@ -29,10 +29,8 @@ def _bends(layout: SphereLayout) -> tuple[Array, Array, Array]:
     That is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """
     vertices, faces, places = layout.vertices, layout.faces, layout.directions
-    pairs = directed_edges(faces)
-    order = np.lexsort(np.sort(pairs, axis=1).T)
-    here, there = order.reshape(-1, 2).T // 3  # closed: every edge has two triangles
-    edges = pairs[order[::2]]
+    edges, owners = edge_triangles(faces)
+    here, there = owners.T
     normals = doubled_areas(vertices, faces)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     angle = np.arccos(np.clip((normals[here] * normals[there]).sum(axis=1), -1.0, 1.0))

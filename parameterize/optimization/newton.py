@@ -37,22 +37,26 @@ _SHORTEST_STEP = 1e-6
 class Optimized:
     """Control points (3, n_u, n_v, n_w) at volume 1, and what is proved of them.
 
-    meets_itself: whether the boundary of a certified map was found to meet itself; undecided: whether neither that nor
-    the contrary was found. Both are False where there is no certificate.
+    injective: True where the boundary is proved not to meet itself, False where it was found to, None where that is not
+    decided; it is asked of certified maps alone.
     """
 
     control: Tensor
     certificate: Certificate
-    meets_itself: bool
-    undecided: bool
+    injective: bool | None
 
     @classmethod
     def of(cls, control: Tensor, knots: Knots, config: SplineConfig) -> "Optimized":
         """Certify control points and, where that succeeds, check their boundary."""
         volume = BSplineVolume((config.degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy())
         certificate = certify(volume)
-        injective = check_boundary(volume).injective if certificate.verdict == "certified" else True
-        return cls(control, certificate, injective is False, injective is None)
+        injective = check_boundary(volume).injective if certificate.verdict == "certified" else None
+        return cls(control, certificate, injective)
+
+    @property
+    def meets_itself(self) -> bool:
+        """Whether the boundary of a certified map was found to meet itself."""
+        return self.injective is False
 
     @property
     def faults(self) -> tuple[int, bool]:
@@ -62,7 +66,7 @@ class Optimized:
     @property
     def rank(self) -> tuple[int, bool, bool]:
         """The faults, and whether the boundary is undecided: of two maps the one with the lower rank is better."""
-        return *self.faults, self.undecided
+        return *self.faults, self.injective is None
 
 
 def optimize(

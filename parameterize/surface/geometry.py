@@ -20,6 +20,13 @@ def directed_edges(faces: IntArray) -> IntArray:
     return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
+def edge_triangles(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the edges (e, 2) of a closed surface, each pair ascending, and the two triangles at each (e, 2)."""
+    sides = np.sort(directed_edges(faces), axis=1)
+    order = np.lexsort(sides.T)
+    return sides[order][::2], order.reshape(-1, 2) // 3
+
+
 def connected(links: IntArray, count: int) -> IntArray:
     """Return the number of the component that each of `count` things belongs to (count,), joined by links (k, 2)."""
     graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
