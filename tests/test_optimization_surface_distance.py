@@ -40,9 +40,8 @@ def test_points_that_are_held_count_in_all_directions():
     held = np.arange(200) < 80
     fit.hold(held)
     residual = fit.residuals(control)
-    each = np.where(
-        held, fit.weights * (residual**2).sum(axis=1), np.einsum("ni,nij,nj->n", residual, metric, residual)
-    )
+    plain, along = fit.weights * (residual**2).sum(axis=1), np.einsum("ni,nij,nj->n", residual, metric, residual)
+    each = np.where(held, plain, along)
     assert fit.energy_and_gradient(control)[0] == pytest.approx(each.sum())
     fit.hold(np.zeros(200, dtype=bool))
     assert fit.energy_and_gradient(control)[0] == pytest.approx(along.sum())
