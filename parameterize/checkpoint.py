@@ -17,7 +17,7 @@ from torch import Tensor
 
 from .files import save_bytes
 
-FORMAT = 6
+FORMAT = 7
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
 
@@ -44,6 +44,12 @@ class Checkpoints:
         """Return the checkpoints of another start of the run, in files of their own; the first start is number 0."""
         other = copy(self)
         other._suffix = f"-{start}" if start else ""
+        return other
+
+    def of_coarse_rounds(self) -> "Checkpoints":
+        """Return the checkpoints of the first rounds, on few control points, in files of their own."""
+        other = copy(self)
+        other._suffix += "-coarse"
         return other
 
     def of_refinement(self, number: int) -> "Checkpoints":

@@ -54,24 +54,24 @@ class TrainConfig:
     learning_rate: float = 1e-3  # of Adam
     matrix_rate: float = 0.015  # of Muon, for the hidden layers' matrices; Adam trains these, too, where it is 0
     final_share: float = 0.02  # of the rates, reached by cosine decay at the end of each stage
-    easy_loss: float = 5.0  # where the first stage ends with a larger loss, all take longer in proportion
-    most_effort: float = 4.0  # factor of their steps then, at most
+    easy_loss: float | None = 5.0  # where the first stage ends with a larger loss, the map is grown instead
     cell: float = 0.12  # edge h of the interior cells (section 4.4.2)
     triangles: int = 700  # surface triangles sampled a step; all of them where there are fewer
     min_det: float = 0.1  # alpha of the bijectivity term
     wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
     whiten: bool = True  # start from the affine map that makes the domain as wide in all directions, not the identity
     det_floor: float = 0.5  # share of `min_det` at which the distortion term holds smaller determinants
-    lost_loss: float | None = 30.0  # where the last stage ends with a larger loss, the map is grown at once
     edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
 
 
 @dataclass(frozen=True)
 class GrowthConfig:
-    """How F grows from a cube into the solid, where the training fails: rounds before those of the spline stage."""
+    """How F grows from a cube into a solid that is hard for the network: rounds before those of the spline stage."""
 
     shares: tuple[float, ...] = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)  # of `vertex`
     steps: int = 12  # a round, at most
+    coarse: float = 1 / 3  # in these rounds, in place of the spline stage's
+    slides: int = 1  # likewise
     penalty: float = 2500.0  # on det J, in these rounds and all later ones
     reach: float = 0.03  # surface points farther from F than this do not slide, and draw F in all directions
     rounds: int = 20  # of the spline stage, after these, at most
@@ -111,6 +111,8 @@ class SplineConfig:
     contact_way: float = 0.0625  # factor of the surface's weights there, each round
     penalties: tuple[float, ...] = (20.0, 100.0, 500.0, 2500.0)  # one a round, then the last one again
     rounds: int = 16  # at most
+    coarse: float = 5 / 9  # of the spans a direction, in the first rounds
+    coarse_rounds: int = 2
     polish: int = 6  # of them, after the map is certified for the first time, at most
     parting: int = 6  # before these, while the boundary of a certified map meets itself, at most
     patient_rounds: int = 2  # after these the anchors let go, and the penalty grows at unproved spans
@@ -203,7 +205,7 @@ class Config:
     layout : LayoutConfig
     growth : GrowthConfig
     starts : int
-        The tries in all: where the trained map is not certified, others are grown from a cube.
+        The tries in all: where a shape is hard to train, or the trained map is not certified, others are grown.
 
     Examples
     --------
@@ -219,19 +221,19 @@ class Config:
     spline: SplineConfig
     layout: LayoutConfig = LAYOUT
     growth: GrowthConfig = GrowthConfig()
-    starts: int = 3  # a map that is not certified is grown instead, from other layouts: so many tries in all
+    starts: int = 3  # the training, then maps grown from a cube, as long as none is certified
     refinement: RefinementConfig | None = None  # the control points of `spline` are all there are where it is None
 
     def scaled(self, factor: float) -> Config:
         """Return the same options with `factor` (at most 100) times as many steps in every stage, at least one each.
 
-        With fewer steps every shape looks hard: none is trained longer then, and none counts as lost.
+        With fewer steps every shape looks hard: with a factor below 1 all are trained to the end.
         """
         if not isinstance(factor, Real) or not 0.0 < factor <= 100.0:
             raise ValueError(f"steps factor must be a positive number, at most 100, got {factor!r:.80}")
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
-        train = self.train if factor >= 1.0 else replace(self.train, most_effort=1.0, lost_loss=None)
+        train = self.train if factor >= 1.0 else replace(self.train, easy_loss=None)
         growth = replace(self.growth, steps=max(1, round(factor * self.growth.steps)))
         return replace(self, train=train, stages=stages, spline=spline, growth=growth)
 
@@ -278,7 +280,7 @@ PRESETS = {
             learning_rate=5e-4,
             matrix_rate=0.0,
             final_share=1.0,
-            most_effort=1.0,
+            easy_loss=None,
             cell=0.04,
             triangles=1_000_000,
             whiten=False,

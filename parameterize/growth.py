@@ -1,4 +1,4 @@
-"""A map that does not need the network: the cube grows into the solid (for shapes on which the training fails).
+"""A map that does not need the network: the cube grows into the solid (for shapes that are hard to train).
 
 The surface is laid on the cube one-to-one before anything else, so that the boundary never has to be untangled. The
 first map is a cube in the solid's middle. Round after round the surface's data draw it more strongly, while the
@@ -32,6 +32,8 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
         growth=growth,
         penalties=(growth.penalty,),
         rounds=rounds + growth.rounds,
+        coarse=growth.coarse,
+        coarse_rounds=rounds,
         usual_steps=(growth.steps,) * rounds + spline.usual_steps[2:],
         patient_rounds=growth.patient_rounds,
         firm_rounds=growth.firm_rounds,

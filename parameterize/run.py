@@ -18,6 +18,7 @@ from .arrays import Array, IntArray
 from .certificate.boundary import check_boundary
 from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
+from .coarse import coarse_knots, optimize_coarse_first
 from .config import Config, SplineConfig, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
 from .cube.cutting import subdivide_finely
@@ -26,13 +27,12 @@ from .cube.flips import flipped, untangle
 from .cube.tutte import Layout, lay_out
 from .growth import first_cube, growing, surface_on_cube
 from .optimization.least_squares import fit_pairs
-from .optimization.newton import Optimized, one_thread_an_operation, optimize
+from .optimization.newton import Optimized, one_thread_an_operation
 from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback, ignore
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
-from .spline.bspline import open_uniform_knots
 from .spline.volume import BSplineVolume
 from .surface.geometry import vertex_quadrics, vertex_weights
 from .surface.surface import Surface
@@ -165,11 +165,10 @@ def parameterize(
     }
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     spline = config.spline
-    knots = (open_uniform_knots(spline.control_points, spline.degree),) * 3
     own, history, seconds = len(surface.vertices), History(), dict[str, float]()
     vertices, faces = subdivide_finely(surface.unit_vertices, surface.faces, own, spline)
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
-    task = _Task(surface, vertices, own, faces, config, knots, seed, place, dtype, given, seconds, report)
+    task = _Task(surface, vertices, own, faces, config, seed, place, dtype, given, seconds, report)
     found, fit = _best_attempt(task, checkpoints)
     told = None
     if config.refinement is not None:
@@ -232,14 +231,13 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """What all attempts share: the surface, itself and at volume 1 with long edges cut; options, knots, the place."""
+    """What all attempts share: the surface, itself and at volume 1 with long edges cut; options, the place."""
 
     surface: Surface
     vertices: Array
     own: int  # vertices of the surface itself, the first ones
     faces: IntArray
     config: Config
-    knots: tuple[Array, Array, Array]
     seed: int
     device: torch.device
     dtype: torch.dtype
@@ -252,14 +250,16 @@ _Attempt = tuple[Optimized, SurfaceFit]
 
 
 def _best_attempt(task: _Task, checkpoints: Checkpoints) -> _Attempt:
-    """Train a map; where it is lost or not certified, grow others. Return the first without faults, or the best."""
+    """Train a map, or grow others where that is hard or not certified. Return the first without faults, or the best."""
     starts = task.config.starts if task.given_corners is None else 1
     best = _trained(task, checkpoints, give_up=starts > 1)
     for start in range(1, starts):
         if best is not None and not any(best[0].faults):
             break
-        fault = "the training is too far from a cube" if best is None else _fault(best[0])
-        _log.warning("%s; growing a map from a cube instead", fault)
+        if best is None:
+            _log.info("the shape is hard for the network: growing a map from a cube instead")
+        else:
+            _log.warning("%s; growing a map from a cube instead", _fault(best[0]))
         other = _grown(task, start, checkpoints.of_start(start))
         if best is None or other[0].rank < best[0].rank:
             best = other
@@ -268,7 +268,7 @@ def _best_attempt(task: _Task, checkpoints: Checkpoints) -> _Attempt:
 
 
 def _trained(task: _Task, checkpoints: Checkpoints, *, give_up: bool) -> _Attempt | None:
-    """Train the network, fit F to it and optimise F. With `give_up`, return None where the last loss is too high."""
+    """Train the network, fit F to it and optimise F. With `give_up`, return None where the shape is hard to train."""
     with _timed(task.seconds, "train"), one_thread_an_operation():
         trainer = Trainer(
             task.vertices,
@@ -281,45 +281,45 @@ def _trained(task: _Task, checkpoints: Checkpoints, *, give_up: bool) -> _Attemp
             checkpoints=checkpoints,
             **task.report,
         )
-        network = trainer.run()
-    limit = task.config.train.lost_loss
-    if give_up and limit is not None and trainer.last_loss > limit:
+        network = trainer.run(give_up=give_up)
+    if network is None:
         return None
+    spline = task.config.spline
     with _timed(task.seconds, "fit"), one_thread_an_operation():
         mapped = map_points(network, task.vertices, task.device, task.dtype)
-        fit = _surface_fit(_layout(mapped, trainer.corners, task), task)
+        fit = _surface_fit(_layout(mapped, trainer.corners, task), spline, task)
         control = _first_spline(network, fit, task)
-    return _optimized(control, fit, task.config.spline, task, checkpoints)
+    return _optimized(control, fit, spline, task, checkpoints)
 
 
 def _grown(task: _Task, start: int, checkpoints: Checkpoints) -> _Attempt:
     """Lay the surface on the cube, turned otherwise at every start, and let F grow from a cube towards it."""
     config = task.config
+    spline = growing(config.spline, config.growth)
     with _timed(task.seconds, "fit"), one_thread_an_operation():
         generator = np.random.default_rng([task.seed, start])
         mesh = task.surface.unit_vertices, task.surface.faces
-        layout = surface_on_cube(*mesh, config.spline, config.layout, generator)
-        fit = _surface_fit(layout, task)
-        control = first_cube(layout, task.own, task.knots, config.spline.degree)
-    return _optimized(control, fit, growing(config.spline, config.growth), task, checkpoints)
+        layout = surface_on_cube(*mesh, spline, config.layout, generator)
+        fit = _surface_fit(layout, spline, task)
+        control = first_cube(layout, task.own, fit.places.knots, spline.degree)
+    return _optimized(control, fit, spline, task, checkpoints)
 
 
 def _optimized(
     control: torch.Tensor, fit: SurfaceFit, spline: SplineConfig, task: _Task, checkpoints: Checkpoints
 ) -> _Attempt:
     with _timed(task.seconds, "optimize"):
-        return optimize(control, task.knots, fit, spline, checkpoints=checkpoints, **task.report), fit
+        return optimize_coarse_first(control, fit, spline, checkpoints=checkpoints, **task.report)
 
 
 def _fault(found: Optimized) -> str:
     return "the boundary meets itself" if found.meets_itself else "not certified"
 
 
-def _surface_fit(layout: Layout, task: _Task) -> SurfaceFit:
+def _surface_fit(layout: Layout, spline: SplineConfig, task: _Task) -> SurfaceFit:
     """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
-    spline = task.config.spline
     return SurfaceFit(
-        SlidingParameters(task.knots, spline.degree, layout.places, layout.faces, task.config.layout),
+        SlidingParameters(coarse_knots(spline), spline.degree, layout.places, layout.faces, task.config.layout),
         layout.vertices,
         vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
         vertex_weights(layout.vertices, layout.faces, task.own),
@@ -358,7 +358,7 @@ def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Te
         np.concatenate([mapped, fit.places.parameters]),
         np.concatenate([inside, vertices]),
         weights,
-        task.knots,
+        fit.places.knots,
         spline.degree,
         fairness=spline.fit_fairness,
     )

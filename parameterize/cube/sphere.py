@@ -84,7 +84,7 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask) -> Array:
         edges, _ = edge_table(faces[half])
         links = _links(edges, np.ones(len(edges)), len(vertices))
         matrix = csc_array(_laplacian(links)[inner][:, inner])
-        flat[inner] = splu(matrix).solve(links[inner][:, rim] @ flat[rim])
+        flat[inner] = _solved(matrix, links[inner][:, rim] @ flat[rim])
         square = (flat[used] ** 2).sum(axis=1, keepdims=True)  # stereographic
         directions[used] = np.hstack([2.0 * flat[used], side * (1.0 - square)]) / (1.0 + square)
     return directions
@@ -98,6 +98,12 @@ def _links(edges: IntArray, weights: Array, count: int) -> csr_array:
 
 def _laplacian(links: csr_array) -> csr_array:
     return csr_array(diags_array(links.sum(axis=1)) - links)
+
+
+def _solved(matrix: csc_array, right: Array) -> Array:
+    """Solve with a symmetric positive definite matrix: the order of elimination keeps its symmetry."""
+    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return np.asarray(factors.solve(right))
 
 
 def _volumes(corners: Array) -> Array:
@@ -177,10 +183,10 @@ def _relaxed(directions: Array, vertices: Array, faces: IntArray, layout: Layout
     for _ in range(layout.sphere_steps if math.isfinite(energy) else 0):
         tangents = _tangents(directions)
         slopes, hessians = triangles.derivatives(directions, tangents)
-        slope = np.bincount(unknowns.ravel(), slopes.ravel(), size)
+        slope = np.asarray(np.bincount(unknowns.ravel(), slopes.ravel(), size), dtype=np.float64)
         matrix = coo_array((hessians.ravel(), (rows, columns)), shape=(size, size)).tocsc()
         damping = layout.sphere_damping * matrix.diagonal().mean()
-        step = splu(csc_array(matrix + damping * eye_array(size))).solve(-slope)
+        step = _solved(csc_array(matrix + damping * eye_array(size)), -slope)
         move, length = np.einsum("nca,na->nc", tangents, step.reshape(-1, 2)), 1.0
         while length > _SHORTEST_STEP:
             trial = directions + length * move

@@ -84,13 +84,13 @@ class SplineEnergy:
     def slide(self, control: Tensor) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
         places, points, longest = self.surface.places, self.surface.points, 0.5 / max(control.shape[1:])
-        for _ in range(self.config.slides):
-            if self._grows is None:
-                places.slide(control, points, longest)
-            else:
-                places.slide(control, points, longest, keep_layout=True, reach=self._grows.reach)
         if self._grows is None:
+            for _ in range(self.config.slides):
+                places.slide(control, points, longest)
             places.relax(self.config.relaxations)
+        else:
+            for _ in range(self._grows.slides):
+                places.slide(control, points, longest, keep_layout=True, reach=self._grows.reach)
         self.watch_facing(control)
         if self._contact is not None:
             self._contact = self._contact_at(control, self._contact.near)

@@ -194,9 +194,8 @@ class _Rounds:
         unproved = found.certificate.unproved
         meets = ", the boundary meets itself" if found.meets_itself else ""
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
-        grown = self.number + 1 >= len(self.shares)
-        self.certified |= grown and found.certificate.verdict == "certified"
-        if self.number == 0 or not grown or found.rank <= self.best.rank:
+        self.certified |= not self.growing and found.certificate.verdict == "certified"
+        if self.number == 0 or self.growing or found.rank <= self.best.rank:
             places = self.energy.surface.places
             self.best, self.best_places = found, (places.parameters, places.cube_faces)
         many = len(unproved) > config.most_watched

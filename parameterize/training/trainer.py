@@ -1,7 +1,6 @@
 """The training stages as one loop: smooth cuboids S(2), S(1), cube, fixed corners, fixed edges (section 4.3.1).
 
-The first stage is passed through once as a look at the shape: the loss that it ends with tells how much effort, as a
-factor of the steps, the same stage once more and all others take.
+The loss that the first stage ends with tells whether the network suits the shape.
 """
 
 import logging
@@ -31,11 +30,11 @@ _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
 
 @dataclass
 class _Run:
-    """Where the training stands: pass, step, and the network at the start of the pass and at its best."""
+    """Where the training stands: stage, step, and the network at the start of the stage and at its best."""
 
     number: int
     step: int
-    start: State  # the network at the start of the pass: corners and cuts were taken from it
+    start: State  # the network at the start of the stage: corners and cuts were taken from it
     best: State
     best_key: tuple[float, float] = (math.inf, math.inf)  # folded samples, then loss
 
@@ -44,7 +43,7 @@ class Trainer:
     """Trains G on one surface.
 
     vertices: (n, 3), at volume 1. faces: (m, 3). given_corners: (8,) vertex numbers or None.
-    The random numbers of a step depend on the seed, the pass and the step alone.
+    The random numbers of a step depend on the seed, the stage and the step alone.
     """
 
     def __init__(
@@ -64,7 +63,6 @@ class Trainer:
         self.config, self.seed, self.device, self.dtype = config, seed, device, dtype
         self.vertices, self.faces, self.corners = vertices, faces, given_corners
         self.history, self.progress, self.checkpoints = history, progress, checkpoints
-        self.effort = 1.0  # until the first pass has ended
         self.generator = torch.Generator()
         first_weights = torch.Generator().manual_seed(seed % 2**63)
         self.network = InverseMap(config.network, first_weights).to(device=device, dtype=dtype)
@@ -74,17 +72,18 @@ class Trainer:
         inside = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
         self.objective = Objective(self.network, inside, config.train)
 
-    def run(self) -> InverseMap:
+    def run(self, *, give_up: bool = False) -> InverseMap | None:
         """Train all stages, or those that a checkpoint leaves; return the network at the best state of the last one.
 
+        With `give_up`, return None where the first stage ends with a loss above `easy_loss`.
         Where the mapped surface is still too far from a cube for its edges to be traced, the stages that fix them are
         left out and a warning says so: the spline stage moves edges anyway. Raises PathError where the user gave the
         corners.
         """
-        given = self.corners is not None
+        given, limit = self.corners is not None, self.config.train.easy_loss
         saved = self.checkpoints.load(_CHECKPOINT)
         first = int(saved[1]["number"]) if saved else 0
-        for number, stage in list(enumerate(self._passes))[first:]:
+        for number, stage in list(enumerate(self.config.stages))[first:]:
             run = self._load_run(*saved) if saved else _Run(number, 0, self._state(), self._state())
             try:
                 boundary = self._prepare(stage)
@@ -97,26 +96,11 @@ class Trainer:
             if saved:
                 self._load_progress(saved[0], optimizer)
             self._train(run, boundary, optimizer)
-            if number == 0:
-                train, (_, loss) = self.config.train, run.best_key
-                self.effort = min(max(loss / train.easy_loss, 1.0), train.most_effort)
+            _, loss = run.best_key
+            if give_up and number == 0 and limit is not None and loss > limit:
+                return None
             saved = None
         return self.network
-
-    @property
-    def last_loss(self) -> float:
-        """The loss of the last step."""
-        return float(self.history.rows[-1][2])
-
-    @property
-    def _passes(self) -> list[StageConfig]:
-        return [self.config.stages[0], *self.config.stages]
-
-    def _steps(self, number: int) -> int:
-        """Return the steps of a pass; the first one is not repeated where it was enough."""
-        if number == 1 and self.effort == 1.0:
-            return 0
-        return round((self.effort if number else 1.0) * self._passes[number].steps)
 
     def map(self, points: Array) -> Array:
         """Return G at points (m, 3), as float64."""
@@ -151,8 +135,8 @@ class Trainer:
 
     def _train(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
         """Train one stage, and leave the network at its best state: fewest folded samples, then lowest loss."""
-        stage, steps = self._passes[run.number], self._steps(run.number)
-        later = sum(self._steps(number) for number in range(run.number + 1, len(self._passes)))
+        stage, steps = self.config.stages[run.number], self.config.stages[run.number].steps
+        later = sum(stage.steps for stage in self.config.stages[run.number + 1 :])
         started, begun = time.perf_counter(), run.step
         try:
             while run.step < steps:
@@ -179,7 +163,7 @@ class Trainer:
             raise FloatingPointError(f"stage {stage.name}, step {run.step}: the loss is not finite")
         if (folded, value) < run.best_key:
             run.best_key, run.best = (folded, value), self._state()
-        optimizer.step(self._share(run.step / self._steps(run.number)))
+        optimizer.step(self._share(run.step / stage.steps))
         self.history.add(stage.name, run.step, value, folded, terms)
         run.step += 1
 
@@ -193,7 +177,6 @@ class Trainer:
         state = {
             "number": run.number,
             "step": run.step,
-            "effort": self.effort,
             "best_key": run.best_key,
             "corners": None if self.corners is None else self.corners.tolist(),
             "history": self.history.rows,
@@ -202,7 +185,6 @@ class Trainer:
 
     def _load_run(self, tensors: State, state: dict[str, Any]) -> _Run:
         """Restore everything but the optimiser; leave the network as it was at the start of the stage."""
-        self.effort = state["effort"]
         self.corners = None if state["corners"] is None else np.array(state["corners"])
         self.history.rows[:] = [tuple(row) for row in state["history"]]
         start, best = _part(tensors, "start"), _part(tensors, "best")

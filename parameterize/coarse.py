@@ -1,0 +1,65 @@
+"""The spline stage on two sets of knots: its first rounds on few control points, the others on all.
+
+The first rounds move the map far, and need no fine spline for that; with a third of the spans a direction such a round
+takes about a fifth of the time. The map so found is then interpolated on the fine knots.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from .checkpoint import Checkpoints
+from .config import SplineConfig
+from .optimization.energy import Knots
+from .optimization.newton import Optimized, optimize
+from .optimization.surface_distance import SurfaceFit
+from .progress import History, ProgressCallback
+from .spline.bspline import evaluate_grid, greville, interpolate_along, open_uniform_knots
+
+
+def coarse_knots(config: SplineConfig) -> Knots:
+    """Return the knots of the first rounds: `coarse` times as many spans as in the end, at least one."""
+    spans = max(1, round(config.coarse * (config.control_points - config.degree)))
+    return (open_uniform_knots(config.degree + spans, config.degree),) * 3
+
+
+def optimize_coarse_first(
+    control: Tensor,
+    fit: SurfaceFit,
+    config: SplineConfig,
+    *,
+    history: History,
+    progress: ProgressCallback,
+    checkpoints: Checkpoints,
+) -> tuple[Optimized, SurfaceFit]:
+    """Run the first `coarse_rounds` on the knots of `control` and `fit`, the others on all; return map and data there.
+
+    control: (3, n_u, n_v, n_w) on `coarse_knots`. The first rounds have a checkpoint of their own. Where both sets of
+    knots are the same, all rounds are one run.
+    """
+    report: dict[str, Any] = {"history": history, "progress": progress}
+    knots, fine = fit.places.knots, (open_uniform_knots(config.control_points, config.degree),) * 3
+    if len(fine[0]) == len(knots[0]):
+        return optimize(control, fine, fit, config, checkpoints=checkpoints, **report), fit
+    longer = (len(fine[0]) / len(knots[0])) ** 1.5  # a step: half of its time is the surface's, which stays the same
+    usual = config.usual_steps[: config.coarse_rounds]
+    usual += tuple(math.ceil(longer * steps) for steps in config.usual_steps[config.coarse_rounds :])
+    first = replace(config, rounds=config.coarse_rounds, usual_steps=usual)
+    found = optimize(control, knots, fit, first, checkpoints=checkpoints.of_coarse_rounds(), **report)
+    control, fit = interpolated(found.control, knots, fine, config.degree), fit.on_knots(fine)
+    begun = config.coarse_rounds
+    return optimize(control, fine, fit, config, checkpoints=checkpoints, begun=begun, **report), fit
+
+
+def interpolated(control: Tensor, knots: Knots, finer: Knots, degree: int) -> Tensor:
+    """Return the control points (3, n_u, n_v, n_w) on other knots of the map that agrees at their Greville points."""
+    degrees = (degree,) * 3
+    places = [greville(row, degree) for row in finer]
+    values = evaluate_grid(degrees, knots, np.moveaxis(control.numpy(), 0, -1), places)
+    for axis in range(3):
+        values = interpolate_along(finer[axis], degree, values, axis)
+    return torch.as_tensor(np.ascontiguousarray(np.moveaxis(values, -1, 0)))
