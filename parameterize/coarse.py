@@ -46,12 +46,12 @@ def optimize_coarse_first(
     if len(fine[0]) == len(knots[0]):
         return optimize(control, fine, fit, config, checkpoints=checkpoints, **report), fit
     longer = (len(fine[0]) / len(knots[0])) ** 1.5  # a step: half of its time is the surface's, which stays the same
-    usual = config.usual_steps[: config.coarse_rounds]
-    usual += tuple(math.ceil(longer * steps) for steps in config.usual_steps[config.coarse_rounds :])
-    first = replace(config, rounds=config.coarse_rounds, usual_steps=usual)
+    begun = min(config.coarse_rounds, config.rounds - 1)  # at least one round is on all
+    usual = config.usual_steps[:begun]
+    usual += tuple(math.ceil(longer * steps) for steps in config.usual_steps[begun:])
+    first = replace(config, rounds=begun, usual_steps=usual)
     found = optimize(control, knots, fit, first, checkpoints=checkpoints.of_coarse_rounds(), **report)
     control, fit = interpolated(found.control, knots, fine, config.degree), fit.on_knots(fine)
-    begun = config.coarse_rounds
     return optimize(control, fine, fit, config, checkpoints=checkpoints, begun=begun, **report), fit
 
 

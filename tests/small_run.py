@@ -16,7 +16,7 @@ def shortened(config):
         config,
         starts=1,
         network=NetworkConfig(width=16, modules=1, frequencies=3),
-        train=replace(config.train, cell=0.2, triangles=200, most_effort=1.0, lost_loss=None),
+        train=replace(config.train, cell=0.2, triangles=200, easy_loss=None),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
         spline=replace(config.spline, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2),
         growth=GrowthConfig(shares=(0.1, 1.0), steps=3, rounds=2),

@@ -26,7 +26,7 @@ def test_scaled_changes_the_number_of_steps_alone():
     half = config.scaled(0.5)
     assert [s.steps for s in half.stages] == [round(0.5 * s.steps) for s in config.stages]
     assert half.spline.steps == round(0.5 * config.spline.steps)
-    assert half.train == replace(config.train, most_effort=1.0, lost_loss=None)  # every shape looks hard then
+    assert half.train == replace(config.train, easy_loss=None)  # every shape looks hard then
     assert half.growth == replace(config.growth, steps=config.growth.steps // 2)
     assert half.spline.penalties == config.spline.penalties
     shortest = config.scaled(1e-9)

@@ -61,16 +61,17 @@ def test_the_rounds_in_which_it_grows_come_first():
     spline = growing(config.spline, config.growth)
     grown = len(config.growth.shares)
     assert spline.rounds == grown + config.growth.rounds
+    assert spline.coarse_rounds == grown
     assert spline.usual_steps[:grown] == (config.growth.steps,) * grown
     assert list(config.growth.shares) == sorted(config.growth.shares) and config.growth.shares[-1] == 1.0
 
 
-def lost(config):
-    return replace(config, starts=2, train=replace(config.train, lost_loss=0.0))
+def hard(config):
+    return replace(config, starts=2, train=replace(config.train, easy_loss=0.0))
 
 
 def test_a_bent_rod_is_certified_without_a_trained_network():
-    config = lost(tiny_config())
+    config = hard(tiny_config())
     config = replace(
         config,
         spline=replace(preset("fast").spline, control_points=12, fit_cell=0.1),
@@ -83,7 +84,7 @@ def test_a_bent_rod_is_certified_without_a_trained_network():
 
 
 def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path):
-    surface, config = bent_rod(300), lost(tiny_config())
+    surface, config = bent_rod(300), hard(tiny_config())
     whole = parameterize(surface, config, seed=1, device="cpu")
 
     def interrupt(state: Progress):

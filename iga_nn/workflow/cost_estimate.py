@@ -36,7 +36,7 @@ REST = 1000.0  # libraries loaded, figures drawn
 
 # Products
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
-EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round
+EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round, on all control points
 HARD_AFTER = (3, 14)  # likewise each time that knots were inserted
 
 # Megabytes
@@ -101,9 +101,9 @@ def forecast(
 
 
 def _training_steps(config: Config) -> tuple[float, float]:
-    """Return the steps of all stages for an easy surface, and for one that takes the most effort."""
-    steps, most = sum(stage.steps for stage in config.stages), config.train.most_effort
-    return steps, steps if most == 1.0 else config.stages[0].steps + most * steps
+    """Return the steps of all stages for an easy surface, and those that show that a surface is hard."""
+    steps = sum(stage.steps for stage in config.stages)
+    return steps, steps if config.train.easy_loss is None or config.starts == 1 else config.stages[0].steps
 
 
 def _growths(refinement: RefinementConfig, control_points: int) -> list[float]:
