@@ -57,7 +57,8 @@ class MapOptions(SurfaceOptions):
     """Say how a surface becomes a volume.
 
     Attributes:
-        preset: "fast", made for two CPU cores, or "paper", the paper's own settings.
+        preset: "fast", made for two CPU cores; "grown", where every map grows from a cube, also of easy shapes; or
+            "paper", the paper's own settings.
         seed: equal seeds give equal volumes, bit for bit.
         device: where the network is trained; "auto" takes CUDA where it is available.
         control_points: number of control points per direction; "auto" starts with 30 and adds more where the surface is
@@ -77,7 +78,7 @@ class MapOptions(SurfaceOptions):
         20
     """
 
-    preset: Literal["fast", "paper"] = "fast"
+    preset: Literal["fast", "grown", "paper"] = "fast"
     seed: int = 0
     device: Literal["auto", "cpu", "cuda"] = "auto"
     control_points: int | Literal["auto"] = 30

@@ -1,4 +1,4 @@
-"""Options of a parameterization: frozen dataclasses, and the two presets.
+"""Options of a parameterization: frozen dataclasses, and the presets.
 
 Lengths are in units of the domain scaled to volume 1. Loss weights are those of the paper's Table 1.
 """
@@ -77,6 +77,7 @@ class GrowthConfig:
     rounds: int = 20  # of the spline stage, after these, at most
     patient_rounds: int = 2  # in place of the spline stage's
     firm_rounds: int = 6  # likewise
+    usual_steps: tuple[int, ...] = (40, 12, 8, 8, 8, 7, 6, 6, 6)  # of the rounds after these
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ class SplineConfig:
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
     steps: int = 60  # a round, at most
     growth: GrowthConfig | None = None  # set by `growth.growing` from Config.growth, where F grows into the solid
-    usual_steps: tuple[int, ...] = (18, 18, 14, 6, 6, 6)  # of the rounds of most runs: tells the time left
+    usual_steps: tuple[int, ...] = (13, 21, 27, 7, 6, 6)  # of the rounds of most runs: tells the time left
     least_steps: int = 6  # a round: what unfolds a few spans hardly lowers the energy of the whole
     slides: int = 3  # of the boundary parameters after each step
     relaxations: int = 1  # sweeps over the triangles that these flipped
@@ -227,13 +228,13 @@ class Config:
     def scaled(self, factor: float) -> Config:
         """Return the same options with `factor` (at most 100) times as many steps in every stage, at least one each.
 
-        With fewer steps every shape looks hard: with a factor below 1 all are trained to the end.
+        With fewer steps every shape looks hard: with a factor below 1 those that "fast" trains are trained to the end.
         """
         if not isinstance(factor, Real) or not 0.0 < factor <= 100.0:
             raise ValueError(f"steps factor must be a positive number, at most 100, got {factor!r:.80}")
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
-        train = self.train if factor >= 1.0 else replace(self.train, easy_loss=None)
+        train = self.train if factor >= 1.0 or not self.train.easy_loss else replace(self.train, easy_loss=None)
         growth = replace(self.growth, steps=max(1, round(factor * self.growth.steps)))
         return replace(self, train=train, stages=stages, spline=spline, growth=growth)
 
@@ -271,8 +272,10 @@ def _stages(steps: tuple[int, int, int, int, int]) -> tuple[StageConfig, ...]:
     )
 
 
+_FAST = Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((90, 60, 90, 30, 60)), SplineConfig())
 PRESETS = {
-    "fast": Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((90, 60, 90, 30, 60)), SplineConfig()),
+    "fast": _FAST,
+    "grown": replace(_FAST, name="grown", train=replace(_FAST.train, easy_loss=0.0)),
     "paper": Config(
         "paper",
         NetworkConfig(width=512, modules=6),
@@ -298,7 +301,8 @@ def preset(name: str) -> Config:
     Parameters
     ----------
     name : str
-        "fast", the default, made for two CPU cores; or "paper", the paper's network and steps: hours without a GPU.
+        "fast", the default, made for two CPU cores; "grown", the same with every map grown from a cube, as hard shapes
+        are; or "paper", the paper's network and steps: hours without a GPU.
 
     Raises
     ------

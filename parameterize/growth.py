@@ -34,7 +34,7 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
         rounds=rounds + growth.rounds,
         coarse=growth.coarse,
         coarse_rounds=rounds,
-        usual_steps=(growth.steps,) * rounds + spline.usual_steps[2:],
+        usual_steps=(growth.steps,) * rounds + growth.usual_steps,
         patient_rounds=growth.patient_rounds,
         firm_rounds=growth.firm_rounds,
     )

@@ -17,7 +17,7 @@ def test_presets_follow_the_papers_stages(name):
 
 
 def test_unknown_preset_names_the_choices():
-    with pytest.raises(ValueError, match="'quick'.*fast, paper"):
+    with pytest.raises(ValueError, match="'quick'.*fast, grown, paper"):
         preset("quick")
 
 

@@ -83,17 +83,18 @@ def test_a_bent_rod_is_certified_without_a_trained_network():
     assert result.quality.boundary.unit_volume.rms < 0.01
 
 
-def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path):
+@pytest.mark.parametrize(("rounds", "kept"), [(1, "spline-1-coarse"), (3, "spline-1")])
+def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path, rounds, kept):
     surface, config = bent_rod(300), hard(tiny_config())
     whole = parameterize(surface, config, seed=1, device="cpu")
 
     def interrupt(state: Progress):
-        if state.stage == "spline" and state.step > 2 * config.spline.steps:
+        if state.stage == "spline" and state.step > rounds * config.spline.steps:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         parameterize(surface, config, seed=1, device="cpu", checkpoint_dir=tmp_path, progress=interrupt)
-    assert (tmp_path / "spline-1.safetensors").is_file()
+    assert (tmp_path / f"{kept}.safetensors").is_file()
     resumed = parameterize(surface, config, seed=1, device="cpu", checkpoint_dir=tmp_path, resume=True)
     assert np.array_equal(resumed.volume.control_points, whole.volume.control_points)
     assert np.array_equal(resumed.boundary.parameters, whole.boundary.parameters)

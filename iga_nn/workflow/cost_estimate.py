@@ -83,7 +83,7 @@ def forecast(
         product = _product_seconds(spline, clock) + CALLS * one_pass
     once = FIT * product + (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
     step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
-    low, high = (
+    low, high = sorted(
         once
         + training * TRAINING_STEP * points * one_pass
         + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
@@ -101,9 +101,10 @@ def forecast(
 
 
 def _training_steps(config: Config) -> tuple[float, float]:
-    """Return the steps of all stages for an easy surface, and those that show that a surface is hard."""
-    steps = sum(stage.steps for stage in config.stages)
-    return steps, steps if config.train.easy_loss is None or config.starts == 1 else config.stages[0].steps
+    """Return the steps for an easy surface, and those that show one to be hard: the first stage's."""
+    steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
+    look = steps if limit is None or config.starts == 1 else config.stages[0].steps
+    return look if limit == 0.0 else steps, look
 
 
 def _growths(refinement: RefinementConfig, control_points: int) -> list[float]:
