@@ -1,7 +1,7 @@
 """The spline stage on two sets of knots: its first rounds on few control points, the others on all.
 
 The first rounds move the map far, and need no fine spline for that; with a third of the spans a direction such a round
-takes about a fifth of the time. The map so found is then interpolated on the fine knots.
+takes about a quarter of the time. The map so found is then interpolated on the fine knots.
 """
 
 import math
