@@ -45,7 +45,7 @@ def optimize_coarse_first(
     knots, fine = fit.places.knots, (open_uniform_knots(config.control_points, config.degree),) * 3
     if len(fine[0]) == len(knots[0]):
         return optimize(control, fine, fit, config, checkpoints=checkpoints, **report), fit
-    longer = (len(fine[0]) / len(knots[0])) ** 1.5  # a step: half of its time is the surface's, which stays the same
+    longer = (len(fine[0]) / len(knots[0])) ** 1.5  # that a step takes on all of them, about
     begun = min(config.coarse_rounds, config.rounds - 1)  # at least one round is on all
     usual = config.usual_steps[:begun]
     usual += tuple(math.ceil(longer * steps) for steps in config.usual_steps[begun:])
