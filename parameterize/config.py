@@ -81,6 +81,17 @@ class GrowthConfig:
 
 
 @dataclass(frozen=True)
+class ExtensionConfig:
+    """How the surface's layout on the cube is extended into the solid, and the spline stage that follows."""
+
+    cell: float = 0.0255  # of the lattice, in a domain of volume 1
+    tolerance: float = 1e-6  # of the linear solves, relative
+    penalty: float = 2500.0  # on det J, in all rounds
+    rounds: int = 20  # in place of the spline stage's
+    usual_steps: tuple[int, ...] = (40, 12, 8, 8, 8, 7, 6, 6, 6)  # likewise
+
+
+@dataclass(frozen=True)
 class SplineConfig:
     """Fit and control-point optimisation (section 4.3.2); weights refer to a domain of volume 1."""
 
@@ -205,8 +216,10 @@ class Config:
         Fit and optimisation, `control_points` a direction and `degree` among them.
     layout : LayoutConfig
     growth : GrowthConfig
+    extension : ExtensionConfig
     starts : int
-        The tries in all: where a shape is hard to train, or the trained map is not certified, others are grown.
+        The tries in all: where a shape is hard to train, or the trained map is not certified, others follow, which
+        are grown and extended by turns.
 
     Examples
     --------
@@ -222,7 +235,8 @@ class Config:
     spline: SplineConfig
     layout: LayoutConfig = LAYOUT
     growth: GrowthConfig = GrowthConfig()
-    starts: int = 3  # the training, then maps grown from a cube, as long as none is certified
+    extension: ExtensionConfig = ExtensionConfig()
+    starts: int = 4  # the training, then maps grown from a cube and extended by turns, as long as none is certified
     refinement: RefinementConfig | None = None  # the control points of `spline` are all there are where it is None
 
     def scaled(self, factor: float) -> Config:

@@ -25,6 +25,7 @@ from .cube.cutting import subdivide_finely
 from .cube.edge_paths import PathError, choose_corners
 from .cube.flips import flipped, untangle
 from .cube.tutte import Layout, lay_out
+from .extension import extended, extending
 from .growth import first_cube, growing, surface_on_cube
 from .optimization.least_squares import fit_pairs
 from .optimization.newton import Optimized, one_thread_an_operation
@@ -36,7 +37,6 @@ from .refinement import Refinement, refine
 from .spline.volume import BSplineVolume
 from .surface.geometry import vertex_quadrics, vertex_weights
 from .surface.surface import Surface
-from .training.network import InverseMap
 from .training.samples import interior_points
 from .training.target_shapes import nearest_on_cube
 from .training.trainer import Trainer, map_points
@@ -250,17 +250,22 @@ _Attempt = tuple[Optimized, SurfaceFit]
 
 
 def _best_attempt(task: _Task, checkpoints: Checkpoints) -> _Attempt:
-    """Train a map, or grow others where that is hard or not certified. Return the first without faults, or the best."""
+    """Train a map; where that is hard or not certified, grow and extend others. Return the first without faults.
+
+    Where all have faults, return the best.
+    """
     starts = task.config.starts if task.given_corners is None else 1
     best = _trained(task, checkpoints, give_up=starts > 1)
     for start in range(1, starts):
         if best is not None and not any(best[0].faults):
             break
+        grows = start % 2 == 1
+        way = "growing a map from a cube" if grows else "extending the surface's layout into the solid"
         if best is None:
-            _log.info("the shape is hard for the network: growing a map from a cube instead")
+            _log.info("the shape is hard for the network: %s instead", way)
         else:
-            _log.warning("%s; growing a map from a cube instead", _fault(best[0]))
-        other = _grown(task, start, checkpoints.of_start(start))
+            _log.warning("%s; %s instead", _fault(best[0]), way)
+        other = (_grown if grows else _extended)(task, start, checkpoints.of_start(start))
         if best is None or other[0].rank < best[0].rank:
             best = other
     assert best is not None
@@ -288,7 +293,9 @@ def _trained(task: _Task, checkpoints: Checkpoints, *, give_up: bool) -> _Attemp
     with _timed(task.seconds, "fit"), one_thread_an_operation():
         mapped = map_points(network, task.vertices, task.device, task.dtype)
         fit = _surface_fit(_layout(mapped, trainer.corners, task), spline, task)
-        control = _first_spline(network, fit, task)
+        inside = interior_points(task.vertices, task.faces, spline.fit_cell)
+        places = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
+        control = _first_spline(inside, places, fit, spline)
     return _optimized(control, fit, spline, task, checkpoints)
 
 
@@ -297,12 +304,27 @@ def _grown(task: _Task, start: int, checkpoints: Checkpoints) -> _Attempt:
     config = task.config
     spline = growing(config.spline, config.growth)
     with _timed(task.seconds, "fit"), one_thread_an_operation():
-        generator = np.random.default_rng([task.seed, start])
-        mesh = task.surface.unit_vertices, task.surface.faces
-        layout = surface_on_cube(*mesh, spline, config.layout, generator)
+        layout = _on_cube(task, start)
         fit = _surface_fit(layout, spline, task)
         control = first_cube(layout, task.own, fit.places.knots, spline.degree)
     return _optimized(control, fit, spline, task, checkpoints)
+
+
+def _extended(task: _Task, start: int, checkpoints: Checkpoints) -> _Attempt:
+    """Lay the surface on the cube likewise, extend that into the solid, fit F to it and optimise F."""
+    config = task.config
+    spline = extending(config.spline, config.extension)
+    with _timed(task.seconds, "fit"), one_thread_an_operation():
+        layout = _on_cube(task, start)
+        fit = _surface_fit(layout, spline, task)
+        control = _first_spline(*extended(layout, config.extension), fit, spline)
+    return _optimized(control, fit, spline, task, checkpoints)
+
+
+def _on_cube(task: _Task, start: int) -> Layout:
+    mesh = task.surface.unit_vertices, task.surface.faces
+    generator = np.random.default_rng([task.seed, start])
+    return surface_on_cube(*mesh, task.config.spline, task.config.layout, generator)
 
 
 def _optimized(
@@ -343,21 +365,16 @@ def _layout(mapped: Array, corners: IntArray | None, task: _Task) -> Layout:
     return Layout(task.vertices, task.faces, untangled)
 
 
-def _first_spline(network: InverseMap, fit: SurfaceFit, task: _Task) -> torch.Tensor:
-    """Fit by least squares to interior pairs (G(x), x) and the boundary's (section 4.3.2, step 2)."""
-    spline, vertices = task.config.spline, fit.points
-    inside = interior_points(task.vertices, task.faces, spline.fit_cell)
-    mapped = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
-    weights = np.concatenate(
-        [
-            np.full(len(inside), (1.0 - spline.boundary_share) / max(len(inside), 1)),
-            np.full(len(vertices), spline.boundary_share / len(vertices)),
-        ]
-    )
+def _first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineConfig) -> torch.Tensor:
+    """Fit by least squares to points inside (k, 3) with their places in the cube, and the boundary's (step 2)."""
+    weights = [
+        np.full(len(inside), (1.0 - spline.boundary_share) / max(len(inside), 1)),
+        np.full(len(fit.points), spline.boundary_share / len(fit.points)),
+    ]
     return fit_pairs(
-        np.concatenate([mapped, fit.places.parameters]),
-        np.concatenate([inside, vertices]),
-        weights,
+        np.concatenate([places, fit.places.parameters]),
+        np.concatenate([inside, fit.points]),
+        np.concatenate(weights),
         fit.places.knots,
         spline.degree,
         fairness=spline.fit_fairness,

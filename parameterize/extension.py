@@ -1,0 +1,133 @@
+"""Another map that does not need the network: the surface's layout on the cube is extended into the solid.
+
+The extension is harmonic, that is each place is the mean of those around it. Sheets that are close in space stay apart,
+because no line through the gap between them is followed. Differences at the surface are as in Shortley and Weller,
+J. Appl. Phys. 9, 1938, with weights that keep the system symmetric.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array, diags_array
+from scipy.sparse.linalg import cg
+
+from .arrays import Array, IntArray
+from .config import ExtensionConfig, SplineConfig
+from .cube.tutte import Layout
+
+_OFFSET = np.array([0.512345, 0.498765, 0.543211])  # in cells: no line of the lattice runs along faces of a model
+_NEAREST = 1e-3  # in cells: the surface counts as no nearer to a lattice point
+
+
+def extending(spline: SplineConfig, extension: ExtensionConfig) -> SplineConfig:
+    """Return the options of the spline stage of such a map: it starts near its end, so folds cost much at once."""
+    return replace(
+        spline,
+        penalties=(extension.penalty,),
+        rounds=extension.rounds,
+        usual_steps=extension.usual_steps,
+    )
+
+
+def extended(layout: Layout, options: ExtensionConfig) -> tuple[Array, Array]:
+    """Return the points (k, 3) of a lattice inside the surface, and their places (k, 3) in the cube."""
+    cell = options.cell
+    low = layout.vertices.min(axis=0) - cell * _OFFSET
+    shape = np.ceil((layout.vertices.max(axis=0) - low) / cell).astype(np.int64) + 1
+    axes = [_crossings(layout, axis, low, cell, shape) for axis in range(3)]
+    inside = _inside(axes[0], shape)
+    index = np.argwhere(inside)
+    numbers = np.full(tuple(shape), -1)
+    numbers[inside] = np.arange(len(index))
+    diagonal, right = np.zeros(len(index)), np.zeros((len(index), 3))
+    rows, columns = [], []
+    for axis, crossings in enumerate(axes):
+        for side in (1, -1):
+            gap, values = crossings.next_to(index, side)
+            near = gap < 1.0
+            weight = np.where(near, 1.0 / np.maximum(gap, _NEAREST), 0.0)
+            diagonal += weight
+            right += weight[:, None] * values
+            linked = np.flatnonzero(~near)
+            beside = index[linked] + side * np.eye(3, dtype=np.int64)[axis]
+            neighbours = numbers[tuple(np.clip(beside, 0, shape - 1).T)]
+            linked, neighbours = linked[neighbours >= 0], neighbours[neighbours >= 0]
+            diagonal[linked] += 1.0
+            rows.append(linked)
+            columns.append(neighbours)
+    ij = np.concatenate(rows), np.concatenate(columns)
+    links = coo_array((np.ones(len(ij[0])), ij), shape=(len(index), len(index)))
+    matrix, precondition = (diags_array(diagonal) - links).tocsr(), diags_array(1.0 / diagonal)
+    places = [cg(matrix, column, rtol=options.tolerance, M=precondition)[0] for column in right.T]
+    return low + cell * index, np.clip(np.stack(places, axis=1), 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossings:
+    """Where lattice lines along an axis cross the surface, in order of line and position.
+
+    lines (n,): numbers; positions (n,): along the axis, in cells; signs (n,): 1 where the line enters, else -1;
+    values (n, 3): places on the cube. shape: of the lattice.
+    """
+
+    axis: int
+    lines: IntArray
+    positions: Array
+    signs: IntArray
+    values: Array
+    shape: IntArray
+
+    def next_to(self, index: IntArray, side: int) -> tuple[Array, Array]:
+        """Return how far the next crossing is from lattice points (k, 3), in cells, and its value (k, 3)."""
+        stride = float(self.shape[self.axis] + 1)  # longer than a line: gaps to crossings of others are above 1
+        keys = stride * self.lines + self.positions
+        own = stride * _line_numbers(index, self.axis, self.shape) + index[:, self.axis]
+        found = np.searchsorted(keys, own) - (side < 0)
+        found = np.clip(found, 0, len(keys) - 1)
+        return np.abs(keys[found] - own), self.values[found]
+
+
+def _line_numbers(index: IntArray, axis: int, shape: IntArray) -> IntArray:
+    first, second = (d for d in range(3) if d != axis)
+    return np.asarray(index[:, first] * shape[second] + index[:, second])
+
+
+def _crossings(layout: Layout, axis: int, low: Array, cell: float, shape: IntArray) -> _Crossings:
+    """Return where the lattice's lines along an axis cross the surface."""
+    across = [d for d in range(3) if d != axis]
+    corners = (layout.vertices[layout.faces] - low) / cell  # (m, 3, 3)
+    flat = corners[:, :, across]
+    first = np.ceil(flat.min(axis=1)).astype(np.int64)
+    counts = np.maximum(np.floor(flat.max(axis=1)).astype(np.int64) - first + 1, 0)  # lines over each triangle's box
+    many = counts.prod(axis=1)
+    owner = np.repeat(np.arange(len(many)), many)
+    number = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
+    line = first[owner] + np.stack(np.divmod(number, counts[owner, 1]), axis=1)
+    doubled = _doubled_area(flat[:, 0], flat[:, 1], flat[:, 2])[owner]
+    a, b, c = np.moveaxis(flat[owner], 1, 0)
+    shares = np.stack([_doubled_area(line, b, c), _doubled_area(a, line, c), _doubled_area(a, b, line)], axis=1)
+    shares /= np.where(doubled == 0.0, 1.0, doubled)[:, None]
+    hit = (shares >= 0.0).all(axis=1) & (doubled != 0.0)
+    owner, line, shares = owner[hit], line[hit], shares[hit, :, None]
+    positions = (shares[:, :, 0] * corners[owner, :, axis]).sum(axis=1)
+    values = (shares * layout.places[layout.faces[owner]]).sum(axis=1)
+    turn = -1.0 if axis != 1 else 1.0  # an outward triangle that a line enters through is seen clockwise
+    signs = (turn * np.sign(doubled[hit])).astype(np.int64)
+    lines = line[:, 0] * shape[across[1]] + line[:, 1]
+    order = np.lexsort((positions, lines))
+    return _Crossings(axis, lines[order], positions[order], signs[order], values[order], shape)
+
+
+def _doubled_area(a: Array, b: Array, c: Array) -> Array:
+    """Return twice the signed area of triangles in the plane, corners (k, 2)."""
+    u, v = b - a, c - a
+    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def _inside(crossings: _Crossings, shape: IntArray) -> Array:
+    """Return which lattice points lie inside, along lines of the first axis: more have been entered than left."""
+    entered = np.zeros((shape[1] * shape[2], shape[0] + 1), dtype=np.int64)
+    places = np.clip(np.ceil(crossings.positions).astype(np.int64), 0, shape[0])
+    np.add.at(entered, (crossings.lines, places), crossings.signs)
+    inside = np.cumsum(entered, axis=1)[:, :-1] > 0
+    return np.asarray(np.moveaxis(inside.reshape(shape[1], shape[2], shape[0]), 2, 0))

@@ -1,0 +1,95 @@
+"""The extension of a surface's layout into the solid: values on its surface, sheets that are close, a folded sheet."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from shapes import ball
+from small_run import tiny_config
+
+from parameterize import parameterize
+from parameterize.config import ExtensionConfig, preset
+from parameterize.cube.tutte import Layout
+from parameterize.extension import extended, extending
+from parameterize.surface.surface import surface_from_arrays
+
+CELL = ExtensionConfig(cell=0.07)
+
+
+def box(low, high):
+    mesh = trimesh.creation.box(bounds=[low, high])
+    return np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
+
+
+def test_values_that_are_linear_on_the_surface_are_linear_inside():
+    points, faces = ball(400)
+    matrix = np.array([[0.2, 0.1, 0.0], [-0.1, 0.3, 0.05], [0.0, 0.05, 0.2]])
+    inside, places = extended(Layout(points, faces, 0.5 + points @ matrix.T), CELL)
+    assert places == pytest.approx(0.5 + inside @ matrix.T, abs=1e-4)
+
+
+def test_the_lattice_fills_the_solid_and_nothing_else():
+    points, faces = ball(2000)
+    inside, _ = extended(Layout(points, faces, 0.5 + 0.1 * points), CELL)
+    assert np.linalg.norm(inside, axis=1).max() < 1.0
+    volume = abs(trimesh.Trimesh(points, faces, process=False).volume)
+    assert len(inside) * CELL.cell**3 == pytest.approx(volume, rel=0.02)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_two_sheets_do_not_feel_each_other_through_a_gap_narrower_than_a_cell(axis):
+    near, far = np.ones(3), np.ones(3)
+    near[axis], far[axis] = 0.5, 0.5 + 0.3 * CELL.cell
+    start = np.zeros(3)
+    start[axis] = far[axis]
+    (lower, faces), (upper, more) = box(np.zeros(3), near), box(start, np.ones(3))
+    values = np.repeat([[0.2] * 3, [0.8] * 3], [len(lower), len(upper)], axis=0)
+    inside, places = extended(Layout(np.vstack([lower, upper]), np.vstack([faces, more + len(lower)]), values), CELL)
+    sheet = np.where(inside[:, axis] < 0.5, 0.2, 0.8)
+    assert set(sheet) == {0.2, 0.8}
+    assert places == pytest.approx(np.repeat(sheet[:, None], 3, axis=1), abs=1e-4)
+
+
+def test_where_two_parts_overlap_is_inside():
+    (first, faces), (second, more) = box(np.zeros(3), [0.6, 1.0, 1.0]), box([0.4, 0.0, 0.0], np.ones(3))
+    points = np.vstack([first, second])
+    inside, _ = extended(Layout(points, np.vstack([faces, more + len(first)]), np.full((16, 3), 0.5)), CELL)
+    assert len(inside) * CELL.cell**3 == pytest.approx(1.0, rel=0.1)
+    for low in (0.1, 0.45, 0.65):  # in one, in both, in the other
+        assert ((inside[:, 0] > low) & (inside[:, 0] < low + 0.15)).any()
+
+
+def test_its_spline_stage_penalises_folds_from_the_first_round():
+    spline = extending(preset("fast").spline, ExtensionConfig(penalty=7.0, rounds=3))
+    assert spline.penalties == (7.0,)
+    assert spline.rounds == 3
+    assert spline.growth is None
+
+
+def sheet_folded_once(count=900):
+    """A thick sheet bent by 300 degrees, so that its ends come close."""
+    points, faces = ball(count)
+    angle, radius = 0.8 * np.pi * points[:, 0], 1.2 + 0.35 * points[:, 1]
+    bent = np.stack([radius * np.sin(angle), radius * np.cos(angle), 0.8 * points[:, 2]], axis=1)
+    return surface_from_arrays(bent, faces, "sheet")
+
+
+def test_where_growth_fails_the_layout_is_extended(caplog):
+    """The growth gets no round that counts, so its map has faults; that of the third try is the result."""
+    config = tiny_config()
+    config = replace(
+        config,
+        starts=3,
+        train=replace(config.train, easy_loss=0.0),
+        spline=replace(preset("fast").spline, control_points=12),
+        growth=replace(preset("fast").growth, shares=(1.0,), steps=1, rounds=0),
+        extension=replace(preset("fast").extension, cell=0.05),
+    )
+    with caplog.at_level("INFO"):
+        result = parameterize(sheet_folded_once(), config, device="cpu")
+    assert "growing a map from a cube instead" in caplog.text
+    assert "extending the surface's layout into the solid instead" in caplog.text
+    assert result.certificate.verdict == "certified"
+    assert result.quality.boundary_check.injective is True
+    assert result.quality.boundary.unit_volume.rms < 0.02
