@@ -291,8 +291,8 @@ def test_a_seed_of_any_size_is_taken(surface):
             parameterize(surface, tiny_config(), seed=seed, device="cpu", progress=interrupt)
 
 
-def test_a_map_not_certified_is_grown_from_a_cube(surface, monkeypatch, tmp_path):
-    """Of three attempts the one with fewest unproved spans is kept; two are grown, from cubes turned otherwise."""
+def test_a_map_not_certified_is_grown_from_a_cube_then_extended(surface, monkeypatch, tmp_path):
+    """Of three attempts the one with fewest unproved spans is kept; the second is grown, the third extended."""
     optimize, seen = run.optimize_coarse_first, []
 
     def spoiled(control, fit, config, **options):
@@ -305,8 +305,9 @@ def test_a_map_not_certified_is_grown_from_a_cube(surface, monkeypatch, tmp_path
     monkeypatch.setattr(run, "optimize_coarse_first", spoiled)
     config = replace(tiny_config(), starts=3)
     result = parameterize(surface, config, seed=3, device="cpu", checkpoint_dir=tmp_path)
-    assert [growth for _, growth, _ in seen] == [None, config.growth, config.growth]
-    assert not torch.equal(seen[1][2], seen[2][2])
+    assert [growth for _, growth, _ in seen] == [None, config.growth, None]
+    assert seen[2][2].shape == seen[0][2].shape  # on as many control points as the trained one
+    assert not torch.equal(seen[0][2], seen[2][2])
     kept = np.moveaxis(seen[1][0].control.numpy(), 0, -1)
     assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
     assert (result.history["stage"] == "cube").sum() == STEPS[2]  # trained once
