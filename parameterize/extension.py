@@ -6,12 +6,13 @@ J. Appl. Phys. 9, 1938, with weights that keep the system symmetric.
 """
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
-from scipy.sparse import coo_array, diags_array
+from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import cg
 
-from .arrays import Array, IntArray
+from .arrays import Array, IntArray, Mask
 from .config import ExtensionConfig, SplineConfig
 from .cube.tutte import Layout
 
@@ -34,32 +35,39 @@ def extended(layout: Layout, options: ExtensionConfig) -> tuple[Array, Array]:
     cell = options.cell
     low = layout.vertices.min(axis=0) - cell * _OFFSET
     shape = np.ceil((layout.vertices.max(axis=0) - low) / cell).astype(np.int64) + 1
-    axes = [_crossings(layout, axis, low, cell, shape) for axis in range(3)]
-    inside = _inside(axes[0], shape)
+    lines = [_crossings(layout, axis, low, cell, shape) for axis in range(3)]
+    inside = _inside(lines[0], shape)
+    matrix, right = _harmonic_system(lines, inside)
+    precondition = diags_array(1.0 / matrix.diagonal())
+    places = [cg(matrix, column, rtol=options.tolerance, M=precondition)[0] for column in right.T]
+    return low + cell * np.argwhere(inside), np.clip(np.stack(places, axis=1), 0.0, 1.0)
+
+
+def _harmonic_system(lines: list["_Crossings"], inside: Mask) -> tuple[csr_array, Array]:
+    """Return matrix (k, k) and right side (k, 3): each inner point is the mean of its six neighbours.
+
+    Where the surface is nearer than the next lattice point, it takes that one's part, weighed by how near it is.
+    """
     index = np.argwhere(inside)
-    numbers = np.full(tuple(shape), -1)
+    numbers = np.full(inside.shape, -1)
     numbers[inside] = np.arange(len(index))
     diagonal, right = np.zeros(len(index)), np.zeros((len(index), 3))
     rows, columns = [], []
-    for axis, crossings in enumerate(axes):
-        for side in (1, -1):
-            gap, values = crossings.next_to(index, side)
-            near = gap < 1.0
-            weight = np.where(near, 1.0 / np.maximum(gap, _NEAREST), 0.0)
-            diagonal += weight
-            right += weight[:, None] * values
-            linked = np.flatnonzero(~near)
-            beside = index[linked] + side * np.eye(3, dtype=np.int64)[axis]
-            neighbours = numbers[tuple(np.clip(beside, 0, shape - 1).T)]
-            linked, neighbours = linked[neighbours >= 0], neighbours[neighbours >= 0]
-            diagonal[linked] += 1.0
-            rows.append(linked)
-            columns.append(neighbours)
+    for (axis, crossings), side in product(enumerate(lines), (1, -1)):
+        gap, values = crossings.next_to(index, side)
+        near = gap < 1.0
+        beside = index.copy()
+        beside[:, axis] += side
+        neighbours = numbers[tuple(np.clip(beside, 0, np.array(inside.shape) - 1).T)]
+        linked = ~near & (neighbours >= 0)
+        weight = np.where(near, 1.0 / np.maximum(gap, _NEAREST), linked)
+        right[near] += weight[near, None] * values[near]
+        diagonal += weight
+        rows.append(np.flatnonzero(linked))
+        columns.append(neighbours[linked])
     ij = np.concatenate(rows), np.concatenate(columns)
     links = coo_array((np.ones(len(ij[0])), ij), shape=(len(index), len(index)))
-    matrix, precondition = (diags_array(diagonal) - links).tocsr(), diags_array(1.0 / diagonal)
-    places = [cg(matrix, column, rtol=options.tolerance, M=precondition)[0] for column in right.T]
-    return low + cell * index, np.clip(np.stack(places, axis=1), 0.0, 1.0)
+    return csr_array(diags_array(diagonal) - links), right
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +132,7 @@ def _doubled_area(a: Array, b: Array, c: Array) -> Array:
     return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
-def _inside(crossings: _Crossings, shape: IntArray) -> Array:
+def _inside(crossings: _Crossings, shape: IntArray) -> Mask:
     """Return which lattice points lie inside, along lines of the first axis: more have been entered than left."""
     entered = np.zeros((shape[1] * shape[2], shape[0] + 1), dtype=np.int64)
     places = np.clip(np.ceil(crossings.positions).astype(np.int64), 0, shape[0])
