@@ -366,7 +366,7 @@ def _layout(mapped: Array, corners: IntArray | None, task: _Task) -> Layout:
 
 
 def _first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineConfig) -> torch.Tensor:
-    """Fit by least squares to points inside (k, 3) with their places in the cube, and the boundary's (4.3.2, step 2)."""
+    """Fit by least squares to pairs (k, 3) of places and points inside, and the boundary's (section 4.3.2, step 2)."""
     weights = [
         np.full(len(inside), (1.0 - spline.boundary_share) / max(len(inside), 1)),
         np.full(len(fit.points), spline.boundary_share / len(fit.points)),
