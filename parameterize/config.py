@@ -194,8 +194,14 @@ class LayoutConfig:
     sphere_steps: int = 300  # of Newton's method for the layout on the sphere, at most
     sphere_damping: float = 1e-8  # of these, as a share of the mean diagonal entry
     sphere_gain: float = 1e-3  # the steps end once one lowers the energy by less than this share
-    turns: int = 100  # of the cube in that layout, from which the best is taken
-    edge_width: float = 0.06  # from the cube's edges, within which the surface should not be hollow
+    turns: int = 200  # of the cube in that layout, drawn at random
+    finals: int = 5  # the best of them, which are turned further
+    turn_steps: int = 60  # of each of these, at most
+    turn_size: float = 0.1  # of the first of these steps, as an angle
+    other_turn: float = 0.3  # a turn that differs from a better one by a larger angle counts as another
+    edge_width: float = 0.15  # from the cube's edges, within which the surface should not be hollow
+    edge_pieces: int = 24  # of each cube edge: one that lies in a hollow is not made up for by ridges beside it
+    hollow: float = 1.0  # times its bend that such a piece counts in addition
 
 
 LAYOUT = LayoutConfig()

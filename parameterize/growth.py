@@ -41,13 +41,14 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
 
 
 def surface_on_cube(
-    vertices: Array, faces: IntArray, spline: SplineConfig, options: LayoutConfig, generator: np.random.Generator
+    vertices: Array, faces: IntArray, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
 ) -> Layout:
     """Lay a closed surface (n, 3), (m, 3) on the cube without a flipped triangle, its long edges cut.
 
-    generator: draws how the cube may be turned. Vertices of the mesh stay first.
+    seed: draws how the cube may be turned; turn: 0 takes the best of these ways, 1 the next, ... Vertices of the mesh
+    stay first.
     """
-    sphere = turned(lay_on_sphere(vertices, faces, options), options, generator)
+    sphere = turned(lay_on_sphere(vertices, faces, options), options, np.random.default_rng(seed), turn)
     columns = np.hstack([sphere.vertices, sphere.directions])
     columns, faces = subdivide_finely(columns, sphere.faces, len(vertices), spline)
     points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])

@@ -265,7 +265,8 @@ def _best_attempt(task: _Task, checkpoints: Checkpoints) -> _Attempt:
             _log.info("the shape is hard for the network: %s instead", way)
         else:
             _log.warning("%s; %s instead", _fault(best[0]), way)
-        other = (_grown if grows else _extended)(task, start, checkpoints.of_start(start))
+        turn = (start - 1) // 2  # a way that comes again begins with another turn of the cube
+        other = (_grown if grows else _extended)(task, turn, checkpoints.of_start(start))
         if best is None or other[0].rank < best[0].rank:
             best = other
     assert best is not None
@@ -299,32 +300,31 @@ def _trained(task: _Task, checkpoints: Checkpoints, *, give_up: bool) -> _Attemp
     return _optimized(control, fit, spline, task, checkpoints)
 
 
-def _grown(task: _Task, start: int, checkpoints: Checkpoints) -> _Attempt:
-    """Lay the surface on the cube, turned otherwise at every start, and let F grow from a cube towards it."""
+def _grown(task: _Task, turn: int, checkpoints: Checkpoints) -> _Attempt:
+    """Lay the surface on the cube and let F grow from a cube towards it."""
     config = task.config
     spline = growing(config.spline, config.growth)
     with _timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = _on_cube(task, start)
+        layout = _on_cube(task, turn)
         fit = _surface_fit(layout, spline, task)
         control = first_cube(layout, task.own, fit.places.knots, spline.degree)
     return _optimized(control, fit, spline, task, checkpoints)
 
 
-def _extended(task: _Task, start: int, checkpoints: Checkpoints) -> _Attempt:
+def _extended(task: _Task, turn: int, checkpoints: Checkpoints) -> _Attempt:
     """Lay the surface on the cube likewise, extend that into the solid, fit F to it and optimise F."""
     config = task.config
     spline = extending(config.spline, config.extension)
     with _timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = _on_cube(task, start)
+        layout = _on_cube(task, turn)
         fit = _surface_fit(layout, spline, task)
         control = _first_spline(*extended(layout, config.extension), fit, spline)
     return _optimized(control, fit, spline, task, checkpoints)
 
 
-def _on_cube(task: _Task, start: int) -> Layout:
+def _on_cube(task: _Task, turn: int) -> Layout:
     mesh = task.surface.unit_vertices, task.surface.faces
-    generator = np.random.default_rng([task.seed, start])
-    return surface_on_cube(*mesh, task.config.spline, task.config.layout, generator)
+    return surface_on_cube(*mesh, task.config.spline, task.config.layout, seed=task.seed, turn=turn)
 
 
 def _optimized(

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from shapes import ball, rounded_cube
 
 from parameterize.config import LAYOUT
 from parameterize.cube.cube import project_radially
 from parameterize.cube.sphere import SphereLayout
-from parameterize.cube.turning import _bends, _hollowness, turned
+from parameterize.cube.turning import _angle_between, _bends, _hollowness, turned
 
 
 def laid(vertices, faces):
@@ -24,23 +25,48 @@ def test_a_hollow_counts_positive_and_a_ridge_negative():
 
 
 def test_the_edges_of_a_cube_are_found_again():
-    """Of 2 000 rotations the chosen one leads the cube's edges close to those of a rounded cube."""
+    """The chosen rotation leads the cube's edges close to those of a rounded cube."""
     points, faces = rounded_cube(4000, 30.0)
     layout = laid(points, faces)
-    options = type(LAYOUT)(turns=2000)
-    found = turned(layout, options, np.random.default_rng(0))
+    found = turned(layout, LAYOUT, np.random.default_rng(0), 0)
     middles, along, bends = _bends(layout)
-    best = _hollowness(middles, along, bends, options.edge_width)
+    best = _hollowness(middles, along, bends, LAYOUT)
     middles, along, bends = _bends(found)
-    assert best < _hollowness(middles, along, bends, options.edge_width) < 0.6 * best < 0.0
+    assert _hollowness(middles, along, bends, LAYOUT) == pytest.approx(best, rel=0.01) and best < 0.0
     ridge = np.sort(np.abs(points - 0.5), axis=1)[:, 1] > 0.47  # on the edges of the rounded cube
     place = np.sort(np.abs(project_radially(found.directions[ridge])), axis=1)[:, 1]
-    assert np.median(place) > 0.4
+    assert np.median(place) > 0.47
+
+
+def test_ridges_do_not_make_up_for_a_hollow_on_the_same_edge():
+    """Of two layouts with the same sum of bends, that one is better whose edges lie in no hollow."""
+    middles = np.array([[-0.5, -0.5, -0.4], [-0.5, -0.5, 0.4]])  # both on one edge of the cube, far apart
+    along = np.array([[0.0, 0.0, 1.0]] * 2)
+    even, uneven = (_hollowness(middles, along, np.array(bends), LAYOUT) for bends in ([-1.0, -1.0], [1.0, -3.0]))
+    assert even == pytest.approx(-2.0, rel=1e-6)
+    assert uneven == pytest.approx(-2.0 + LAYOUT.hollow, rel=1e-6)
 
 
 def test_the_same_generator_gives_the_same_turn():
     layout = laid(*ball(200))
-    first, second = (turned(layout, LAYOUT, np.random.default_rng(7)).directions for _ in range(2))
+    first, second = (turned(layout, LAYOUT, np.random.default_rng(7), 0).directions for _ in range(2))
     assert np.array_equal(first, second)
-    assert not np.allclose(turned(layout, LAYOUT, np.random.default_rng(8)).directions, first)
+    assert not np.allclose(turned(layout, LAYOUT, np.random.default_rng(8), 0).directions, first)
     assert np.linalg.norm(first, axis=1) == pytest.approx(1.0)
+
+
+def test_a_higher_number_gives_another_turn_that_is_no_better():
+    points, faces = ball(600)
+    layout = laid(points * (1.0 + 0.3 * np.sin(5.0 * points[:, :1]) * points[:, 1:2]), faces)
+    middles, along, bends = _bends(layout)
+    found = [turned(layout, LAYOUT, np.random.default_rng(1), number).directions for number in (0, 1, 100)]
+    turns = [Rotation.align_vectors(directions, layout.directions)[0] for directions in found]
+    costs = [_hollowness(middles @ turn.as_matrix().T, along @ turn.as_matrix().T, bends, LAYOUT) for turn in turns]
+    assert _angle_between(turns[1], turns[0]) > LAYOUT.other_turn
+    assert costs[0] < costs[1] <= costs[2]
+
+
+def test_a_quarter_turn_of_the_cube_is_no_other_turn():
+    quarter, some = Rotation.from_euler("z", 90.0, degrees=True), Rotation.from_rotvec([0.3, -0.2, 0.1])
+    assert _angle_between(quarter * some, some) == pytest.approx(0.0, abs=1e-12)
+    assert _angle_between(Rotation.from_rotvec([0.0, 0.4, 0.0]) * quarter * some, some) == pytest.approx(0.4)

@@ -26,8 +26,7 @@ def bent_rod(count=900):
 
 
 def on_cube(surface, spline, seed=0):
-    generator = np.random.default_rng(seed)
-    return surface_on_cube(surface.unit_vertices, surface.faces, spline, LAYOUT, generator)
+    return surface_on_cube(surface.unit_vertices, surface.faces, spline, LAYOUT, seed=seed, turn=0)
 
 
 def test_a_bent_rod_lies_on_the_cube_without_a_flip():

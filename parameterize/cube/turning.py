@@ -5,22 +5,51 @@ edge in a hollow cannot lie on the surface; one along a ridge suits it best.
 """
 
 import numpy as np
+from scipy.optimize import fmin
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Array
 from ..config import LayoutConfig
 from ..surface.geometry import doubled_areas, edge_triangles
-from .cube import CORNERS, EDGES, project_radially
+from ..threads import in_parallel
+from .cube import project_radially
 from .sphere import SphereLayout
 
 
-def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Generator) -> SphereLayout:
-    """Return the layout, turned by that one of some random rotations which leaves the edges least in hollows."""
+def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Generator, number: int) -> SphereLayout:
+    """Return the layout, turned so that the cube's edges lie least in hollows: 0 is the best turn, 1 the next, ...
+
+    The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
+    nearly are the same count as one. The last one stands for all numbers above.
+    """
     middles, along, bends = _bends(layout)
-    rotations = Rotation.random(options.turns, rng=generator).as_matrix()
-    costs = [_hollowness(middles @ r.T, along @ r.T, bends, options.edge_width) for r in rotations]
-    best = rotations[int(np.argmin(costs))]
+    simplex = options.turn_size * np.vstack([np.zeros(3), np.eye(3)])
+
+    def cost(rotation: Rotation) -> float:
+        turn = rotation.as_matrix().T
+        return _hollowness(middles @ turn, along @ turn, bends, options)
+
+    def turned_further(rotation: Rotation) -> tuple[float, Rotation]:
+        def cost_after(vector: Array) -> float:
+            return cost(Rotation.from_rotvec(vector) * rotation)
+
+        least = fmin(cost_after, simplex[0], initial_simplex=simplex, maxfun=options.turn_steps, disp=False)
+        return cost_after(least), Rotation.from_rotvec(least) * rotation
+
+    rotations = list(Rotation.random(options.turns, rng=generator))
+    costs = in_parallel(cost, rotations)
+    finals = [rotations[i] for i in np.argsort(costs)[: options.finals]]
+    turns = list[Rotation]()
+    for _, rotation in sorted(in_parallel(turned_further, finals), key=lambda found: found[0]):
+        if all(_angle_between(rotation, other) > options.other_turn for other in turns):
+            turns.append(rotation)
+    best = turns[min(number, len(turns) - 1)].as_matrix()
     return SphereLayout(layout.vertices, layout.faces, layout.directions @ best.T)
+
+
+def _angle_between(first: Rotation, second: Rotation) -> float:
+    """Return the angle by which two turns of the cube differ, which looks the same from 24 sides."""
+    return float((first * second.inv()).reduce(left=Rotation.create_group("O")).magnitude())
 
 
 def _bends(layout: SphereLayout) -> tuple[Array, Array, Array]:
@@ -42,13 +71,16 @@ def _bends(layout: SphereLayout) -> tuple[Array, Array, Array]:
     return middles, step / np.maximum(length, 1e-300)[:, None], length * hollow
 
 
-def _hollowness(middles: Array, along: Array, bends: Array, width: float) -> float:
-    """Return the sum of the bends (e,) near the cube's edges, those across them above all."""
-    radial, total = project_radially(middles), 0.0
-    for i, j in EDGES:
-        edge = CORNERS[j] - CORNERS[i]
-        away = radial + 0.5 - CORNERS[i]
-        away = away - np.clip(away @ edge, 0.0, 1.0)[:, None] * edge
-        near = np.exp(-0.5 * (away**2).sum(axis=1) / width**2)
-        total += float((bends * near * (along @ edge) ** 2).sum())
-    return total
+def _hollowness(middles: Array, along: Array, bends: Array, options: LayoutConfig) -> float:
+    """Return the sum of the bends (e,) near the cube's edges, those across them above all; hollow pieces count more."""
+    radial, rows = project_radially(middles), np.arange(len(middles))
+    size = np.abs(radial)
+    axis = size.argmin(axis=1)  # of the nearest edge of the cube
+    away = 0.5 - np.sort(size, axis=1)[:, 1]
+    weights = np.exp(-0.5 * (away / options.edge_width) ** 2) * along[rows, axis] ** 2
+    places = np.minimum(options.edge_pieces * (0.5 + radial[rows, axis]), options.edge_pieces - 1).astype(np.int64)
+    positive = radial > 0.0
+    positive[rows, axis] = False
+    edges = 8 * axis + positive @ [1, 2, 4]
+    pieces = np.bincount(options.edge_pieces * edges + places, bends * weights)
+    return float(pieces.sum() + options.hollow * np.maximum(pieces, 0.0).sum())
