@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from numbers import Integral
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -43,6 +43,8 @@ from .training.trainer import Trainer, map_points
 
 _log = logging.getLogger(__name__)
 
+Origin = Literal["network", "growth", "extension"]
+
 
 @dataclass(frozen=True, eq=False)
 class Parameterization:
@@ -67,6 +69,9 @@ class Parameterization:
         Where the network was trained.
     seed : int
     config : Config
+    origin : "network", "growth" or "extension"
+        Where the map comes from; a shape that is hard for the network is grown from a cube, or the layout of its
+        surface is extended.
     refinement : Refinement or None
         With config.refinement, how many control points each direction got, and why no more.
 
@@ -88,6 +93,7 @@ class Parameterization:
     device: str
     seed: int
     config: Config
+    origin: Origin
     refinement: Refinement | None = None
 
 
@@ -169,7 +175,8 @@ def parameterize(
     vertices, faces = subdivide_finely(surface.unit_vertices, surface.faces, own, spline)
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
     task = _Task(surface, vertices, own, faces, config, seed, place, dtype, given, seconds, report)
-    found, fit = _best_attempt(task, checkpoints)
+    attempt = _best_attempt(task, checkpoints)
+    found, fit = attempt.found, attempt.fit
     told = None
     if config.refinement is not None:
         with _timed(seconds, "refine"):
@@ -181,7 +188,17 @@ def parameterize(
         proofs = certificate, check_boundary(volume)
         quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, *proofs)
     return Parameterization(
-        volume, boundary, certificate, quality, history.arrays(), seconds, place.type, seed, config, told
+        volume,
+        boundary,
+        certificate,
+        quality,
+        history.arrays(),
+        seconds,
+        place.type,
+        seed,
+        config,
+        attempt.origin,
+        told,
     )
 
 
@@ -246,7 +263,13 @@ class _Task:
     report: dict[str, Any]  # history and progress, as Trainer and optimize take them
 
 
-_Attempt = tuple[Optimized, SurfaceFit]
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """A map, the surface data that belong to it, and where it comes from."""
+
+    found: Optimized
+    fit: SurfaceFit
+    origin: Origin
 
 
 def _best_attempt(task: _Task, checkpoints: Checkpoints) -> _Attempt:
@@ -257,17 +280,17 @@ def _best_attempt(task: _Task, checkpoints: Checkpoints) -> _Attempt:
     starts = task.config.starts if task.given_corners is None else 1
     best = _trained(task, checkpoints, give_up=starts > 1)
     for start in range(1, starts):
-        if best is not None and not any(best[0].faults):
+        if best is not None and not any(best.found.faults):
             break
         grows = start % 2 == 1
         way = "growing a map from a cube" if grows else "extending the surface's layout into the solid"
         if best is None:
             _log.info("the shape is hard for the network: %s instead", way)
         else:
-            _log.warning("%s; %s instead", _fault(best[0]), way)
+            _log.warning("%s; %s instead", _fault(best.found), way)
         turn = (start - 1) // 2  # a way that comes again begins with another turn of the cube
         other = (_grown if grows else _extended)(task, turn, checkpoints.of_start(start))
-        if best is None or other[0].rank < best[0].rank:
+        if best is None or other.found.rank < best.found.rank:
             best = other
     assert best is not None
     return best
@@ -297,7 +320,7 @@ def _trained(task: _Task, checkpoints: Checkpoints, *, give_up: bool) -> _Attemp
         inside = interior_points(task.vertices, task.faces, spline.fit_cell)
         places = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
         control = _first_spline(inside, places, fit, spline)
-    return _optimized(control, fit, spline, task, checkpoints)
+    return _optimized(control, fit, spline, task, checkpoints, "network")
 
 
 def _grown(task: _Task, turn: int, checkpoints: Checkpoints) -> _Attempt:
@@ -308,7 +331,7 @@ def _grown(task: _Task, turn: int, checkpoints: Checkpoints) -> _Attempt:
         layout = _on_cube(task, turn)
         fit = _surface_fit(layout, spline, task)
         control = first_cube(layout, task.own, fit.places.knots, spline.degree)
-    return _optimized(control, fit, spline, task, checkpoints)
+    return _optimized(control, fit, spline, task, checkpoints, "growth")
 
 
 def _extended(task: _Task, turn: int, checkpoints: Checkpoints) -> _Attempt:
@@ -319,7 +342,7 @@ def _extended(task: _Task, turn: int, checkpoints: Checkpoints) -> _Attempt:
         layout = _on_cube(task, turn)
         fit = _surface_fit(layout, spline, task)
         control = _first_spline(*extended(layout, config.extension), fit, spline)
-    return _optimized(control, fit, spline, task, checkpoints)
+    return _optimized(control, fit, spline, task, checkpoints, "extension")
 
 
 def _on_cube(task: _Task, turn: int) -> Layout:
@@ -328,10 +351,16 @@ def _on_cube(task: _Task, turn: int) -> Layout:
 
 
 def _optimized(
-    control: torch.Tensor, fit: SurfaceFit, spline: SplineConfig, task: _Task, checkpoints: Checkpoints
+    control: torch.Tensor,
+    fit: SurfaceFit,
+    spline: SplineConfig,
+    task: _Task,
+    checkpoints: Checkpoints,
+    origin: Origin,
 ) -> _Attempt:
     with _timed(task.seconds, "optimize"):
-        return optimize_coarse_first(control, fit, spline, checkpoints=checkpoints, **task.report)
+        found, fit = optimize_coarse_first(control, fit, spline, checkpoints=checkpoints, **task.report)
+    return _Attempt(found, fit, origin)
 
 
 def _fault(found: Optimized) -> str:

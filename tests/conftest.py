@@ -55,6 +55,7 @@ def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
         device="cpu",
         seed=given.get("seed", 0),
         config=given.get("config") or preset("fast"),
+        origin="network",
     )
 
 

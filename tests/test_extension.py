@@ -90,6 +90,7 @@ def test_where_growth_fails_the_layout_is_extended(caplog):
         result = parameterize(sheet_folded_once(), config, device="cpu")
     assert "growing a map from a cube instead" in caplog.text
     assert "extending the surface's layout into the solid instead" in caplog.text
+    assert result.origin == "extension"
     assert result.certificate.verdict == "certified"
     assert result.quality.boundary_check.injective is True
     assert result.quality.boundary.unit_volume.rms < 0.02

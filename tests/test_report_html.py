@@ -80,6 +80,13 @@ def test_verdicts_of_what_went_wrong(result):
     assert "The map folds" in text and "0.25, 0.5, 1" in text and "did not converge" in text
 
 
+@pytest.mark.parametrize(("origin", "words"), [("network", "the network"), ("growth", "a growing cube")])
+def test_page_says_where_the_map_comes_from(result, origin, words):
+    report = json.loads((result / "report.json").read_text())
+    report["parameterization"]["origin"] = origin
+    assert f"<dt>The map comes from</dt><dd>{words}</dd>" in page.page(report, None, result)
+
+
 def test_a_boundary_that_meets_itself_comes_first(result):
     report = json.loads((result / "report.json").read_text())
     meeting = {"parameters": [[0, 0, 0], [1, 1, 1]], "point": [0.125, 2.0, 3.0]}

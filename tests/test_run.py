@@ -187,6 +187,7 @@ def test_a_shape_that_is_hard_to_train_is_grown_after_the_first_stage(surface, u
     assert not np.array_equal(result.volume.control_points, undisturbed.volume.control_points)
     alone = parameterize(surface, hard_config(starts=1), seed=3, device="cpu")  # no other try: all stages are trained
     same_result(undisturbed, alone)
+    assert (result.origin, alone.origin) == ("growth", "network")
 
 
 def test_a_run_killed_after_the_look_at_a_hard_shape_resumes(surface, tmp_path):
@@ -308,6 +309,7 @@ def test_a_map_not_certified_is_grown_from_a_cube_then_extended(surface, monkeyp
     assert [growth for _, growth, _ in seen] == [None, config.growth, None]
     assert seen[2][2].shape == seen[0][2].shape  # on as many control points as the trained one
     assert not torch.equal(seen[0][2], seen[2][2])
+    assert result.origin == "growth"
     kept = np.moveaxis(seen[1][0].control.numpy(), 0, -1)
     assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
     assert (result.history["stage"] == "cube").sum() == STEPS[2]  # trained once

@@ -40,6 +40,11 @@ MEANINGS = {
     "folded": "The map folds: det J is negative somewhere. Do not trust what is solved on it.",
     "undecided": "Neither det J > 0 on the whole cube nor a fold could be proved.",
 }
+ORIGINS = {
+    "network": ("the network", "trained on the surface"),
+    "growth": ("a growing cube", "the surface laid on its faces without the network"),
+    "extension": ("the surface's layout on a cube", "extended into the solid without the network"),
+}
 
 
 def write(folder: Path, report: Report, scene: Scene | None) -> None:
@@ -150,6 +155,8 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
         facts.append(("Unknowns", f"{finest['dofs']:,}", f"{finest['iterations']} iterations"))
     points = " × ".join(map(str, quality["control_points"]))
     facts.append(("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"]))))
+    if "origin" in quality:
+        facts.append(("The map comes from", *ORIGINS[quality["origin"]]))
     if told := quality.get("refinement"):
         facts.append(("Control points chosen", told["stopped"], reports.control_points_in_words(report)))
     return facts

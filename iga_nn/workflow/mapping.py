@@ -193,6 +193,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
         device=result.device,
         versions=reports.versions(),
         parameterization=result.quality.as_dict()
+        | {"origin": result.origin}
         | ({"refinement": result.refinement.as_dict()} if result.refinement else {})
         | advice.unproved(result.volume, result.certificate),
     )
