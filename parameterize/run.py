@@ -70,8 +70,7 @@ class Parameterization:
     seed : int
     config : Config
     origin : "network", "growth" or "extension"
-        Where the map comes from; a shape that is hard for the network is grown from a cube, or the layout of its
-        surface is extended.
+        Where the map comes from: the trained network, a cube that grew, or an extended layout of the surface.
     refinement : Refinement or None
         With config.refinement, how many control points each direction got, and why no more.
 
@@ -188,17 +187,17 @@ def parameterize(
         proofs = certificate, check_boundary(volume)
         quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, *proofs)
     return Parameterization(
-        volume,
-        boundary,
-        certificate,
-        quality,
-        history.arrays(),
-        seconds,
-        place.type,
-        seed,
-        config,
-        attempt.origin,
-        told,
+        volume=volume,
+        boundary=boundary,
+        certificate=certificate,
+        quality=quality,
+        history=history.arrays(),
+        seconds=seconds,
+        device=place.type,
+        seed=seed,
+        config=config,
+        origin=attempt.origin,
+        refinement=told,
     )
 
 

@@ -72,7 +72,10 @@ def _bends(layout: SphereLayout) -> tuple[Array, Array, Array]:
 
 
 def _hollowness(middles: Array, along: Array, bends: Array, options: LayoutConfig) -> float:
-    """Return the sum of the bends (e,) near the cube's edges, those across them above all; hollow pieces count more."""
+    """Return the sum of the bends (e,) near the cube's edges, weighed by nearness and direction.
+
+    Along a cube edge they are summed piece by piece; what is above zero counts more.
+    """
     radial, rows = project_radially(middles), np.arange(len(middles))
     size = np.abs(radial)
     axis = size.argmin(axis=1)  # of the nearest edge of the cube
