@@ -13,11 +13,11 @@ import torch
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from .arrays import Array, IntArray
+from .arrays import Array
 from .config import GrowthConfig, LayoutConfig, SplineConfig
 from .cube.cube import project_radially, snap
 from .cube.cutting import cut_along_rays, subdivide_finely
-from .cube.sphere import lay_on_sphere
+from .cube.sphere import SphereLayout
 from .cube.turning import turned
 from .cube.tutte import Layout
 from .spline.bspline import greville
@@ -41,16 +41,16 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
 
 
 def surface_on_cube(
-    vertices: Array, faces: IntArray, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
+    sphere: SphereLayout, own: int, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
 ) -> Layout:
-    """Lay a closed surface (n, 3), (m, 3) on the cube without a flipped triangle, its long edges cut.
+    """Lay a closed surface, laid on the sphere, on the cube without a flipped triangle, its long edges cut.
 
-    seed: draws how the cube may be turned; turn: 0 takes the best of these ways, 1 the next, ... Vertices of the mesh
-    stay first.
+    own: how many vertices are the mesh's; these stay first. seed: draws how the cube may be turned; turn: 0 takes the
+    best of these ways, 1 the next, ...
     """
-    sphere = turned(lay_on_sphere(vertices, faces, options), options, np.random.default_rng(seed), turn)
+    sphere = turned(sphere, options, np.random.default_rng(seed), turn)
     columns = np.hstack([sphere.vertices, sphere.directions])
-    columns, faces = subdivide_finely(columns, sphere.faces, len(vertices), spline)
+    columns, faces = subdivide_finely(columns, sphere.faces, own, spline)
     points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])
     cut = cut_along_rays(places, faces, options.path_snap)
     return Layout(cut.carry(points), cut.faces, snap(cut.carry(places)))

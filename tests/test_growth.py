@@ -10,6 +10,7 @@ from small_run import tiny_config
 from parameterize import parameterize
 from parameterize.config import LAYOUT, preset
 from parameterize.cube.flips import flipped
+from parameterize.cube.sphere import lay_on_sphere
 from parameterize.growth import first_cube, growing, surface_on_cube
 from parameterize.optimization.newton import Optimized
 from parameterize.progress import Progress
@@ -26,7 +27,8 @@ def bent_rod(count=900):
 
 
 def on_cube(surface, spline, seed=0):
-    return surface_on_cube(surface.unit_vertices, surface.faces, spline, LAYOUT, seed=seed, turn=0)
+    sphere = lay_on_sphere(surface.unit_vertices, surface.faces, LAYOUT)
+    return surface_on_cube(sphere, len(surface.vertices), spline, LAYOUT, seed=seed, turn=0)
 
 
 def test_a_bent_rod_lies_on_the_cube_without_a_flip():

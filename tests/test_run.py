@@ -9,7 +9,7 @@ import torch
 from shapes import turned
 from small_run import STEPS, small_surface, tiny_config
 
-from parameterize import run
+from parameterize import attempts
 from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig
@@ -294,7 +294,7 @@ def test_a_seed_of_any_size_is_taken(surface):
 
 def test_a_map_not_certified_is_grown_from_a_cube_then_extended(surface, monkeypatch, tmp_path):
     """Of three attempts the one with fewest unproved spans is kept; the second is grown, the third extended."""
-    optimize, seen = run.optimize_coarse_first, []
+    optimize, seen = attempts.optimize_coarse_first, []
 
     def spoiled(control, fit, config, **options):
         found, fit = optimize(control, fit, config, **options)
@@ -303,7 +303,7 @@ def test_a_map_not_certified_is_grown_from_a_cube_then_extended(surface, monkeyp
         seen.append((found, config.growth, control))
         return found, fit
 
-    monkeypatch.setattr(run, "optimize_coarse_first", spoiled)
+    monkeypatch.setattr(attempts, "optimize_coarse_first", spoiled)
     config = replace(tiny_config(), starts=3)
     result = parameterize(surface, config, seed=3, device="cpu", checkpoint_dir=tmp_path)
     assert [growth for _, growth, _ in seen] == [None, config.growth, None]
@@ -323,7 +323,7 @@ def test_a_map_not_certified_is_grown_from_a_cube_then_extended(surface, monkeyp
 @pytest.mark.parametrize("meets", [[True, False], [False], [True, True]])
 def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monkeypatch, meets):
     """The first start of several that does not meet itself is kept; where all do, the first."""
-    optimize, seen = run.optimize_coarse_first, []
+    optimize, seen = attempts.optimize_coarse_first, []
 
     def certified(control, *args, **options):
         found, fit = optimize(control, *args, **options)
@@ -333,7 +333,7 @@ def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monk
         return seen[-1], fit
 
     answers = iter(meets)
-    monkeypatch.setattr(run, "optimize_coarse_first", certified)
+    monkeypatch.setattr(attempts, "optimize_coarse_first", certified)
     result = parameterize(surface, replace(tiny_config(), starts=2), seed=3, device="cpu")
     assert len(seen) == len(meets)
     kept = np.moveaxis(seen[meets.index(False) if False in meets else 0].control.numpy(), 0, -1)

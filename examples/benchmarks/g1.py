@@ -2,6 +2,7 @@
 
     python examples/benchmarks/g1.py --jobs 2
     python examples/benchmarks/g1.py --models DIR --only bunny duck --out out/g1
+    python examples/benchmarks/g1.py --control-points auto --tolerance 1.5e-4 --out out/g1_auto
 
 Runs the models as `iga-nn batch` does: each has a folder with its report, and the same command skips what is finished
 and goes on from checkpoints. Writes g1.csv (every figure) and g1.md, anew after each model; copy them to results/ when
@@ -178,6 +179,7 @@ def _options(argv: list[str] | None) -> Options:
         seed=given.seed,
         device="cpu",
         control_points=given.control_points,
+        tolerance=given.tolerance,
         steps_factor=given.steps_factor,
         resume=True,
     )
@@ -210,8 +212,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--out", type=Path, default=results, help=f"folder of the results (default: {results})")
     parser.add_argument("--steps-factor", type=float, default=1.0, help="shorten every stage, for a quick look")
-    parser.add_argument("--control-points", type=int, default=30, help="per direction (default: 30)")
+    parser.add_argument("--control-points", type=_count, default=30, help='per direction, or "auto" (default: 30)')
+    tolerance = MapOptions.tolerance
+    parser.add_argument("--tolerance", type=float, default=tolerance, help=f"of auto (default: {tolerance:g})")
     return parser
+
+
+def _count(text: str) -> int | Literal["auto"]:
+    return "auto" if text == "auto" else int(text)
 
 
 # Models

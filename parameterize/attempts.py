@@ -1,0 +1,222 @@
+"""The ways to a map, one after the other: the trained network, a cube that grows, a layout extended into the solid."""
+
+import logging
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import torch
+
+from .arrays import Array, IntArray
+from .checkpoint import Checkpoints
+from .coarse import coarse_knots, optimize_coarse_first
+from .config import Config, SplineConfig
+from .cube.cutting import subdivide_finely
+from .cube.edge_paths import PathError, choose_corners
+from .cube.flips import flipped, untangle
+from .cube.sphere import SphereLayout, lay_on_sphere
+from .cube.tutte import Layout, lay_out
+from .extension import extended, extending
+from .growth import first_cube, growing, surface_on_cube
+from .optimization.least_squares import fit_pairs
+from .optimization.newton import Optimized, one_thread_an_operation
+from .optimization.sliding import SlidingParameters
+from .optimization.surface_distance import SurfaceFit
+from .surface.geometry import vertex_quadrics, vertex_weights
+from .surface.surface import Surface
+from .training.samples import interior_points
+from .training.target_shapes import nearest_on_cube
+from .training.trainer import Trainer, map_points
+
+_log = logging.getLogger(__name__)
+
+Origin = Literal["network", "growth", "extension"]
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What all attempts share: the surface, options, the place, and what is computed of the surface once."""
+
+    surface: Surface
+    config: Config
+    seed: int
+    device: torch.device
+    dtype: torch.dtype
+    given_corners: IntArray | None
+    seconds: dict[str, float]  # which grow as the run goes on
+    report: dict[str, Any]  # history and progress, as Trainer and optimize take them
+
+    @property
+    def own(self) -> int:
+        """Number of the surface's own vertices, which stay the first ones where edges are cut."""
+        return len(self.surface.vertices)
+
+    @cached_property
+    def mesh(self) -> tuple[Array, IntArray]:
+        """Vertices (n, 3) and faces (m, 3) at volume 1, long edges cut."""
+        return subdivide_finely(self.surface.unit_vertices, self.surface.faces, self.own, self.config.spline)
+
+    @cached_property
+    def sphere(self) -> SphereLayout:
+        """The surface at volume 1, laid on the sphere."""
+        return lay_on_sphere(self.surface.unit_vertices, self.surface.faces, self.config.layout)
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """A map, the surface data that belong to it, and where it comes from."""
+
+    found: Optimized
+    fit: SurfaceFit
+    origin: Origin
+
+
+def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
+    """Train a map; where that is hard or not certified, grow and extend others. Return the first without faults.
+
+    Where all have faults, return the best.
+    """
+    starts = task.config.starts if task.given_corners is None else 1
+    best = _trained(task, checkpoints, give_up=starts > 1)
+    for start in range(1, starts):
+        if best is not None and not any(best.found.faults):
+            break
+        grows = start % 2 == 1
+        way = "growing a map from a cube" if grows else "extending the surface's layout into the solid"
+        if best is None:
+            _log.info("the shape is hard for the network: %s instead", way)
+        else:
+            _log.warning("%s; %s instead", _fault(best.found), way)
+        turn = (start - 1) // 2  # a way that comes again begins with another turn of the cube
+        other = (_grown if grows else _extended)(task, turn, checkpoints.of_start(start))
+        if best is None or other.found.rank < best.found.rank:
+            best = other
+    assert best is not None
+    return best
+
+
+def _trained(task: Task, checkpoints: Checkpoints, *, give_up: bool) -> Attempt | None:
+    """Train the network, fit F to it and optimise F. With `give_up`, return None where the shape is hard to train."""
+    with timed(task.seconds, "train"), one_thread_an_operation():
+        trainer = Trainer(
+            *task.mesh,
+            task.config,
+            seed=task.seed,
+            device=task.device,
+            dtype=task.dtype,
+            given_corners=task.given_corners,
+            checkpoints=checkpoints,
+            **task.report,
+        )
+        network = trainer.run(give_up=give_up)
+    if network is None:
+        return None
+    spline = task.config.spline
+    vertices, faces = task.mesh
+    with timed(task.seconds, "fit"), one_thread_an_operation():
+        mapped = map_points(network, vertices, task.device, task.dtype)
+        fit = _surface_fit(_layout(mapped, trainer.corners, task), spline, task)
+        inside = interior_points(vertices, faces, spline.fit_cell)
+        places = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
+        control = _first_spline(inside, places, fit, spline)
+    return _optimized(control, fit, spline, task, checkpoints, "network")
+
+
+def _grown(task: Task, turn: int, checkpoints: Checkpoints) -> Attempt:
+    """Lay the surface on the cube and let F grow from a cube towards it."""
+    config = task.config
+    spline = growing(config.spline, config.growth)
+    with timed(task.seconds, "fit"), one_thread_an_operation():
+        layout = _on_cube(task, turn)
+        fit = _surface_fit(layout, spline, task)
+        control = first_cube(layout, task.own, fit.places.knots, spline.degree)
+    return _optimized(control, fit, spline, task, checkpoints, "growth")
+
+
+def _extended(task: Task, turn: int, checkpoints: Checkpoints) -> Attempt:
+    """Lay the surface on the cube likewise, extend that into the solid, fit F to it and optimise F."""
+    config = task.config
+    spline = extending(config.spline, config.extension)
+    with timed(task.seconds, "fit"), one_thread_an_operation():
+        layout = _on_cube(task, turn)
+        fit = _surface_fit(layout, spline, task)
+        control = _first_spline(*extended(layout, config.extension), fit, spline)
+    return _optimized(control, fit, spline, task, checkpoints, "extension")
+
+
+def _on_cube(task: Task, turn: int) -> Layout:
+    config = task.config
+    return surface_on_cube(task.sphere, task.own, config.spline, config.layout, seed=task.seed, turn=turn)
+
+
+def _optimized(
+    control: torch.Tensor,
+    fit: SurfaceFit,
+    spline: SplineConfig,
+    task: Task,
+    checkpoints: Checkpoints,
+    origin: Origin,
+) -> Attempt:
+    with timed(task.seconds, "optimize"):
+        found, fit = optimize_coarse_first(control, fit, spline, checkpoints=checkpoints, **task.report)
+    return Attempt(found, fit, origin)
+
+
+def _fault(found: Optimized) -> str:
+    return "the boundary meets itself" if found.meets_itself else "not certified"
+
+
+def _surface_fit(layout: Layout, spline: SplineConfig, task: Task) -> SurfaceFit:
+    """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
+    return SurfaceFit(
+        SlidingParameters(coarse_knots(spline), spline.degree, layout.places, layout.faces, task.config.layout),
+        layout.vertices,
+        vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
+        vertex_weights(layout.vertices, layout.faces, task.own),
+        given_corners=None if task.given_corners is None else task.mesh[0][task.given_corners],
+    )
+
+
+def _layout(mapped: Array, corners: IntArray | None, task: Task) -> Layout:
+    """Return nearest points on the cube, untangled; where that leaves flips, patches between traced edges.
+
+    The first stays closer to the network's map, the second always succeeds where the edges can be traced.
+    """
+    vertices, faces = task.mesh
+    nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
+    untangled = untangle(nearest, faces, task.config.layout)
+    if flipped(untangled, faces).mean() > task.config.spline.few_flips:
+        try:
+            chosen = choose_corners(mapped) if corners is None else corners
+            return lay_out(mapped, vertices, faces, chosen, task.config.layout)
+        except PathError as error:
+            _log.warning("the first layout has flipped triangles: %s", error)
+    return Layout(vertices, faces, untangled)
+
+
+def _first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineConfig) -> torch.Tensor:
+    """Fit by least squares to pairs (k, 3) of places and points inside, and the boundary's (section 4.3.2, step 2)."""
+    weights = [
+        np.full(len(inside), (1.0 - spline.boundary_share) / max(len(inside), 1)),
+        np.full(len(fit.points), spline.boundary_share / len(fit.points)),
+    ]
+    return fit_pairs(
+        np.concatenate([places, fit.places.parameters]),
+        np.concatenate([inside, fit.points]),
+        np.concatenate(weights),
+        fit.places.knots,
+        spline.degree,
+        fairness=spline.fit_fairness,
+    )
+
+
+@contextmanager
+def timed(seconds: dict[str, float], name: str) -> Iterator[None]:
+    """Add the wall seconds of what runs inside to seconds[name]."""
+    start = time.perf_counter()
+    yield
+    seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
