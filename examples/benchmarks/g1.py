@@ -6,9 +6,8 @@
 
 Runs the models as `iga-nn batch` does: each has a folder with its report, and the same command skips what is finished
 and goes on from checkpoints. Writes g1.csv (every figure) and g1.md, anew after each model; copy them to results/ when
-they are to be kept. A worker has cores // jobs threads, on the CPU also where there is a GPU. Right before a run it
-measures t_cal, the wall seconds of 1e12 floating-point operations: seconds / t_cal compares between machines. A model
-that cannot be run keeps its row, which says why; the paper's santa4 is not public, its row waits for santa4.obj.
+they are to be kept. A worker has cores // jobs threads, on the CPU also where there is a GPU. A model that cannot be
+run keeps its row, which says why; the paper's santa4 is not public, its row waits for santa4.obj.
 """
 
 from __future__ import annotations
@@ -77,13 +76,13 @@ class Row:
     """What is known of one model, the columns of g1.csv; distances between spline and mesh at the scale it came in.
 
     status: "done", or in one line why figures are missing or not to be trusted.
-    seconds: wall, of the parameterization alone; t_cal: wall seconds of 1e12 operations on the same threads. Both are
-    unknown where the run was interrupted and went on.
+    seconds: wall, of the parameterization alone; unknown where the run was interrupted and went on.
     """
 
     model: str
     status: str = DONE
     verdict: str | None = None
+    control_points: str | None = None
     det_lower_bound: float | None = None
     arap_mean_unit_volume: float | None = None
     arap_max_unit_volume: float | None = None
@@ -100,10 +99,9 @@ class Row:
     seconds_train: float | None = None
     seconds_fit: float | None = None
     seconds_optimize: float | None = None
+    seconds_refine: float | None = None
     seconds_certify: float | None = None
     threads: int | None = None
-    t_cal: float | None = None
-    seconds_in_t_cal: float | None = None
     exact: str | None = None
     l2_relative_refine_0: float | None = None
     l2_relative_refine_1: float | None = None
@@ -257,10 +255,11 @@ def row_of(known: Known) -> Row:
     """All figures of one model, from its folder; why there are none as the status."""
     if known.report is None:
         return Row(known.entry.name, known.line)
-    report, times = known.report, processes.times_of(known)
+    report = known.report
     quality, levels = report["parameterization"], report["poisson"]["levels"]
     found: dict[str, Any] = {
         "verdict": quality["bijective"],
+        "control_points": " x ".join(map(str, quality["control_points"])),
         "det_lower_bound": quality["det_lower_bound"],
         "flipped_triangles": len(BoundaryMap.load(known.entry.folder / "boundary.npz").flipped()),
         "exact": report["poisson"]["exact"],
@@ -277,9 +276,7 @@ def row_of(known: Known) -> Row:
         found[f"iterations_refine_{level}"] = solved["iterations"]
         if not solved["converged"]:
             found["status"] = f"the solver did not converge at refine {level}"
-    if times:
-        found["seconds_in_t_cal"] = times["seconds"] / times["t_cal"]
-    return Row(known.entry.name, **found, **times)
+    return Row(known.entry.name, **found, **processes.times_of(known))
 
 
 # Tables
@@ -311,7 +308,7 @@ def as_markdown(rows: Sequence[Row], options: Options) -> str:
         processes.as_markdown(QUALITY_HEAD, [_quality_cells(row) for row in rows]),
         "Distances between spline and mesh, at the scale the models came in; triangles of the boundary map turned over",
         processes.as_markdown(DISTANCE_HEAD, [_cells(row, DISTANCE_COLUMNS) for row in measured]),
-        "Wall seconds of the parameterization; they differ between machines, and between hours of one",
+        "Control points, and wall seconds of the parameterization, which differ between machines and hours",
         processes.as_markdown(TIME_HEAD, [_cells(row, TIME_COLUMNS) for row in measured]),
         "Poisson's equation; X, Y, Z are x, y, z scaled to volume 1 about the middle of the bounding box",
         processes.as_markdown(SOLVE_HEAD, [_cells(row, SOLVE_COLUMNS) for row in measured]),
@@ -325,7 +322,7 @@ def as_markdown(rows: Sequence[Row], options: Options) -> str:
 Format = Callable[[Any], str]
 QUALITY_HEAD = ("model", "verdict", "det J / mean >=", "ARAP mean", "paper", "ARAP max", "paper", "boundary", "paper")
 DISTANCE_HEAD = ("model", "spline to mesh rms", "max", "mesh to spline rms", "max", "flipped")
-TIME_HEAD = ("model", "seconds", "train", "fit", "optimize", "certify")
+TIME_HEAD = ("model", "control points", "seconds", *processes.STAGES)
 SOLVE_HEAD = (
     "model", "exact solution", "relative L2, refine 0", "refine 1", "L2, refine 0", "refine 1", "iterations, refine 0",
     "refine 1",
@@ -337,9 +334,10 @@ DISTANCE_COLUMNS: dict[str, Format] = {
     "mesh_to_spline_max": "{:.3g}".format,
     "flipped_triangles": str,
 }
-TIME_COLUMNS: dict[str, Format] = dict.fromkeys(
-    ("seconds", *(f"seconds_{s}" for s in ("train", "fit", "optimize", "certify"))), "{:.1f}".format
-)
+TIME_COLUMNS: dict[str, Format] = {
+    "control_points": str,
+    **dict.fromkeys(("seconds", *(f"seconds_{stage}" for stage in processes.STAGES)), "{:.1f}".format),
+}
 SOLVE_COLUMNS: dict[str, Format] = {
     "exact": str,
     "l2_relative_refine_0": "{:.2e}".format,
@@ -400,7 +398,8 @@ def _caveats(rows: Sequence[Row], options: Options) -> list[str]:
     if mapping.steps_factor != 1.0:
         found.append(f"Every stage's steps times {mapping.steps_factor:g}: a quick look, no measurement.")
     if mapping.control_points != 30:
-        found.append(f"{mapping.control_points} control points a direction; the paper has 30.")
+        tolerance = f" with tolerance {mapping.tolerance:g}" if mapping.control_points == "auto" else ""
+        found.append(f"{mapping.control_points} control points a direction{tolerance}; the paper has 30.")
     return found
 
 

@@ -4,17 +4,14 @@
     python examples/benchmarks/poisson.py 27 64 --degrees 2 3 4 5 --threads 1 2 --peers --out results
 
 Every row has a process of its own, whose peak memory it reports. Seconds are those of set-up and solve to a residual
-of 1e-10, compilation and error norms apart: process CPU seconds, and beside them wall seconds. t_cal, measured in the
-same process on the same threads, are the CPU seconds of 1e12 floating-point operations: CPU / t_cal compares between
-machines, idle or busy. Peers solve the same problem on the same map, where their package is installed: MFEM with its
+of 1e-10, compilation and error norms apart: process CPU seconds, and beside them wall seconds; they differ
+between machines. Peers solve the same problem on the same map, where their package is installed: MFEM with its
 assembled matrix, Gauss-Seidel and conjugate gradients. All L2 errors come from rules of degree + 2 points.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import json
 import resource
 import subprocess
@@ -28,9 +25,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from processes import calibrate, processor
+from processes import processor
 
 from iga_nn.report.document import versions
+from iga_nn.report.tables import csv_text
 from parameterize.files import save_text
 from solve import Poisson, Problem, benchmark_volume, solve_problem
 from solve.discretization.errors import error_norms
@@ -44,7 +42,7 @@ PEERS = {MFEM: "mfem"}  # name -> module
 
 @dataclass(frozen=True)
 class Row:
-    """One solve. setup, solve: CPU seconds; wall: of both together; peak_mb: of the process, t_cal not yet taken."""
+    """One solve. setup, solve: CPU seconds; wall: of both together; peak_mb: of the process."""
 
     solver: str
     n: int
@@ -57,31 +55,23 @@ class Row:
     iterations: int
     l2: float
     peak_mb: int
-    t_cal: float
 
     @property
     def seconds_per_mdof(self) -> float:
         """CPU seconds for a million unknowns."""
         return (self.setup + self.solve) / self.dofs * 1e6
 
-    @property
-    def ratio(self) -> float:
-        """CPU seconds over t_cal."""
-        return (self.setup + self.solve) / self.t_cal
-
     def cells(self) -> list[str]:
         """Of the Markdown table."""
         return [
             self.solver,
             f"{self.n} | {self.degree} | {self.threads} | {self.dofs}",
-            f"{self.setup:.2f} | {self.solve:.2f} | {self.wall:.2f} | {self.ratio:.3f}",
+            f"{self.setup:.2f} | {self.solve:.2f} | {self.wall:.2f}",
             f"{self.seconds_per_mdof:.1f} | {self.iterations} | {self.l2:.4e} | {self.peak_mb}",
         ]
 
 
-HEADINGS = (
-    "solver, n, degree, threads, dofs, setup s, solve s, wall s, CPU / t_cal, s per Mdof, iterations, L2, peak MB"
-)
+HEADINGS = "solver, n, degree, threads, dofs, setup s, solve s, wall s, s per Mdof, iterations, L2, peak MB"
 
 
 def run_ours(n: int, degree: int, threads: int) -> dict[str, Any]:
@@ -168,11 +158,7 @@ def measure(solver: str, n: int, degree: int, threads: int) -> Row:
     """A row, in this process."""
     found = RUNNERS[solver](n, degree, threads)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-    calibrate(share=0.01, threads=threads)  # imports torch
-    start = time.process_time()
-    calibrate(threads=threads)
-    t_cal = time.process_time() - start
-    return Row(solver=solver, n=n, degree=degree, threads=threads, peak_mb=peak, t_cal=t_cal, **found)
+    return Row(solver=solver, n=n, degree=degree, threads=threads, peak_mb=peak, **found)
 
 
 def measure_apart(solver: str, n: int, degree: int, threads: int) -> Row:
@@ -188,18 +174,13 @@ def table(rows: Sequence[Row]) -> str:
     lines = [f"| {' | '.join(headings)} |", "|" + " --- |" * len(headings)]
     lines += [f"| {' | '.join(row.cells())} |" for row in rows]
     named = ", ".join(f"{name} {number}" for name, number in versions().items())
-    lowest, highest = min(row.t_cal for row in rows), max(row.t_cal for row in rows)
-    return "\n".join([*lines, "", f"{processor()}; t_cal {lowest:.1f} to {highest:.1f} s; {named}."])
+    return "\n".join([*lines, "", f"{processor()}; {named}."])
 
 
 def save(rows: Sequence[Row], folder: Path) -> None:
     """Write poisson.csv and poisson.md."""
     folder.mkdir(parents=True, exist_ok=True)
-    text = io.StringIO()
-    writer = csv.DictWriter(text, [field.name for field in fields(Row)], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(row) for row in rows)
-    save_text(folder / "poisson.csv", text.getvalue())
+    save_text(folder / "poisson.csv", csv_text([field.name for field in fields(Row)], map(asdict, rows)))
     save_text(
         folder / "poisson.md",
         f"# The solver on the twisted cube\n\n{(__doc__ or '').split(chr(10) * 2)[2].strip()}\n\n{table(rows)}\n",

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import platform
 import sys
-import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -20,10 +18,11 @@ from iga_nn.batch.task import Ended, Task, compute
 from iga_nn.errors import InputError
 from iga_nn.workflow.output_folder import has_checkpoint
 from parameterize.files import save_text
+from parameterize.threads import default_threads
 
 BAD_INPUT, INTERRUPTED = 2, 130
-CALIBRATION = "calibration.json"  # in the folder of a surface
-STAGES = ("train", "fit", "optimize", "certify")
+THREADS = "threads.txt"  # in the folder of a surface whose seconds were measured
+STAGES = ("train", "fit", "optimize", "refine", "certify")
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -43,26 +42,21 @@ def cores() -> int:
 
 
 def compute_measured(task: Task, number: int, batch: str) -> Ended:
-    """Compute a surface right after measuring t_cal; what goes on from a checkpoint has no time of its own."""
-    share, resumed = min(1.0, task.mapping.steps_factor), has_checkpoint(task.folder)
-    t_cal, threads = calibrate(share)
+    """Compute a surface and keep its number of threads; what goes on from a checkpoint has no time of its own."""
+    resumed = has_checkpoint(task.folder)
     ended = compute(task, number, batch)
-    if ended.report is not None:
-        known = {"t_cal": t_cal, "threads": threads, "resumed": resumed}
-        save_text(task.folder / CALIBRATION, json.dumps(known) + "\n")
+    if ended.report is not None and not resumed:
+        save_text(task.folder / THREADS, f"{default_threads()}\n")
     return ended
 
 
 def times_of(row: Row) -> dict[str, Any]:
-    """Seconds of the parameterization, in all and by stage, t_cal and threads; empty where they were not measured."""
-    file = row.entry.folder / CALIBRATION
+    """Seconds of the parameterization, in all and by stage, and threads; empty where they were not measured."""
+    file = row.entry.folder / THREADS
     if row.report is None or not file.is_file():
         return {}
-    known = json.loads(file.read_text(encoding="utf-8"))
-    if known.pop("resumed"):
-        return {}
-    seconds = {f"seconds_{stage}": row.report["seconds"][stage] for stage in STAGES}
-    return known | seconds | {"seconds": sum(seconds.values())}
+    seconds = {f"seconds_{stage}": row.report["seconds"].get(stage, 0.0) for stage in STAGES}
+    return seconds | {"seconds": sum(seconds.values()), "threads": int(file.read_text(encoding="utf-8"))}
 
 
 def run(
@@ -105,27 +99,6 @@ def as_markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table in Markdown."""
     lines = [head, ["---"] * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def calibrate(share: float = 1.0, threads: int | None = None) -> tuple[float, int]:
-    """Return t_cal, the wall seconds of 1e12 operations in float32 products (8192, 512) @ (512, 512), and the threads.
-
-    share: the part of these operations that is measured, for quick looks. threads: as many as torch takes by default.
-    """
-    import torch
-
-    usual = torch.get_num_threads()
-    torch.set_num_threads(threads or usual)
-    left, right = torch.ones(8192, 512), torch.full((512, 512), 1.0 / 512.0)
-    operations = 2 * 8192 * 512 * 512  # of one product
-    repeats = max(1, round(share * 1e12 / operations))
-    product = left @ right  # starts the threads
-    start = time.perf_counter()
-    for _ in range(repeats):
-        torch.mm(left, right, out=product)
-    seconds = time.perf_counter() - start
-    torch.set_num_threads(usual)
-    return seconds * 1e12 / (repeats * operations), threads or usual
 
 
 def processor() -> str:
