@@ -98,8 +98,10 @@ def device_preconditioner(preconditioner: FastDiagonalization, device: str) -> F
 
 
 class _OnDevice(FastDiagonalization):
-    def _along_u(self, u: Any, x: Any) -> Any:
-        return torch.tensordot(u, x, 1)
+    def _along_u(self, u: Any, x: Any, after: Any = None) -> Any:
+        result = torch.tensordot(u, x, 1)
+        return result if after is None else after * result
 
-    def _across(self, v: Any, w: Any, x: Any) -> Any:
-        return (v @ x) @ w.T
+    def _across(self, v: Any, w: Any, x: Any, before: Any = None, after: Any = None) -> Any:
+        result = (v @ (x if before is None else before * x)) @ w.T
+        return result if after is None else after * result

@@ -50,13 +50,11 @@ class FastDiagonalization:
         shape, residual = residual.shape, residual.reshape(self.scaling.shape)
         if self.singular:
             residual = residual - self._mean(residual)
-        spectral = self._to_columns(u.T, v.T, w.T, self.scaling * residual)
-        spectral *= self.inverse
-        result = self._to_rows(u, v, w, spectral)
-        result *= self.scaling
+        spectral = self._to_columns(u.T, v.T, w.T, residual, self.scaling, self.inverse)
+        result = self._to_rows(u, v, w, spectral, self.scaling)
         if self.local is not None:
             u, v, w = self.local.inverses
-            nodes = self.space.to_rows(self._to_columns(u.T, v.T, w.T, residual.copy()))
+            nodes = self.space.to_rows(self._to_columns(u.T, v.T, w.T, residual))
             result += self._to_rows(u, v, w, self.space.to_columns(self.local(nodes)))
         if self.singular:
             result -= self._mean(result)
@@ -66,35 +64,47 @@ class FastDiagonalization:
         """Return the mean over the free coefficients of all processes."""
         return self.space.total(x.sum()) / len(self.vectors[0]) / math.prod(x.shape[1:])
 
-    def _to_columns(self, u: Array, v: Array, w: Array, x: Array) -> Array:
-        """Apply three small matrices along the three axes of own rows x, which are overwritten; return columns."""
-        return self._along_u(u, self.space.to_columns(self._across(v, w, x)))
+    def _to_columns(
+        self, u: Array, v: Array, w: Array, x: Array, before: Array | None = None, after: Array | None = None
+    ) -> Array:
+        """Apply three small matrices along the three axes of own rows x, and return columns.
 
-    def _to_rows(self, u: Array, v: Array, w: Array, x: Array) -> Array:
-        """Apply three small matrices along the three axes of columns x, and return own rows."""
-        return self._across(v, w, self.space.to_rows(self._along_u(u, x)))
+        before, after: diagonals that are applied first, in rows, and last, in columns.
+        """
+        return self._along_u(u, self.space.to_columns(self._across(v, w, x, before=before)), after)
 
-    def _along_u(self, u: Array, x: Array) -> Array:
-        """Apply a matrix along the first axis."""
-        columns, result = x.reshape(len(x), -1), np.empty_like(x)
-        rows = result.reshape(columns.shape)
+    def _to_rows(self, u: Array, v: Array, w: Array, x: Array, after: Array | None = None) -> Array:
+        """Apply three small matrices along the three axes of columns x, then a diagonal, and return own rows."""
+        return self._across(v, w, self.space.to_rows(self._along_u(u, x)), after=after)
+
+    def _along_u(self, u: Array, x: Array, after: Array | None = None) -> Array:
+        """Return x, a matrix applied along the first axis, then a diagonal."""
+        result = np.empty_like(x)
+        columns, rows = x.reshape(len(x), -1), result.reshape(len(x), -1)
+        factors = None if after is None else after.reshape(len(x), -1)
 
         def multiply(start: int) -> None:
             piece = slice(start, start + COLUMNS)
             np.matmul(u, columns[:, piece], out=rows[:, piece])
+            if factors is not None:
+                rows[:, piece] *= factors[:, piece]
 
         in_parallel(multiply, range(0, rows.shape[1], COLUMNS), self.threads)
         return result
 
-    def _across(self, v: Array, w: Array, x: Array) -> Array:
-        """Apply two matrices along the other axes of x, which is overwritten."""
+    def _across(self, v: Array, w: Array, x: Array, before: Array | None = None, after: Array | None = None) -> Array:
+        """Return x, a diagonal applied, two matrices along the other axes, and another diagonal."""
+        result = np.empty_like(x)
 
         def multiply(start: int) -> None:
             for i in range(start, min(start + LAYERS, len(x))):
-                np.matmul(v @ x[i], w.T, out=x[i])
+                layer = x[i] if before is None else before[i] * x[i]
+                np.matmul(v @ layer, w.T, out=result[i])
+                if after is not None:
+                    result[i] *= after[i]
 
         in_parallel(multiply, range(0, len(x), LAYERS), self.threads)
-        return x
+        return result
 
 
 def fast_diagonalization(
