@@ -66,6 +66,14 @@ def test_a_higher_number_gives_another_turn_that_is_no_better():
     assert costs[0] < costs[1] <= costs[2]
 
 
+def test_where_the_best_rotations_lead_to_one_turn_others_follow():
+    """All rotations that are turned further find the edges of a rounded cube."""
+    layout = laid(*rounded_cube(2000, 30.0))
+    first, second = (turned(layout, LAYOUT, np.random.default_rng(0), number).directions for number in range(2))
+    away = Rotation.align_vectors(first, second)[0]
+    assert _angle_between(away, Rotation.identity()) > LAYOUT.other_turn
+
+
 def test_a_quarter_turn_of_the_cube_is_no_other_turn():
     quarter, some = Rotation.from_euler("z", 90.0, degrees=True), Rotation.from_rotvec([0.3, -0.2, 0.1])
     assert _angle_between(quarter * some, some) == pytest.approx(0.0, abs=1e-12)

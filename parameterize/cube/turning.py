@@ -20,7 +20,7 @@ def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Gen
     """Return the layout, turned so that the cube's edges lie least in hollows: 0 is the best turn, 1 the next, ...
 
     The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
-    nearly are the same count as one. The last one stands for all numbers above.
+    nearly are the same count as one. Where that leaves too few, the next best rotations that differ from all follow.
     """
     middles, along, bends = _bends(layout)
     simplex = options.turn_size * np.vstack([np.zeros(3), np.eye(3)])
@@ -37,14 +37,25 @@ def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Gen
         return cost_after(least), Rotation.from_rotvec(least) * rotation
 
     rotations = list(Rotation.random(options.turns, rng=generator))
-    costs = in_parallel(cost, rotations)
-    finals = [rotations[i] for i in np.argsort(costs)[: options.finals]]
+    order = np.argsort(in_parallel(cost, rotations))
+    found = in_parallel(turned_further, [rotations[i] for i in order[: options.finals]])
     turns = list[Rotation]()
-    for _, rotation in sorted(in_parallel(turned_further, finals), key=lambda found: found[0]):
-        if all(_angle_between(rotation, other) > options.other_turn for other in turns):
+    for _, rotation in sorted(found, key=lambda pair: pair[0]):
+        if _is_other(rotation, turns, options):
             turns.append(rotation)
+    for i in order[options.finals :]:
+        if number < len(turns):
+            break
+        if _is_other(rotations[i], turns, options):
+            _, rotation = turned_further(rotations[i])
+            if _is_other(rotation, turns, options):
+                turns.append(rotation)
     best = turns[min(number, len(turns) - 1)].as_matrix()
     return SphereLayout(layout.vertices, layout.faces, layout.directions @ best.T)
+
+
+def _is_other(rotation: Rotation, turns: list[Rotation], options: LayoutConfig) -> bool:
+    return all(_angle_between(rotation, turn) > options.other_turn for turn in turns)
 
 
 def _angle_between(first: Rotation, second: Rotation) -> float:
