@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
-from parameterize.surface.surface import MAX_FACES, MeshError, Surface, load_surface
+from parameterize.surface.surface import MAX_FACES, MeshError, Surface, load_surface, surface_from_arrays
 
 from .errors import InputError
 from .new_file import check_new, save_new
-from .samples import SAMPLES, obj_text, sample
+from .samples import SAMPLES, obj_text
 
 DATA_FOLDER = "IGA_NN_DATA"
 SET = "g1"  # names a set of models
@@ -54,7 +54,7 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
     if Path(name).is_file():
         return load_surface(name, component=component, max_faces=max_faces)
     if name in SAMPLES:  # before folders: the results of a sample are in a folder of its name
-        return _accepted_sample(name, component, max_faces)
+        return surface_from_arrays(*SAMPLES[name](), name, component=component, max_faces=max_faces)
     if found := _in_data_folder(name):
         return load_surface(found, component=component, max_faces=max_faces)
     known = Path(name).name.split(".")[0]
@@ -65,17 +65,6 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
     if Path(name).suffix:
         raise MeshError(f"{name}: no such file: check the name and the folder")
     raise MeshError(f"{name}: no such file and no sample; the samples are {', '.join(SAMPLES)}")
-
-
-def _accepted_sample(name: str, component: int | None, max_faces: int) -> Surface:
-    surface = sample(name)
-    if component not in (None, 0):
-        raise MeshError(f"{name}: no component {component}: a sample is one piece; leave --component out")
-    if len(surface.faces) > max_faces:
-        raise MeshError(
-            f"{name}: {len(surface.faces)} faces, more than {max_faces}: raise --max-faces, or add --decimate"
-        )
-    return surface
 
 
 def fetch_all(name: str, out: str | Path | None = None, *, force: bool = False) -> Iterator[Path]:

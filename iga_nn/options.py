@@ -24,7 +24,6 @@ Equation: TypeAlias = "Poisson | Elasticity | Problem"
 Formula = str  # one that starts with a minus is written --option=-x
 
 MAX_CONTROL_POINTS = 100  # per direction
-MAX_STEPS_FACTOR = 100.0
 MAX_REFINE = 6
 MAX_DEGREE = 8
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
@@ -95,8 +94,6 @@ class MapOptions(SurfaceOptions):
         self._check_kinds()
         if self.seed < 0:
             raise InputError(f"seed {self.seed}: must not be negative")
-        if not 0.0 < self.steps_factor <= MAX_STEPS_FACTOR:
-            raise InputError(f"steps factor {self.steps_factor}: must be positive, at most {MAX_STEPS_FACTOR:g}")
         with input_errors():
             config = preset(self.preset).scaled(self.steps_factor)
             if self.control_points == "auto":

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Knots = tuple[Array, Array, Array]  # the knot vectors of u, v, w
 
 
 def in_brackets(point: Iterable[float]) -> str:

@@ -1,9 +1,6 @@
 """The ways to a map, one after the other: the trained network, a cube that grows, a layout extended into the solid."""
 
 import logging
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -26,6 +23,7 @@ from .optimization.least_squares import fit_pairs
 from .optimization.newton import Optimized, one_thread_an_operation
 from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
+from .progress import timed
 from .surface.geometry import vertex_quadrics, vertex_weights
 from .surface.surface import Surface
 from .training.samples import interior_points
@@ -92,7 +90,7 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
         else:
             _log.warning("%s; %s instead", _fault(best.found), way)
         turn = (start - 1) // 2  # a way that comes again begins with another turn of the cube
-        other = (_grown if grows else _extended)(task, turn, checkpoints.of_start(start))
+        other = (_grown if grows else _extended)(task, turn, checkpoints.of_part(start))
         if best is None or other.found.rank < best.found.rank:
             best = other
     assert best is not None
@@ -212,11 +210,3 @@ def _first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineC
         spline.degree,
         fairness=spline.fit_fairness,
     )
-
-
-@contextmanager
-def timed(seconds: dict[str, float], name: str) -> Iterator[None]:
-    """Add the wall seconds of what runs inside to seconds[name]."""
-    start = time.perf_counter()
-    yield
-    seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start

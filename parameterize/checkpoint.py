@@ -40,22 +40,10 @@ class Checkpoints:
             for path in [path for name in NAMES for path in folder.glob(f"{name}*.safetensors")]:
                 path.unlink()
 
-    def of_start(self, start: int) -> "Checkpoints":
-        """Return the checkpoints of another start of the run, in files of their own; the first start is number 0."""
+    def of_part(self, name: str | int) -> "Checkpoints":
+        """Return the checkpoints of another part of the run, in files of their own."""
         other = copy(self)
-        other._suffix = f"-{start}" if start else ""
-        return other
-
-    def of_coarse_rounds(self) -> "Checkpoints":
-        """Return the checkpoints of the first rounds, on few control points, in files of their own."""
-        other = copy(self)
-        other._suffix += "-coarse"
-        return other
-
-    def of_refinement(self, number: int) -> "Checkpoints":
-        """Return the checkpoints of the spline stage after so many refinements, in files of their own."""
-        other = copy(self)
-        other._suffix += f"-refined{number}"
+        other._suffix += f"-{name}"
         return other
 
     def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:

@@ -1,7 +1,7 @@
 """The spline stage on two sets of knots: its first rounds on few control points, the others on all.
 
-The first rounds move the map far, and need no fine spline for that; with a third of the spans a direction such a round
-takes about a quarter of the time. The map so found is then interpolated on the fine knots.
+The first rounds move the map far, and need no fine spline for that; on fewer spans they take a fraction of the time.
+The map so found is then interpolated on the fine knots.
 """
 
 import math
@@ -12,9 +12,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from .arrays import Knots
 from .checkpoint import Checkpoints
 from .config import SplineConfig
-from .optimization.energy import Knots
 from .optimization.newton import Optimized, optimize
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback
@@ -50,7 +50,7 @@ def optimize_coarse_first(
     usual = config.usual_steps[:begun]
     usual += tuple(math.ceil(longer * steps) for steps in config.usual_steps[begun:])
     first = replace(config, rounds=begun, usual_steps=usual)
-    found = optimize(control, knots, fit, first, checkpoints=checkpoints.of_coarse_rounds(), **report)
+    found = optimize(control, knots, fit, first, checkpoints=checkpoints.of_part("coarse"), **report)
     control, fit = interpolated(found.control, knots, fine, config.degree), fit.on_knots(fine)
     return optimize(control, fine, fit, config, checkpoints=checkpoints, begun=begun, **report), fit
 

@@ -223,6 +223,8 @@ class Config:
     layout : LayoutConfig
     growth : GrowthConfig
     extension : ExtensionConfig
+    refinement : RefinementConfig or None
+        Where knots are inserted after the spline stage; None: the control points of `spline` are all there are.
     starts : int
         The tries in all: where a shape is hard to train, or the trained map is not certified, others follow, which
         are grown and extended by turns.
@@ -242,8 +244,8 @@ class Config:
     layout: LayoutConfig = LAYOUT
     growth: GrowthConfig = GrowthConfig()
     extension: ExtensionConfig = ExtensionConfig()
-    starts: int = 4  # the training, then maps grown from a cube and extended by turns, as long as none is certified
-    refinement: RefinementConfig | None = None  # the control points of `spline` are all there are where it is None
+    starts: int = 4
+    refinement: RefinementConfig | None = None
 
     def scaled(self, factor: float) -> Config:
         """Return the same options with `factor` (at most 100) times as many steps in every stage, at least one each.

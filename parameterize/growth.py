@@ -13,7 +13,7 @@ import torch
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
-from .arrays import Array
+from .arrays import Knots
 from .config import GrowthConfig, LayoutConfig, SplineConfig
 from .cube.cube import project_radially, snap
 from .cube.cutting import cut_along_rays, subdivide_finely
@@ -56,7 +56,7 @@ def surface_on_cube(
     return Layout(cut.carry(points), cut.faces, snap(cut.carry(places)))
 
 
-def first_cube(layout: Layout, own: int, knots: tuple[Array, Array, Array], degree: int) -> Tensor:
+def first_cube(layout: Layout, own: int, knots: Knots, degree: int) -> Tensor:
     """Return control points (3, n_u, n_v, n_w) of the unit cube, turned so that it faces the surface as laid out."""
     weights = vertex_weights(layout.vertices, layout.faces, own)
     rotation, _ = Rotation.align_vectors(layout.vertices - 0.5, layout.places - 0.5, weights)

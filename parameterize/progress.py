@@ -1,7 +1,9 @@
-"""What a long run reports: Progress to its caller after each step, History of all steps, as history.npz holds them."""
+"""What a long run reports: Progress to its caller, History of all steps, as history.npz holds them, and its seconds."""
 
 import math
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -53,3 +55,11 @@ class History:
         for name in sorted({name for row in self.rows for name in row[4]}):
             columns[name] = np.array([row[4].get(name, math.nan) for row in self.rows])
         return columns
+
+
+@contextmanager
+def timed(seconds: dict[str, float], name: str) -> Iterator[None]:
+    """Add the wall seconds of what runs inside to seconds[name]."""
+    start = time.perf_counter()
+    yield
+    seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start

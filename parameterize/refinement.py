@@ -5,14 +5,14 @@ What it finds is kept where no less is proved of it; else the map before is the 
 """
 
 import logging
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any, Literal
 
 import numpy as np
 import torch
 
-from .arrays import Array, IntArray
+from .arrays import Array, IntArray, Knots
 from .certificate.determinant import DeterminantForm
 from .checkpoint import Checkpoints
 from .config import RefinementConfig, SplineConfig
@@ -21,7 +21,7 @@ from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback
 from .quality.distances import Distances
 from .quality.quality import arap_grid
-from .spline.knot_choice import Knots, halved_where_most, totals_along
+from .spline.knot_choice import halved_where_most, totals_along
 from .spline.volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
@@ -61,10 +61,6 @@ class Refinement:
     levels: tuple[Level, ...]
     dropped: Level | None
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the entry `refinement` of report.json."""
-        return asdict(self)
-
 
 def refine(
     found: Optimized,
@@ -90,7 +86,7 @@ def refine(
         _log.info("%s", levels[-1])
         if not any(found.faults) and levels[-1].boundary <= refinement.tolerance:
             break
-        kept = checkpoints.of_refinement(number)
+        kept = checkpoints.of_part(f"refined{number}")
         finer = _chosen_knots(spots, config, refinement, kept)
         if _counts(finer, config) == levels[-1].control_points:
             stopped = "limit reached"

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray
-from .attempts import Origin, Task, best_attempt, timed
+from .attempts import Origin, Task, best_attempt
 from .certificate.boundary import check_boundary
 from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
@@ -19,7 +19,7 @@ from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
 from .optimization.newton import Optimized
 from .optimization.surface_distance import SurfaceFit
-from .progress import History, ProgressCallback, ignore
+from .progress import History, ProgressCallback, ignore, timed
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
 from .spline.volume import BSplineVolume

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, Knots
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
@@ -67,7 +67,7 @@ class SplineField:
     """
 
     degrees: tuple[int, int, int]
-    knots: tuple[Array, Array, Array]
+    knots: Knots
     coefficients: Array
     geometry: BSplineVolume | None = None
 

@@ -17,8 +17,7 @@ from .diagnostics import ConvergenceError, judge, solve_notices
 from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_estimate, error_norms, missing_mean
 from .discretization.operator import Assembled, FormOperator, Operator, assemble, free_window
-from .discretization.planes import is_rough
-from .discretization.quadrature import operator_rule
+from .discretization.planes import rule_of
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .field import Points, SplineField
 from .forms.form import Form, check_law
@@ -304,13 +303,12 @@ def assemble_data(
     if isinstance(problem, Problem):
         samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
         couples = check_law(form, Points.of(samples, (SAMPLES, SAMPLES, SAMPLES)))
-    rough = quadrature == "spline" and is_rough(volume, space.whole, form.tensor)
     assembled = assemble(
         volume,
         space,
         form,
         problem.source_at,
-        operator_rule(space, quadrature, rough),
+        rule_of(volume, space, form.tensor, quadrature),
         window=free_window(space.whole, problem.dirichlet),
         component=0 if form.components == 1 and form.symmetric and not couples else None,
         threads=threads,

@@ -107,16 +107,16 @@ def test_a_broken_file_is_refused(tmp_path):
 
 def test_every_start_has_checkpoints_of_its_own(tmp_path):
     first = Checkpoints(tmp_path, IDENTITY, resume=True)
-    second = first.of_start(1)
+    second = first.of_part(1)
     first.save("spline", {"x": torch.zeros(1)}, {"number": 1})
     assert second.load("spline") is None
     second.save("spline", {"x": torch.ones(1)}, {"number": 2})
-    assert [c.load("spline")[1]["number"] for c in (first, second, first.of_start(0))] == [1, 2, 1]
+    assert [c.load("spline")[1]["number"] for c in (first, second)] == [1, 2]
 
 
 def test_a_fresh_run_removes_its_old_checkpoints_and_nothing_else(tmp_path):
-    for start in range(2):
-        Checkpoints(tmp_path, IDENTITY, resume=False).of_start(start).save("spline", {"x": torch.zeros(1)}, {})
+    for part in ("1", "coarse"):
+        Checkpoints(tmp_path, IDENTITY, resume=False).of_part(part).save("spline", {"x": torch.zeros(1)}, {})
     (tmp_path / "weights.safetensors").write_bytes(b"somebody's")
     Checkpoints(tmp_path, IDENTITY, resume=False)
     assert [p.name for p in tmp_path.iterdir()] == ["weights.safetensors"]

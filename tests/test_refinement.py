@@ -1,3 +1,5 @@
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 import torch
@@ -95,7 +97,7 @@ def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypa
     assert told.stopped == "no better map" and len(told.levels) == 1
     assert told.dropped.unproved > 0 and max(told.dropped.control_points) > 6
     assert "the one before is kept" in caplog.text
-    assert told.as_dict()["dropped"]["unproved"] == told.dropped.unproved
+    assert asdict(told)["dropped"]["unproved"] == told.dropped.unproved
 
 
 def test_spans_that_are_not_proved_are_halved_first(first, monkeypatch):

@@ -5,15 +5,14 @@ from __future__ import annotations
 import logging
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import expected_errors, one_line
 from ..options import MapOptions, ProblemOptions
-from ..workflow import LOGGERS, pipeline
+from ..workflow import logged, pipeline
 
 if TYPE_CHECKING:
     from parameterize.progress import Progress
@@ -59,7 +58,7 @@ def compute(task: Task, number: int, batch: str) -> Ended:
     error is printed here, since only this process knows it.
     """
     teller = _Teller(task, number, batch)
-    with _silent():
+    with logged(logging.NullHandler()):  # warnings are in the report: a surface has one line on the terminal
         try:
             return Ended("done", report=_run(task, teller.step))
         except KeyboardInterrupt:
@@ -71,22 +70,6 @@ def compute(task: Task, number: int, batch: str) -> Ended:
                 return Ended("failed", f"out of memory: {LESS_MEMORY}")
             traceback.print_exc()
             return Ended("failed", f"internal error, please report it: {type(error).__name__}: {one_line(error)}")
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Keep the log of a run, whose warnings are in its report, off the terminal: a surface has one line there."""
-    handler, loggers = logging.NullHandler(), [logging.getLogger(name) for name in LOGGERS]
-    before = [logger.propagate for logger in loggers]
-    for logger in loggers:
-        logger.addHandler(handler)
-        logger.propagate = False
-    try:
-        yield
-    finally:
-        for logger, propagate in zip(loggers, before, strict=True):
-            logger.removeHandler(handler)
-            logger.propagate = propagate
 
 
 def _run(task: Task, progress: Any) -> Report:

@@ -15,7 +15,7 @@ from rich.progress import Progress as Bar
 from rich.table import Column
 from rich.text import Text
 
-from ..workflow import LOGGERS
+from ..workflow import logged
 
 if TYPE_CHECKING:
     from parameterize.progress import Progress, ProgressCallback
@@ -155,17 +155,5 @@ def _bar(console: Console, *columns: ProgressColumn) -> Bar:
 def _shown_log(quiet: bool) -> Iterator[Console]:
     """Show the log of the packages on stderr while the block runs; only warnings where `quiet`."""
     console = Console(file=sys.stderr, highlight=False)
-    handler = _ConsoleHandler(console)
-    loggers = [logging.getLogger(name) for name in LOGGERS]
-    before = [(logger.level, logger.propagate) for logger in loggers]
-    for logger in loggers:
-        logger.addHandler(handler)
-        logger.setLevel(logging.WARNING if quiet else logging.INFO)
-        logger.propagate = False
-    try:
+    with logged(_ConsoleHandler(console), logging.WARNING if quiet else logging.INFO):
         yield console
-    finally:
-        for logger, (level, propagate) in zip(loggers, before, strict=True):
-            logger.removeHandler(handler)
-            logger.setLevel(level)
-            logger.propagate = propagate

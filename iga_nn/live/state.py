@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from parameterize.arrays import Array
+from parameterize.cube.cube import nearest_faces
 from parameterize.surface.surface import Surface
 
 from ..figures.evaluate import FACE_COLORS
@@ -102,11 +103,8 @@ def colors(points: Array, surface: Surface, *, mapped: bool) -> dict[str, str]:
     """Return red, green and blue (m, 3) of the triangles: of the cube's face each is nearest to; grey if not mapped."""
     if not mapped:
         return _packed(np.full(surface.faces.shape, GREY, dtype=np.uint8))
-    away = points[surface.faces].mean(axis=1) - 0.5  # (m, 3), from the cube's centre
-    axis = np.abs(away).argmax(axis=1)
-    side = np.take_along_axis(away, axis[:, None], axis=1)[:, 0] > 0.0
     palette = np.array([[int(color[at : at + 2], 16) for at in (1, 3, 5)] for color in FACE_COLORS], dtype=np.uint8)
-    return _packed(palette[2 * axis + side])  # (m, 3)
+    return _packed(palette[nearest_faces(points[surface.faces].mean(axis=1))])  # (m, 3)
 
 
 def _packed(values: NDArray[Any]) -> dict[str, str]:

@@ -23,7 +23,7 @@ from parameterize.progress import Progress
 
 from ..errors import expected_errors, one_line
 from ..options import MapOptions, PoissonOptions
-from ..workflow import LOGGERS, pipeline
+from ..workflow import logged, pipeline
 
 INTERVAL = 0.4  # seconds, at least, between two steps that are reported
 SHARE = 0.05  # of the job's time, at most, that reporting takes
@@ -100,15 +100,12 @@ def _work(
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C in the terminal
     os.chdir(folder)
     teller = _Teller(sender, halt)
-    for logger in map(logging.getLogger, LOGGERS):
-        logger.addHandler(teller)
-        logger.setLevel(logging.INFO)
-        logger.propagate = False
     try:
-        if mapping is None:
-            pipeline.solve_to(name, problem=poisson, force=True)  # over what a stopped solve left
-        else:
-            pipeline.run("poisson", name, mapping=mapping, poisson=poisson, progress=teller.step)
+        with logged(teller, logging.INFO):
+            if mapping is None:
+                pipeline.solve_to(name, problem=poisson, force=True)  # over what a stopped solve left
+            else:
+                pipeline.run("poisson", name, mapping=mapping, poisson=poisson, progress=teller.step)
     except KeyboardInterrupt:
         sender.send(End("stopped"))
     except expected_errors() as error:

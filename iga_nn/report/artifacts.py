@@ -1,7 +1,7 @@
 """Lists every file of an output folder: what it shows, which part of a run writes it, how a figure is drawn.
 
-The output folder, the report page, the live page and the table of docs/output.md are made from this table. A new figure
-needs a function in `iga_nn.figures` and a row here.
+The output folder, the report page and the live page are made from this table; a test compares that of docs/output.md
+with it. A new figure needs a function in `iga_nn.figures` and a row here.
 """
 
 from __future__ import annotations
@@ -83,12 +83,3 @@ def figures_of(report: Mapping[str, Any]) -> list[Artifact]:
     """Return the figures that belong to the sections a report has."""
     parts = {part for section, part in SECTIONS.items() if section in report}
     return [artifact for artifact in ARTIFACTS if artifact.draw and artifact.part in parts]
-
-
-def as_markdown() -> str:
-    """Return the table of files as docs/output.md shows it."""
-    rows = ["| file | content |", "| --- | --- |"]
-    for artifact in ARTIFACTS:
-        arrays = ": " + ", ".join(f"`{name}`" for name in artifact.arrays) if artifact.arrays else ""
-        rows.append(f"| `{artifact.file}` | {artifact.shows}{arrays} |")
-    return "\n".join(rows)

@@ -194,7 +194,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
         versions=reports.versions(),
         parameterization=result.quality.as_dict()
         | {"origin": result.origin}
-        | ({"refinement": result.refinement.as_dict()} if result.refinement else {})
+        | ({"refinement": asdict(result.refinement)} if result.refinement else {})
         | advice.unproved(result.volume, result.certificate),
     )
     tell(state, options)

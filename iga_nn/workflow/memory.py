@@ -40,13 +40,12 @@ class SolveMemory:
 def solve_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptions) -> SolveMemory:
     """Return the forecast for the finest level."""
     from solve.discretization.errors import POINTS
-    from solve.discretization.planes import is_rough
-    from solve.discretization.quadrature import operator_rule
+    from solve.discretization.planes import rule_of
     from solve.discretization.space import trial_space
 
     form, space = equation.form, trial_space(volume, max(options.refine), options.degree)
-    rough = options.quadrature == "spline" and is_rough(volume, space, equation.on(volume).form.tensor)
-    points = float(np.prod(operator_rule(space, options.quadrature, rough).shape, dtype=float))
+    rule = rule_of(volume, space, equation.on(volume).form.tensor, options.quadrature)
+    points = float(np.prod(rule.shape, dtype=float))
     unknowns = float(form.components * space.dofs)
     kept = CONSTANT * form.constant + BLOCK + form.has_reaction
     (_, *degrees), (_, *functions) = space.degrees, space.shape

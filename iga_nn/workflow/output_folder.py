@@ -7,13 +7,14 @@ import os
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
 from parameterize.files import unfinished
+from parameterize.progress import timed
 
 from ..errors import InputError, one_line
 from ..report import document as reports
@@ -46,12 +47,9 @@ class RunFolder:
     seconds: dict[str, float] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
 
-    @contextmanager
-    def timed(self, step: str) -> Iterator[None]:
-        """Count the block's seconds as those of `step`."""
-        start = time.perf_counter()
-        yield
-        self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
+    def timed(self, step: str) -> AbstractContextManager[None]:
+        """Return a context that counts its seconds as those of `step`."""
+        return timed(self.seconds, step)
 
     def draw(self, part: Part, **known: Any) -> None:
         """Draw the figures of one part of a run.

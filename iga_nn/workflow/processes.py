@@ -33,11 +33,8 @@ def all_processes() -> Any:
 def together(comm: Any) -> Iterator[None]:
     """Let the block fail on all processes or on none; only the first one says why.
 
-    Where it fails on one while others wait for it, that one says why and ends the job. comm: None for a single process.
+    Where it fails on one while others wait for it, that one says why and ends the job.
     """
-    if comm is None:
-        yield
-        return
     if comm.rank > 0:
         logging.disable()
     meeting, fault = comm.Dup(), None

@@ -45,17 +45,11 @@ def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
     """Certify a volume and return the section `parameterization` of report.json."""
     from parameterize.certificate.boundary import check_boundary
     from parameterize.certificate.jacobian import certify
+    from parameterize.quality.quality import proved
 
     certificate = certify(volume)
-    return {
-        "control_points": list(volume.shape),
-        "degrees": list(volume.degrees),
-        "bijective": certificate.verdict,
-        **check_boundary(volume).as_dict(),
-        "det_lower_bound": certificate.lower_bound,
-        "witness": certificate.witness,
-        **advice.unproved(volume, certificate),
-    }
+    facts = proved(volume.shape, volume.degrees, certificate, check_boundary(volume))
+    return facts | advice.unproved(volume, certificate)
 
 
 def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, command: str) -> None:

@@ -14,7 +14,7 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Knots
 from ..quality.distances import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_normals
@@ -70,7 +70,7 @@ class ContactPenalty:
 
 
 def contact_penalty(
-    knots: tuple[Array, Array, Array], degree: int, control: Tensor, gap: float, near: IntArray | None = None
+    knots: Knots, degree: int, control: Tensor, gap: float, near: IntArray | None = None
 ) -> ContactPenalty:
     """Return the penalty for the boundary of F at these control points; it is empty where no two sheets are near.
 

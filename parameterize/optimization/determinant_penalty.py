@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from torch import Tensor
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Knots
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
 from ..threads import in_parallel
@@ -72,7 +72,7 @@ class SpanBarrier:
     knots: the same degree p in the three directions; floor in units of det J.
     """
 
-    def __init__(self, knots: tuple[Array, Array, Array], degree: int, floor: float) -> None:
+    def __init__(self, knots: Knots, degree: int, floor: float) -> None:
         self.floor = floor
         self._extractions = [extraction(k, degree) for k in knots]
         self._widths = [np.diff(breakpoints(k)) for k in knots]

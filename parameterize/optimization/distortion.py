@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..arrays import Array
+from ..arrays import Array, Knots
 from ..config import SplineConfig
 from ..threads import in_parallel
 from .operators import PiecewiseOperator
@@ -24,7 +24,7 @@ class DistortionEnergy:
     holds against folds. Gauss quadrature.
     """
 
-    def __init__(self, knots: tuple[Array, Array, Array], config: SplineConfig) -> None:
+    def __init__(self, knots: Knots, config: SplineConfig) -> None:
         self._grid = GaussGrid(knots, (config.degree,) * 3, config.gauss, inner=config.inner_gauss)
         self._config = config
         self._limit = config.arap_limit

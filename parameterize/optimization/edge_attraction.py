@@ -10,7 +10,7 @@ crosses itself beside them.
 import numpy as np
 from torch import Tensor
 
-from ..arrays import Array
+from ..arrays import Array, Knots
 from ..config import SplineConfig
 from ..cube.cube import CORNERS, EDGES
 from ..quality.distances import nearest_on_mesh
@@ -21,7 +21,7 @@ from .surface_distance import SurfaceFit
 _A_SPAN = 2
 
 
-def edge_points(knots: tuple[Array, Array, Array]) -> Array:
+def edge_points(knots: Knots) -> Array:
     """Return the corners of the cube, and the ends and middles of the spans along its edges: (k, 3)."""
     points = []
     for i, j in EDGES:

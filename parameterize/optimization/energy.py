@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..arrays import Array, IntArray
+from ..arrays import IntArray, Knots
 from ..config import GrowthConfig, SplineConfig
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import SpanBarrier
@@ -21,7 +21,6 @@ from .surface_distance import SurfaceFit
 from .tensor_product import FastDiagonalization, bending_operator, grams
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
-Knots = tuple[Array, Array, Array]
 
 
 class SplineEnergy:

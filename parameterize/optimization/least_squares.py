@@ -5,7 +5,7 @@ import torch
 from scipy.sparse import csr_array
 from torch import Tensor
 
-from ..arrays import Array
+from ..arrays import Array, Knots
 from ..spline.bspline import basis_derivatives, sparse_rows, window_numbers
 from .operators import ControlRows, conjugate_gradients, weighted_sum
 from .tensor_product import FastDiagonalization, bending_operator, grams
@@ -15,7 +15,7 @@ def fit_pairs(
     parameters: Array,
     points: Array,
     weights: Array,
-    knots: tuple[Array, Array, Array],
+    knots: Knots,
     degree: int,
     *,
     fairness: float,
@@ -37,7 +37,7 @@ def fit_pairs(
     return control
 
 
-def _collocation_3d(parameters: Array, knots: tuple[Array, Array, Array], degree: int) -> csr_array:
+def _collocation_3d(parameters: Array, knots: Knots, degree: int) -> csr_array:
     """Return rows of tensor-product basis values: (m, n_u n_v n_w)."""
     tables = [basis_derivatives(k, degree, parameters[:, d]) for d, k in enumerate(knots)]
     sizes = [len(k) - degree - 1 for k in knots]

@@ -15,7 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Knots
 from ..certificate.boundary import check_boundary
 from ..certificate.jacobian import Certificate, certify
 from ..checkpoint import Checkpoints
@@ -25,7 +25,7 @@ from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
 from .acceleration import Acceleration
 from .determinant_penalty import edge_spans
-from .energy import Knots, SplineEnergy
+from .energy import SplineEnergy
 from .surface_distance import SurfaceFit
 
 _log = logging.getLogger(__name__)

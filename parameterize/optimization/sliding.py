@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Knots
 from ..config import LAYOUT, LayoutConfig
 from ..cube.cube import axis_and_side, damped_fit, face_number, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
@@ -36,7 +36,7 @@ class SlidingParameters:
 
     def __init__(
         self,
-        knots: tuple[Array, Array, Array],
+        knots: Knots,
         degree: int,
         parameters: Array,
         triangles: IntArray,
@@ -52,7 +52,7 @@ class SlidingParameters:
         for known in ("window", "rows"):
             self.__dict__.pop(known, None)
 
-    def on_knots(self, knots: tuple[Array, Array, Array]) -> "SlidingParameters":
+    def on_knots(self, knots: Knots) -> "SlidingParameters":
         """Return the same parameters for a spline with other knots."""
         other = SlidingParameters(knots, self.degree, self.parameters, self.triangles, self.layout)
         other.place(self.parameters, self.cube_faces)
@@ -195,9 +195,7 @@ def _pieces(points: int) -> list[slice]:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _face_windows(
-    knots: tuple[Array, Array, Array], degree: int, parameters: Array, cube_faces: IntArray
-) -> tuple[IntArray, Array, Array]:
+def _face_windows(knots: Knots, degree: int, parameters: Array, cube_faces: IntArray) -> tuple[IntArray, Array, Array]:
     """Return what a FaceWindow holds, for points (N, 3) on cube faces (N,)."""
     count, width = len(parameters), degree + 1
     sizes, stride = np.empty(3, np.int64), np.ones(3, np.int64)

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..arrays import Array, Mask
+from ..arrays import Array, Knots, Mask
 from ..surface.geometry import vertex_normals
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
@@ -38,7 +38,7 @@ class SurfaceFit:
         self._held = np.zeros(len(points), dtype=bool)
         self.aim(points, quadrics)
 
-    def on_knots(self, knots: tuple[Array, Array, Array]) -> "SurfaceFit":
+    def on_knots(self, knots: Knots) -> "SurfaceFit":
         """Return the same data for a spline with other knots, at the present parameters and weights."""
         places, given = self.places.on_knots(knots), self.given_corners
         other = SurfaceFit(places, self.points, self._quadrics, self._weights, given_corners=given)

@@ -88,14 +88,7 @@ class QualityReport(Shown):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the section in plain Python types, ready for JSON; a bound that is not finite is None."""
-        bound = self.certificate.lower_bound
-        return {
-            "control_points": list(self.control_points),
-            "degrees": list(self.degrees),
-            "bijective": self.certificate.verdict,
-            **self.boundary_check.as_dict(),
-            "det_lower_bound": bound if isfinite(bound) else None,
-            "witness": None if self.certificate.witness is None else list(self.certificate.witness),
+        return proved(self.control_points, self.degrees, self.certificate, self.boundary_check) | {
             "arap": asdict(self.arap),
             "boundary": asdict(self.boundary),
             "surface_distance": {
@@ -128,6 +121,21 @@ class QualityReport(Shown):
             _line("spline to mesh", self.spline_to_mesh),
         ]
         return "\n".join(lines)
+
+
+def proved(
+    shape: tuple[int, int, int], degrees: tuple[int, int, int], certificate: Certificate, check: BoundaryCheck
+) -> dict[str, Any]:
+    """Return what the section says of a volume that was certified, and not measured."""
+    bound = certificate.lower_bound
+    return {
+        "control_points": list(shape),
+        "degrees": list(degrees),
+        "bijective": certificate.verdict,
+        **check.as_dict(),
+        "det_lower_bound": bound if isfinite(bound) else None,
+        "witness": None if certificate.witness is None else list(certificate.witness),
+    }
 
 
 def _line(name: str, measure: BothScales[Any]) -> str:

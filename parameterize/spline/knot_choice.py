@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Knots
 from .bspline import breakpoints, midpoints
-
-Knots = tuple[Array, Array, Array]
 
 
 def totals_along(places: Array, amounts: Array, knots: Knots) -> tuple[Array, Array, Array]:

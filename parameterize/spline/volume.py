@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array
+from ..arrays import Array, Knots
 from ..display import Shown, above
 from ..files import load_arrays, save_arrays
 from .bspline import (
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 AXES = "uvw"
 FACE_NAMES = ("u0", "u1", "v0", "v1", "w0", "w1")
 LARGEST = 1e100  # coordinate: determinants of larger ones leave double precision
-
-Knots = tuple[Array, Array, Array]
 
 
 def checked_knots(degrees: Sequence[int], knots: Sequence[ArrayLike], counts: Sequence[int], what: str) -> Knots:
@@ -100,7 +98,7 @@ class BSplineVolume(Shown):
     """
 
     degrees: tuple[int, int, int]
-    knots: tuple[Array, Array, Array]
+    knots: Knots
     control_points: Array
 
     def __post_init__(self) -> None:

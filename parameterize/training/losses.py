@@ -108,8 +108,3 @@ def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float) 
     direction = step / step.norm(dim=1, keepdim=True).clamp_min(1e-12)
     aim = aim / aim.norm(dim=1, keepdim=True).clamp_min(1e-12)
     return distance(mapped, target) + weight * (direction - aim).square().sum(dim=1).mean()
-
-
-def folded(det: Tensor) -> int:
-    """Return the number of stencils whose Jacobian determinant is not positive."""
-    return int((det <= 0.0).sum())

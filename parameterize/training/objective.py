@@ -77,7 +77,7 @@ class Objective:
             "arap": losses.distortion(jacobian, det, self.config.det_floor * alpha),
             "fair": losses.fairness(nodes, cell),
         }
-        return terms, losses.folded(det)
+        return terms, int((det <= 0.0).sum())
 
     def _surface_terms(
         self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor

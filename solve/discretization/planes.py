@@ -10,7 +10,7 @@ from parameterize.spline.volume import BSplineVolume
 
 from ..field import Points
 from . import kernels
-from .quadrature import GaussRule
+from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace
 
 SAMPLES = 6  # places a direction, each three neighbouring spans
@@ -52,6 +52,11 @@ def geometry_planes(
     for q, fields, x in map_planes(volume, rule, points):
         kernels.plane_rows(fields, rule.plane_weights(q), rows, measure)
         yield q, rows, measure, x
+
+
+def rule_of(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array], quadrature: str) -> GaussRule:
+    """Return the rule of a law's operator on a volume. tensor: as in `is_rough`. quadrature: as in `SpaceOptions`."""
+    return operator_rule(space, quadrature, quadrature == "spline" and is_rough(volume, space.whole, tensor))
 
 
 def is_rough(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array]) -> bool:

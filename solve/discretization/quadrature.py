@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array, hstack
 from scipy.sparse.linalg import splu
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, Knots
 from parameterize.spline.bspline import basis_derivatives, gauss_points, greville, sparse_rows
 
 from .kernels import Tables
@@ -60,7 +60,7 @@ class GaussRule:
         parts = [slice(start, start + step) for start in range(0, len(w), step)]
         return [GaussRule((u, v, w[part]), (weights_u, weights_v, weights_w[part])) for part in parts]
 
-    def tabulate(self, degrees: tuple[int, int, int], knots: tuple[Array, Array, Array]) -> Tables:
+    def tabulate(self, degrees: tuple[int, int, int], knots: Knots) -> Tables:
         """Return tables of any spline basis (the trial space's or the map's) at the points of this rule.
 
         A direction's table is the index (q,) of the first function that is nonzero at each point, the values and first

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, Knots
 from parameterize.spline.bspline import apply_along, breakpoints, insert_knots, insertion_into, midpoints
 from parameterize.spline.volume import BSplineVolume
 
@@ -27,7 +27,7 @@ class TrialSpace:
     """
 
     degrees: tuple[int, int, int]
-    knots: tuple[Array, Array, Array]
+    knots: Knots
 
     @property
     def rank(self) -> int:
@@ -166,9 +166,7 @@ def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = Non
     return TrialSpace(degrees, (rows[0], rows[1], rows[2]))
 
 
-def embedded(
-    coefficients: Array, degrees: tuple[int, int, int], knots: tuple[Array, Array, Array], space: TrialSpace
-) -> Array:
+def embedded(coefficients: Array, degrees: tuple[int, int, int], knots: Knots, space: TrialSpace) -> Array:
     """Return the coefficients in `space` of a spline given in a smaller space of the same degrees; exact.
 
     Of a slab they are those of its rows.
