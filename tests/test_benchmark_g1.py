@@ -143,7 +143,7 @@ def test_bad_arguments_are_one_line(tmp_path, capsys):
     assert "horse: no such model" in error_of(capsys, *here, "--only", "duck", "horse")
     assert "--jobs 0" in error_of(capsys, *here, "--jobs", "0")
     assert "seed -1" in error_of(capsys, *here, "--seed", "-1")
-    assert "steps factor nan" in error_of(capsys, *here, "--steps-factor", "nan")
+    assert "steps factor must be a positive number" in error_of(capsys, *here, "--steps-factor", "nan")
     assert "--preset" in error_of(capsys, *here, "--preset", "slow")
     assert "nowhere: no such folder" in error_of(capsys, "--models", "nowhere")
     (tmp_path / "file").touch()

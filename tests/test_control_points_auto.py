@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 from conftest import formula_parameterization
@@ -31,7 +31,7 @@ TOLD = {
 
 @pytest.mark.parametrize("words", TOLD)
 def test_it_is_said_how_many_and_why(words):
-    section = {"refinement": json.loads(json.dumps(TOLD[words].as_dict()))}
+    section = {"refinement": json.loads(json.dumps(asdict(TOLD[words])))}
     assert reports.control_points_in_words({"parameterization": section}) == words
     assert reports.control_points_in_words({"parameterization": {}}) == ""
 

@@ -41,7 +41,6 @@ def test_identity_costs_nothing():
     assert float(losses.distortion(jacobian, det, 0.05)) == pytest.approx(0.0, abs=1e-12)
     assert float(losses.fairness(points, CELL)) == pytest.approx(0.0, abs=1e-20)
     assert float(losses.bijectivity(det, 0.1)) == 0.0
-    assert losses.folded(det) == 0
 
 
 def test_distortion_of_an_affine_map():
@@ -60,13 +59,12 @@ def test_a_rotation_is_no_distortion_and_a_reflection_is():
         det = determinant(jacobian)
         value = float(losses.distortion(jacobian, det, 0.05))
         assert (value < 1e-12) if sign > 0.0 else (value > 1.0)
-        assert losses.folded(det) == (0 if sign > 0.0 else 7)
+        DROP
 
 
 def test_bijectivity_by_hand():
     det = torch.tensor([0.3, 0.1, 0.0, -0.4])
     assert float(losses.bijectivity(det, 0.1)) == pytest.approx((0.1**2 + 0.5**2) / 4.0)
-    assert losses.folded(det) == 2
 
 
 def test_distortion_gradient():
