@@ -59,7 +59,6 @@ def test_a_rotation_is_no_distortion_and_a_reflection_is():
         det = determinant(jacobian)
         value = float(losses.distortion(jacobian, det, 0.05))
         assert (value < 1e-12) if sign > 0.0 else (value > 1.0)
-        DROP
 
 
 def test_bijectivity_by_hand():
