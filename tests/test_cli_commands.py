@@ -62,6 +62,8 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
         "schema", "command", "input", "config", "estimate", "seed", "device", "versions",
         "parameterization", "poisson", "seconds",
     ]  # fmt: skip
+    described = (Path(iga_nn.__file__).resolve().parents[1] / "docs" / "output.md").read_text(encoding="utf-8")
+    assert all(f"`{field}`" in described for field in [*report, *report["parameterization"]])
     assert report["poisson"]["exact"] == "x*y"
     assert [level["elements"] for level in report["poisson"]["levels"]] == [4**3, 8**3]
     assert set(report["seconds"]) == {"load", "train", "fit", "optimize", "certify", "solve", "report", "total"}
