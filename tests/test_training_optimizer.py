@@ -8,7 +8,7 @@ import torch
 
 from parameterize.config import NetworkConfig, TrainConfig
 from parameterize.training.network import InverseMap
-from parameterize.training.optimizer import TrainingOptimizer
+from parameterize.training.optimizer import Muon, TrainingOptimizer
 
 SMALL = NetworkConfig(width=16, modules=2, frequencies=3)
 
@@ -35,6 +35,22 @@ def test_steps_of_hidden_matrices_have_singular_values_that_are_alike():
     step = torch.linalg.svdvals(network.residual[0].linear.weight.detach() - before)
     assert gradient[0] > 10.0 * gradient[4]
     assert step[0] < 3.0 * step[4]
+
+
+@pytest.mark.parametrize("shape", [(16, 16), (24, 9), (9, 24)])
+def test_steps_are_those_of_torchs_muon_but_for_its_rounding(shape):
+    """That of torch computes in bfloat16, so its steps have an error of up to a hundredth."""
+    generator = torch.Generator().manual_seed(1)
+    start = torch.randn(shape, generator=generator)
+    ours, theirs = start.clone().requires_grad_(), start.clone().requires_grad_()
+    optimizers = Muon([ours], lr=0.1), torch.optim.Muon([theirs], lr=0.1, weight_decay=0.0)
+    for _ in range(3):
+        ours.grad = torch.randn(shape, generator=generator)
+        theirs.grad = ours.grad.clone()
+        for optimizer in optimizers:
+            optimizer.step()
+    moved = (theirs - start).detach()
+    assert float((ours - theirs).detach().norm()) < 0.02 * float(moved.norm())
 
 
 def test_every_parameter_moves_and_a_share_of_the_rate_moves_it_by_that_share():

@@ -4,6 +4,7 @@ det J > 0 needs the faces of the solid to meet at less than 180 degrees along th
 edge in a hollow cannot lie on the surface; one along a ridge suits it best.
 """
 
+import numba
 import numpy as np
 from scipy.optimize import fmin
 from scipy.spatial.transform import Rotation
@@ -12,15 +13,17 @@ from ..arrays import Array
 from ..config import LayoutConfig
 from ..surface.geometry import doubled_areas, edge_triangles
 from ..threads import in_parallel
-from .cube import project_radially
 from .sphere import SphereLayout
 
+_FLAT = 1e-6  # an edge with a smaller angle, such as one within a cut triangle, does not bend
 
-def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Generator, number: int) -> SphereLayout:
-    """Return the layout, turned so that the cube's edges lie least in hollows: 0 is the best turn, 1 the next, ...
 
-    The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
-    nearly are the same count as one. Where that leaves too few, the next best rotations that differ from all follow.
+def best_turn(layout: SphereLayout, options: LayoutConfig, generator: np.random.Generator, number: int) -> Array:
+    """Return the rotation (3, 3) of the directions by which the cube's edges lie least in hollows.
+
+    number: 0 takes the best turn, 1 the next, ... The best of some random rotations are turned further by the simplex
+    method of Nelder and Mead. Of these, turns that nearly are the same count as one. Where that leaves too few, the
+    next best rotations that differ from all follow.
     """
     middles, along, bends = _bends(layout)
     simplex = options.turn_size * np.vstack([np.zeros(3), np.eye(3)])
@@ -50,8 +53,7 @@ def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Gen
             _, rotation = turned_further(rotations[i])
             if _is_other(rotation, turns, options):
                 turns.append(rotation)
-    best = turns[min(number, len(turns) - 1)].as_matrix()
-    return SphereLayout(layout.vertices, layout.faces, layout.directions @ best.T)
+    return np.asarray(turns[min(number, len(turns) - 1)].as_matrix())
 
 
 def _is_other(rotation: Rotation, turns: list[Rotation], options: LayoutConfig) -> bool:
@@ -64,16 +66,17 @@ def _angle_between(first: Rotation, second: Rotation) -> float:
 
 
 def _bends(layout: SphereLayout) -> tuple[Array, Array, Array]:
-    """Return of each mesh edge middle and direction on the sphere (e, 3), and how much the surface bends there (e,).
+    """Return middle and direction on the sphere (e, 3) of the edges that bend, and how much the surface bends there (e,).
 
     That is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """
     vertices, faces, places = layout.vertices, layout.faces, layout.directions
     edges, owners = edge_triangles(faces)
-    here, there = owners.T
     normals = doubled_areas(vertices, faces)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    angle = np.arccos(np.clip((normals[here] * normals[there]).sum(axis=1), -1.0, 1.0))
+    angle = np.arccos(np.clip((normals[owners[:, 0]] * normals[owners[:, 1]]).sum(axis=1), -1.0, 1.0))
+    bent = angle > _FLAT
+    edges, angle, (here, there) = edges[bent], angle[bent], owners[bent].T
     middle_there = vertices[faces[there]].mean(axis=1) - vertices[edges[:, 0]]
     hollow = np.where((middle_there * normals[here]).sum(axis=1) > 0.0, angle, -angle)
     step = places[edges[:, 1]] - places[edges[:, 0]]
@@ -87,14 +90,23 @@ def _hollowness(middles: Array, along: Array, bends: Array, options: LayoutConfi
 
     Along a cube edge they are summed piece by piece; what is above zero counts more.
     """
-    radial, rows = project_radially(middles), np.arange(len(middles))
-    size = np.abs(radial)
-    axis = size.argmin(axis=1)  # of the nearest edge of the cube
-    away = 0.5 - np.sort(size, axis=1)[:, 1]
-    weights = np.exp(-0.5 * (away / options.edge_width) ** 2) * along[rows, axis] ** 2
-    places = np.minimum(options.edge_pieces * (0.5 + radial[rows, axis]), options.edge_pieces - 1).astype(np.int64)
-    positive = radial > 0.0
-    positive[rows, axis] = False
-    edges = 8 * axis + positive @ [1, 2, 4]
-    pieces = np.bincount(options.edge_pieces * edges + places, bends * weights)
+    pieces = _bends_of_pieces(middles, along, bends, options.edge_width, options.edge_pieces)
     return float(pieces.sum() + options.hollow * np.maximum(pieces, 0.0).sum())
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _bends_of_pieces(middles: Array, along: Array, bends: Array, width: float, count: int) -> Array:
+    """Return the weighed sums (3, 2, 2, count): by the cube edge's axis, its sides along the others, and the piece."""
+    sums = np.zeros((3, 2, 2, count))
+    for point, direction, bend in zip(middles, along, bends):  # noqa: B905 - numba knows no strict
+        axis = 0  # of the nearest edge of the cube
+        for other in range(1, 3):
+            if abs(point[other]) < abs(point[axis]):
+                axis = other
+        first, second = point[(axis + 1) % 3], point[(axis + 2) % 3]
+        size = 2.0 * max(abs(first), abs(second))  # projects radially onto the cube
+        away = 0.5 - min(abs(first), abs(second)) / size
+        weight = np.exp(-0.5 * (away / width) ** 2) * direction[axis] ** 2
+        piece = min(int(count * (0.5 + point[axis] / size)), count - 1)
+        sums[axis, int(first > 0.0), int(second > 0.0), piece] += weight * bend
+    return sums

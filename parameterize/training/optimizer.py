@@ -1,8 +1,12 @@
 """The optimiser of the training: Muon for the hidden layers' matrices, Adam for all else.
 
 Muon takes steps whose singular values are all alike (Jordan et al., 2024), so that directions in which the gradient is
-small advance as fast as the others.
+small advance as fast as the others. That of torch computes in bfloat16, which takes 20 times as long as float32 on
+processors without instructions for it; this one computes in the parameters' own precision.
 """
+
+import math
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -11,6 +15,39 @@ from ..config import TrainConfig
 from .network import InverseMap
 
 Tensors = dict[str, Tensor]
+
+
+class Muon(torch.optim.Optimizer):
+    """Steps along U V^T, where U S V^T is the momentum of a matrix's gradients; lr: the largest singular value."""
+
+    _MOMENTUM = 0.95
+    _POLYNOMIAL = (3.4445, -4.7750, 2.0315)  # of the quintic iteration by Jordan et al.: singular values go near 1
+    _ITERATIONS = 5
+
+    def __init__(self, matrices: list[Tensor], lr: float) -> None:
+        super().__init__(matrices, {"lr": lr})
+
+    @torch.no_grad()
+    def step(self, closure: Any = None) -> None:  # type: ignore[override]
+        """Take one step (Nesterov's momentum)."""
+        for group in self.param_groups:
+            for matrix in group["params"]:
+                momentum = self.state[matrix].setdefault("momentum_buffer", torch.zeros_like(matrix))
+                momentum.lerp_(matrix.grad, 1.0 - self._MOMENTUM)
+                direction = self._orthogonal(matrix.grad.lerp(momentum, self._MOMENTUM))
+                rows, columns = matrix.shape
+                matrix.sub_(direction, alpha=group["lr"] * math.sqrt(max(1.0, rows / columns)))
+
+    def _orthogonal(self, matrix: Tensor) -> Tensor:
+        """Return U V^T of a matrix U S V^T, about: its singular values lie between 0.7 and 1.2."""
+        a, b, c = self._POLYNOMIAL
+        tall = matrix.shape[0] > matrix.shape[1]
+        x = matrix.T if tall else matrix
+        x = x / x.norm().clamp(min=1e-7)
+        for _ in range(self._ITERATIONS):
+            gram = x @ x.T
+            x = torch.addmm(x, torch.addmm(gram, gram, gram, beta=b, alpha=c), x, beta=a)
+        return x.T if tall else x
 
 
 class TrainingOptimizer:
@@ -23,7 +60,7 @@ class TrainingOptimizer:
             (hidden if is_hidden else others).append(p)
         self._parts: dict[str, torch.optim.Optimizer] = {"adam": torch.optim.Adam(others, lr=config.learning_rate)}
         if hidden:
-            self._parts["muon"] = torch.optim.Muon(hidden, lr=config.matrix_rate, weight_decay=0.0)
+            self._parts["muon"] = Muon(hidden, lr=config.matrix_rate)
         self._rates = {name: part.param_groups[0]["lr"] for name, part in self._parts.items()}
 
     def clear(self) -> None:
