@@ -66,7 +66,7 @@ def _angle_between(first: Rotation, second: Rotation) -> float:
 
 
 def _bends(layout: SphereLayout) -> tuple[Array, Array, Array]:
-    """Return middle and direction on the sphere (e, 3) of the edges that bend, and how much the surface bends there (e,).
+    """Return middle and direction on the sphere (e, 3) of the edges that bend, and how much they bend (e,).
 
     That is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """

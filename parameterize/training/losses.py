@@ -1,12 +1,14 @@
 """The terms of the training loss L = L_inner + L_bound (paper, eq. (2) and (3)), one function a term.
 
+Each term has the name of its weight in `StageWeights`.
 The paper gives the terms' own formulas without numbers: those of L_bound in section 4.4.1, those of L_inner in 4.4.2.
 """
 
 import torch
 from torch import Tensor
 
-from ..optimization.polar import closest_rotation, cofactor
+from ..config import TrainConfig
+from ..optimization.polar import closest_rotation, cofactor, determinant
 from .samples import OFFSETS, gather
 
 _POSITION = {tuple(int(v) for v in offset): i for i, offset in enumerate(OFFSETS)}
@@ -27,6 +29,29 @@ def stencil_jacobian(mapped: Tensor, cell: float) -> Tensor:
     """Return J by central differences of G: stencils (r, 19, 3) -> (3, 3, r), the second index is the direction."""
     columns = [(_neighbour(mapped, e) - _neighbour(mapped, _minus(e))).T for e in _UNITS]
     return torch.stack(columns, dim=1) / (2.0 * cell)
+
+
+def inner_terms(nodes: Tensor, cell: float, config: TrainConfig) -> tuple[dict[str, Tensor], int]:
+    """Return the terms of L_inner (section 4.4.2) on mapped stencils (r, 19, 3), and the number folded."""
+    jacobian = stencil_jacobian(nodes, cell)
+    det = determinant(jacobian)
+    terms = {
+        "bij": bijectivity(det, config.min_det),
+        "arap": distortion(jacobian, det, config.det_floor * config.min_det),
+        "fair": fairness(nodes, cell),
+    }
+    return terms, int((det <= 0.0).sum())
+
+
+def surface_terms(surface: Tensor, goal: Tensor, wrong_side: float) -> dict[str, Tensor]:
+    """Return the terms of L_bound (section 4.4.1) on corners (3 t, 3) of mapped triangles, drawn to `goal`."""
+    corners = surface.view(-1, 3, 3)
+    normals = triangle_normals(corners)
+    return {
+        "dist": distance(surface, goal),
+        "norm": normal_difference(normals, triangle_normals(goal.view(-1, 3, 3)), wrong_side),
+        "star": star_shape(corners, normals),
+    }
 
 
 def bijectivity(det: Tensor, alpha: float) -> Tensor:

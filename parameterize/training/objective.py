@@ -7,7 +7,6 @@ from torch import Tensor
 
 from ..config import StageConfig, TrainConfig
 from ..cube.cube import CORNERS
-from ..optimization.polar import determinant
 from . import losses
 from .network import InverseMap, map_in_pieces
 from .samples import Stencils, TriangleSampler, gather
@@ -58,8 +57,10 @@ class Objective:
         points = [self.stencils.shifted(generator), *(boundary.vertices[index] for index in (used, *held))]
         mapped = map_in_pieces(self.network, torch.cat(points))
         nodes, surface, *held = torch.split(mapped, [len(p) for p in points])
-        terms, folded = self._interior_terms(gather(nodes, self.stencils.index))
-        terms |= self._surface_terms(stage, boundary, gather(surface, place), picks)
+        surface = gather(surface, place)
+        goal = self._goal(stage, boundary, surface, picks)
+        terms, folded = losses.inner_terms(gather(nodes, self.stencils.index), self.stencils.cell, self.config)
+        terms |= losses.surface_terms(surface, goal, self.config.wrong_side if stage.target == "cube" else 0.0)
         terms |= self._held_terms(boundary, held)
         weights = {name: getattr(stage.weights, name) for name in terms}
         if "cor" in terms:
@@ -67,35 +68,15 @@ class Objective:
         total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
         return total, folded, {name: float(term.detach()) for name, term in terms.items()}
 
-    def _interior_terms(self, nodes: Tensor) -> tuple[dict[str, Tensor], int]:
-        """Return the terms of L_inner (section 4.4.2) on mapped stencils (r, 19, 3), and the number folded."""
-        cell, alpha = self.stencils.cell, self.config.min_det
-        jacobian = losses.stencil_jacobian(nodes, cell)
-        det = determinant(jacobian)
-        terms = {
-            "bij": losses.bijectivity(det, alpha),
-            "arap": losses.distortion(jacobian, det, self.config.det_floor * alpha),
-            "fair": losses.fairness(nodes, cell),
-        }
-        return terms, int((det <= 0.0).sum())
+    def _goal(self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor) -> Tensor:
+        """Return what the corners (3 t, 3) of the mapped triangles `picks` (t,) are to reach.
 
-    def _surface_terms(
-        self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor
-    ) -> dict[str, Tensor]:
-        """Return the terms of L_bound (section 4.4.1) on the corners (3 t, 3) of the mapped triangles `picks` (t,)."""
-        with torch.no_grad():  # once the surface is cut, each triangle goes to its own face of the cube
+        Once the surface is cut, each triangle goes to its own face of the cube.
+        """
+        with torch.no_grad():
             if boundary.labels is None:
-                goal = nearest(stage.target, surface)
-            else:
-                goal = nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
-        normals = losses.triangle_normals(surface.view(-1, 3, 3))
-        goal_normals = losses.triangle_normals(goal.view(-1, 3, 3))
-        wrong_side = self.config.wrong_side if stage.target == "cube" else 0.0
-        return {
-            "dist": losses.distance(surface, goal),
-            "norm": losses.normal_difference(normals, goal_normals, wrong_side),
-            "star": losses.star_shape(surface.view(-1, 3, 3), normals),
-        }
+                return nearest(stage.target, surface)
+            return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
 
     def _held_terms(self, boundary: BoundarySamples, held: list[Tensor]) -> dict[str, Tensor]:
         """Return the terms of L_bound for what is held: the mapped corners (8, 3), then the path points (k, 3)."""
