@@ -60,7 +60,6 @@ class TrainConfig:
     min_det: float = 0.1  # alpha of the bijectivity term
     wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
     whiten: bool = True  # start from the affine map that makes the domain as wide in all directions, not the identity
-    turn: bool = True  # after the first stage, so that the cube's edges keep out of hollows; not with given corners
     det_floor: float = 0.5  # share of `min_det` at which the distortion term holds smaller determinants
     edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
 
@@ -310,7 +309,6 @@ PRESETS = {
             cell=0.04,
             triangles=1_000_000,
             whiten=False,
-            turn=False,
         ),
         _stages((600, 400, 1000, 500, 1000)),
         SplineConfig(),

@@ -50,12 +50,6 @@ class InverseMap(nn.Module):
         nn.init.zeros_(self.last.weight)
         nn.init.zeros_(self.last.bias)
 
-    @torch.no_grad()
-    def turn(self, rotation: Tensor) -> None:
-        """Turn what G maps to about c, by a rotation (3, 3)."""
-        for matrix in (self.affine, self.last.weight, self.last.bias):
-            matrix.copy_(rotation @ matrix)
-
     def encode(self, x: Tensor) -> Tensor:
         """Return x, sin(n k x) / (n k), cos(n k x) / (n k) for n = 1..N: (m, 3) -> (m, 6 N + 3)."""
         nk = self.multiples * self.scale  # (N,)

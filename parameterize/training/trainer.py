@@ -17,8 +17,6 @@ from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
-from ..cube.sphere import SphereLayout
-from ..cube.turning import best_turn
 from ..progress import History, Progress, ProgressCallback
 from .network import InverseMap
 from .objective import BoundarySamples, EdgePaths, Objective
@@ -101,18 +99,8 @@ class Trainer:
             _, loss = run.best_key
             if give_up and number == 0 and limit is not None and loss > limit:
                 return None
-            if number == 0 and self.config.train.turn and not given:
-                self._turn()
             saved = None
         return self.network
-
-    def _turn(self) -> None:
-        """Turn the ball that the first stage has mapped to, so that the cube's edges keep out of hollows."""
-        directions = self.mapped() - 0.5
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        sphere = SphereLayout(self.vertices, self.faces, directions)
-        rotation = best_turn(sphere, self.config.layout, np.random.default_rng(self.seed), 0)
-        self.network.turn(self._tensor(rotation))
 
     def map(self, points: Array) -> Array:
         """Return G at points (m, 3), as float64."""
