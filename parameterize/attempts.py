@@ -90,7 +90,7 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
         else:
             _log.warning("%s; %s instead", _fault(best.found), way)
         turn = (start - 1) // 2  # a way that comes again begins with another turn of the cube
-        other = (_grown if grows else _extended)(task, turn, checkpoints.of_part(start))
+        other = _grown_or_extended(task, turn, checkpoints.of_part(start), grows=grows)
         if best is None or other.found.rank < best.found.rank:
             best = other
     assert best is not None
@@ -124,31 +124,18 @@ def _trained(task: Task, checkpoints: Checkpoints, *, give_up: bool) -> Attempt 
     return _optimized(control, fit, spline, task, checkpoints, "network")
 
 
-def _grown(task: Task, turn: int, checkpoints: Checkpoints) -> Attempt:
-    """Lay the surface on the cube and let F grow from a cube towards it."""
+def _grown_or_extended(task: Task, turn: int, checkpoints: Checkpoints, *, grows: bool) -> Attempt:
+    """Lay the surface on the cube; let F grow towards it, or fit F to the layout extended into the solid."""
     config = task.config
-    spline = growing(config.spline, config.growth)
+    spline = growing(config.spline, config.growth) if grows else extending(config.spline, config.extension)
     with timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = _on_cube(task, turn)
+        layout = surface_on_cube(task.sphere, task.own, config.spline, config.layout, seed=task.seed, turn=turn)
         fit = _surface_fit(layout, spline, task)
-        control = first_cube(layout, task.own, fit.places.knots, spline.degree)
-    return _optimized(control, fit, spline, task, checkpoints, "growth")
-
-
-def _extended(task: Task, turn: int, checkpoints: Checkpoints) -> Attempt:
-    """Lay the surface on the cube likewise, extend that into the solid, fit F to it and optimise F."""
-    config = task.config
-    spline = extending(config.spline, config.extension)
-    with timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = _on_cube(task, turn)
-        fit = _surface_fit(layout, spline, task)
-        control = _first_spline(*extended(layout, config.extension), fit, spline)
-    return _optimized(control, fit, spline, task, checkpoints, "extension")
-
-
-def _on_cube(task: Task, turn: int) -> Layout:
-    config = task.config
-    return surface_on_cube(task.sphere, task.own, config.spline, config.layout, seed=task.seed, turn=turn)
+        if grows:
+            control = first_cube(layout, task.own, fit.places.knots, spline.degree)
+        else:
+            control = _first_spline(*extended(layout, config.extension), fit, spline)
+    return _optimized(control, fit, spline, task, checkpoints, "growth" if grows else "extension")
 
 
 def _optimized(
