@@ -50,6 +50,7 @@ from parameterize.run import corner_vertices
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import MeshError
 from solve.field import SplineField
+from solve.forms.frame import UnitFrame
 from solve.forms.parser import Expression, ExpressionError
 from solve.study import benchmark_volume
 
@@ -243,7 +244,7 @@ def given(read):
 def read_formula(path):
     """A formula as the shell hands it over, with its derivatives."""
     try:
-        expression = Expression(os.fsdecode(path.read_bytes()))
+        expression = Expression(os.fsdecode(path.read_bytes())).placed(UnitFrame((0.5, 0.0, 0.0), 2.0))
     except ExpressionError as error:
         raise InputError(f"{path}: {error}") from None
     points = np.linspace(-1.0, 2.0, 12).reshape(3, 4)
