@@ -1,7 +1,5 @@
 """The cube's edges are turned out of hollows and towards ridges."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -10,12 +8,7 @@ from shapes import ball, rounded_cube
 from parameterize.config import LAYOUT
 from parameterize.cube.cube import project_radially
 from parameterize.cube.sphere import SphereLayout
-from parameterize.cube.turning import _angle_between, _bends, _hollowness, best_turn
-
-
-def turned(layout, options, generator, number):
-    rotation = best_turn(layout, options, generator, number)
-    return replace(layout, directions=layout.directions @ rotation.T)
+from parameterize.cube.turning import _angle_between, _bends, _hollowness, turned
 
 
 def laid(vertices, faces):

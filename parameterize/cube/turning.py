@@ -15,15 +15,12 @@ from ..surface.geometry import doubled_areas, edge_triangles
 from ..threads import in_parallel
 from .sphere import SphereLayout
 
-_FLAT = 1e-6  # an edge with a smaller angle, such as one within a cut triangle, does not bend
 
+def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Generator, number: int) -> SphereLayout:
+    """Return the layout, turned so that the cube's edges lie least in hollows: 0 is the best turn, 1 the next, ...
 
-def best_turn(layout: SphereLayout, options: LayoutConfig, generator: np.random.Generator, number: int) -> Array:
-    """Return the rotation (3, 3) of the directions by which the cube's edges lie least in hollows.
-
-    number: 0 takes the best turn, 1 the next, ... The best of some random rotations are turned further by the simplex
-    method of Nelder and Mead. Of these, turns that nearly are the same count as one. Where that leaves too few, the
-    next best rotations that differ from all follow.
+    The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
+    nearly are the same count as one. Where that leaves too few, the next best rotations that differ from all follow.
     """
     middles, along, bends = _bends(layout)
     simplex = options.turn_size * np.vstack([np.zeros(3), np.eye(3)])
@@ -53,7 +50,8 @@ def best_turn(layout: SphereLayout, options: LayoutConfig, generator: np.random.
             _, rotation = turned_further(rotations[i])
             if _is_other(rotation, turns, options):
                 turns.append(rotation)
-    return np.asarray(turns[min(number, len(turns) - 1)].as_matrix())
+    best = turns[min(number, len(turns) - 1)].as_matrix()
+    return SphereLayout(layout.vertices, layout.faces, layout.directions @ best.T)
 
 
 def _is_other(rotation: Rotation, turns: list[Rotation], options: LayoutConfig) -> bool:
@@ -66,17 +64,16 @@ def _angle_between(first: Rotation, second: Rotation) -> float:
 
 
 def _bends(layout: SphereLayout) -> tuple[Array, Array, Array]:
-    """Return middle and direction on the sphere (e, 3) of the edges that bend, and how much they bend (e,).
+    """Return of each mesh edge middle and direction on the sphere (e, 3), and how much the surface bends there (e,).
 
     That is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """
     vertices, faces, places = layout.vertices, layout.faces, layout.directions
     edges, owners = edge_triangles(faces)
+    here, there = owners.T
     normals = doubled_areas(vertices, faces)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    angle = np.arccos(np.clip((normals[owners[:, 0]] * normals[owners[:, 1]]).sum(axis=1), -1.0, 1.0))
-    bent = angle > _FLAT
-    edges, angle, (here, there) = edges[bent], angle[bent], owners[bent].T
+    angle = np.arccos(np.clip((normals[here] * normals[there]).sum(axis=1), -1.0, 1.0))
     middle_there = vertices[faces[there]].mean(axis=1) - vertices[edges[:, 0]]
     hollow = np.where((middle_there * normals[here]).sum(axis=1) > 0.0, angle, -angle)
     step = places[edges[:, 1]] - places[edges[:, 0]]
