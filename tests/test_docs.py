@@ -42,7 +42,7 @@ class Page(HTMLParser):
 def site(tmp_path_factory):
     """The pages of the site, built in a copy: the gallery writes beside its sources.
 
-    Of the gallery heat.py alone is run, as tests/test_examples.py runs them all.
+    Of the scripts heat.py alone is run here: test_examples.py runs them all.
     """
     copy = tmp_path_factory.mktemp("site")
     for folder in ("docs", "examples"):
@@ -88,7 +88,7 @@ def test_formulas_and_public_names_are_shown(site):
     assert "ArrayLike" in text and "_SupportsArray" not in text and "ForwardRef" not in text
 
 
-def test_the_gallery_was_run_and_shows_its_volumes(site):
+def test_a_script_that_is_run_shows_what_it_says_and_every_volume_is_shown(site):
     (heat,) = (file for file in site if file.parts[-2:] == ("gallery", "heat.html"))
     assert "relative L2 error" in heat.read_text(encoding="utf-8")
     views = {f"scenes/{file.name}" for file in site if file.parent.name == "scenes"}
