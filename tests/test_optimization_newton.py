@@ -159,6 +159,36 @@ def test_a_polish_that_folds_is_mended_before_more_is_taken_back(monkeypatch):
     assert len(taken_back) == 2 and np.all(fit.yielding == 1.0)  # 0.1, 0.4, folded, 1
 
 
+def test_a_polish_ends_after_three_rounds_that_fold(monkeypatch):
+    certified = certify(as_volume(wavy_control(0.0)))
+    folded = replace(certified, verdict="folded", unproved=np.array([[1, 1, 1]]))
+    answers, seen = iter([certified, certified, folded, certified, folded, folded, folded]), []
+
+    def found(control, *_):
+        seen.append(Optimized(control, next(answers), True))
+        return seen[-1]
+
+    monkeypatch.setattr(Optimized, "of", found)
+    fit, steps = surface_fit(), count(1)
+    fit.give_way(np.full(len(fit.points), 1e-6))
+    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control + 1e-6 * next(steps))
+    kept = optimize(wavy_control(0.0), KNOTS, fit, replace(CONFIG, rounds=9), history=History())
+    assert kept is seen[3] and len(seen) == 7
+
+
+@pytest.mark.parametrize(("counts", "rounds"), [((9, 8, 7, 6, 5), 4), ((9, 8, 4, 4, 3), 5)])
+def test_rounds_end_where_they_unfold_no_more(monkeypatch, counts, rounds):
+    folded = replace(certify(as_volume(wavy_control(0.0))), verdict="folded")
+    unproved = iter([np.ones((k, 3), dtype=np.int64) for k in (20, *counts)])
+    monkeypatch.setattr(
+        Optimized, "of", lambda control, *_: Optimized(control, replace(folded, unproved=next(unproved)), None)
+    )
+    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control)
+    config = replace(CONFIG, rounds=5, firm_rounds=9, stalling=3)
+    optimize(wavy_control(0.0), KNOTS, surface_fit(), config, history=History())
+    assert len(list(unproved)) == 5 - rounds
+
+
 def test_the_number_of_threads_changes_no_bit(monkeypatch):
     control, found = wavy_control(0.1, seed=3), []
     monkeypatch.delenv("NUMBA_NUM_THREADS", raising=False)
@@ -205,6 +235,36 @@ def test_a_folded_start_is_unfolded():
     assert mean_arap(as_volume(found.control)) < mean_arap(as_volume(start))
 
 
+def test_smoothing_bends_least_next_to_the_spans_and_moves_nothing_else():
+    knots = (open_uniform_knots(14, 3),) * 3
+    row = greville(knots[0], 3)
+    control = torch.as_tensor(np.stack(np.meshgrid(row, row, row, indexing="ij")))
+    folded = control.clone()
+    folded[:, 6, 6, 6] += 0.4
+    energy = SplineEnergy(CONFIG, knots, surface_fit())
+    assert torch.allclose(energy.smoothed(folded, np.array([[4, 4, 4]])), control, atol=1e-7)  # a cube bends nowhere
+    folded[:, 10, 6, 6] += 0.4  # spans 3 to 5 need the points 3 to 8
+    smoothed = energy.smoothed(folded, np.array([[4, 4, 4]]))
+    moved = (smoothed != folded).any(dim=0).nonzero()
+    assert moved.min() == 3 and moved.max() == 8 and len(moved) == 6**3
+
+
+@pytest.mark.parametrize(("left", "most"), [(0, 2), (1, 2), (2, 2), (0, 1)])
+def test_spans_that_stay_unproved_are_smoothed_where_fewer_are_left_then(monkeypatch, left, most):
+    certified = certify(as_volume(wavy_control(0.0)))
+    folded = [replace(certified, verdict="folded", unproved=np.ones((k, 3), dtype=np.int64)) for k in range(3)]
+    proofs = [certified, *folded[1:]]
+    smooth = wavy_control(0.1)
+    monkeypatch.setattr(
+        Optimized, "of", lambda x, *_: Optimized(x, proofs[left if torch.equal(x, smooth) else 2], None)
+    )
+    monkeypatch.setattr(SplineEnergy, "smoothed", lambda *_: smooth)
+    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control)
+    start, config = wavy_control(0.0), replace(CONFIG, rounds=3, firm_rounds=2, most_smoothed=most)
+    kept = optimize(start, KNOTS, surface_fit(), config, history=History())
+    assert torch.equal(kept.control, smooth if left < 2 <= most else start)
+
+
 @pytest.mark.parametrize(("most", "rounds"), [(0, 3), (1000, 5)])
 def test_a_try_with_too_much_folded_is_given_up(monkeypatch, most, rounds):
     """Nothing is mended here; where single spans cannot be watched, the try ends once the surface would give way."""
@@ -219,7 +279,7 @@ def test_a_try_with_too_much_folded_is_given_up(monkeypatch, most, rounds):
 def test_what_gave_way_counts_again_once_the_map_is_certified():
     start, fit, history = wavy_control(0.08), surface_fit(), History()
     fit.give_way(np.full(len(fit.points), 0.05))
-    found = optimize(start, KNOTS, fit, replace(CONFIG, rounds=10, polish=8), history=history)
+    found = optimize(start, KNOTS, fit, replace(CONFIG, rounds=10, polish=8, patience=8), history=history)
     assert found.certificate.verdict == "certified"
     assert np.median(fit.yielding) == 1.0
     assert history.arrays()["step"].max() >= 3 * CONFIG.steps  # rounds after the certificate: 0.05 times 4 a round

@@ -277,6 +277,12 @@ def with_neighbours(spans: NDArray[np.int64], n_spans: tuple[int, ...]) -> NDArr
     return found
 
 
+def acting_on(spans: NDArray[np.bool_], degree: int) -> NDArray[np.bool_]:
+    """Mark the control points that act on marked spans: (n_u, n_v, n_w), `degree` fewer spans a direction."""
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(spans, degree), (degree + 1,) * 3)
+    return np.asarray(windows.any(axis=(3, 4, 5)))
+
+
 def edge_spans(n_spans: tuple[int, int, int]) -> NDArray[np.int64]:
     """Return the spans (k, 3) that touch one of the cube's 12 edges."""
     index = np.indices(n_spans).reshape(3, -1).T

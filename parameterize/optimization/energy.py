@@ -12,7 +12,7 @@ from torch import Tensor
 from ..arrays import IntArray, Knots
 from ..config import GrowthConfig, SplineConfig
 from .contact import ContactPenalty, contact_penalty
-from .determinant_penalty import SpanBarrier
+from .determinant_penalty import SpanBarrier, acting_on, with_neighbours
 from .distortion import DistortionEnergy
 from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
@@ -132,6 +132,22 @@ class SplineEnergy:
             return energy, gradient
         turned, push = self._facing.energy_and_gradient(control)
         return energy + self.penalty * turned, gradient + self.penalty * push
+
+    def smoothed(self, control: Tensor, spans: IntArray) -> Tensor:
+        """Bend F as little as possible in and next to spans (k, 3): return the control points, the others held.
+
+        Which side is folded over which plays no part in this, as it does where det J is penalised.
+        """
+        near = with_neighbours(spans, self.barrier.weights.shape)
+        free = torch.from_numpy(acting_on(near, self.config.degree)).to(control.dtype)
+        moved, _ = conjugate_gradients(
+            lambda x: free * self._bending(x),
+            -free * self._bending(control),
+            lambda x: x,
+            tolerance=self.config.smoothing_tolerance,
+            max_iterations=self.config.smoothing_iterations,
+        )
+        return control + moved
 
     def newton_direction(self, control: Tensor, right: Tensor, damping: float = 0.0) -> Tensor:
         """Solve roughly (Hessian + damping) x = right at `control`, the parameters of the surface held."""

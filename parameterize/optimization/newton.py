@@ -6,6 +6,7 @@ Steps and sliding by turns converge linearly; acceleration.py looks ahead, and w
 
 import logging
 import math
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,6 +32,7 @@ from .surface_distance import SurfaceFit
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
 _SHORTEST_STEP = 1e-6
+_COUNTS = ("number", "parting", "polished", "folding", "fewest", "halved")  # of rounds and spans, in a checkpoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +87,14 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the penalty on them and their neighbours grows further, and after
-    `firm_rounds` the surface data near them loses weight; where more than `most_watched` are unproved then,
-    the rounds end. Where the boundary of a certified map meets itself, further
-    rounds push it apart, and the surface data there lose weight. Once the map is certified, a few more rounds take back
-    what the data has lost, step by step, as far as they can. Anchors along the cube's edges draw F to the surface in
-    those last rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The
-    result is the last certified map whose boundary is proved not to meet itself, else the last one where that is not
-    decided, else the last certified one, else the one with the fewest unproved spans.
+    `firm_rounds` the surface data near them loses weight, and where they are few, F is smoothed there. The rounds end
+    without a certified map where more than `most_watched` spans are unproved then, or `stalling` rounds do not halve
+    their number. Where the boundary of a certified map meets itself, further rounds push it apart, and the surface data
+    there lose weight. Once the map is certified, a few more rounds take back what the data has lost, step by step, as
+    far as they can. Anchors along the cube's edges draw F to the surface in those last rounds and, where it is close to
+    begin with, in the first ones: not while what is folded comes apart. The result is the last certified map whose
+    boundary is proved not to meet itself, else the last one where that is not decided, else the last certified one,
+    else the one with the fewest unproved spans.
     begun: of how many rounds `control` is the result, on other knots; watched (k, 3): spans that nearly fold there.
     A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
     """
@@ -143,13 +146,17 @@ class _Rounds:
     certified: bool = False  # whether a round on these knots has ended with a certified map
     parting: int = 0  # rounds in which the boundary of a certified map that meets itself is pushed apart
     polished: int = 0  # rounds after that, or after the map was certified for the first time
-    lost: bool = False  # whether so much is still folded that letting single spans give way cannot mend it
+    folding: int = 0  # rounds of polish in turn that have ended with a map that folds again
+    fewest: int = sys.maxsize  # spans unproved when their number was last halved
+    halved: int = 0  # the round in which that was
+    lost: bool = False  # whether the rounds end without a certified map: too much is folded, or no more unfolds
 
     @property
     def finished(self) -> bool:
         """Whether no round is left, or the last polish has left nothing to take back."""
         config = self.energy.config
-        polished = self.polished == config.polish or (self.polished > 0 and self.settled and not self.energy.yields)
+        done = self.polished > 0 and self.settled and not self.energy.yields
+        polished = done or self.polished == config.polish or self.folding == config.patience
         return self.number >= config.rounds or polished or self.lost
 
     @property
@@ -189,9 +196,9 @@ class _Rounds:
 
     def conclude(self, control: Tensor) -> None:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
-        self.control, config = control, self.energy.config
-        found = Optimized.of(control, self.knots, config)
-        unproved = found.certificate.unproved
+        config = self.energy.config
+        found = self._smoothed(Optimized.of(control, self.knots, config))
+        self.control, unproved = found.control, found.certificate.unproved
         meets = ", the boundary meets itself" if found.meets_itself else ""
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
         self.certified |= not self.growing and found.certificate.verdict == "certified"
@@ -205,8 +212,22 @@ class _Rounds:
             self.energy.barrier.stiffen(unproved, config.span_growth, config.span_most)
         if self.number >= config.firm_rounds and not self.polished and len(unproved):
             self.energy.give_way(unproved, config.giving_way)
+        self.folding = self.folding + 1 if self.polished and len(unproved) else 0
+        if 2 * len(unproved) <= self.fewest or self.number <= len(self.shares):
+            self.fewest, self.halved = len(unproved), self.number
         self.number += 1
-        self.lost = many and self.number >= config.firm_rounds
+        stalled = not self.certified and self.number > self.halved + config.stalling
+        self.lost = stalled or (many and self.number >= config.firm_rounds)
+
+    def _smoothed(self, found: Optimized) -> Optimized:
+        """Smooth the map near spans that the last rounds have not unfolded; return it where fewer are unproved then."""
+        unproved, config = found.certificate.unproved, self.energy.config
+        stalled = self.number >= config.firm_rounds and not self.growing and found.faults >= self.best.faults
+        if not stalled or self.polished or not 0 < len(unproved) <= config.most_smoothed:
+            return found
+        smoothed = Optimized.of(self.energy.smoothed(found.control, unproved), self.knots, config)
+        _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.certificate.unproved))
+        return smoothed if smoothed.faults < found.faults else found
 
     def save(self, checkpoints: Checkpoints, history: History) -> None:
         """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
@@ -223,7 +244,7 @@ class _Rounds:
             "anchors_yielding": torch.as_tensor(anchors.yielding),
             "span_weights": torch.as_tensor(self.energy.barrier.weights),
         }
-        counts = {"number": self.number, "parting": self.parting, "polished": self.polished}
+        counts = {name: getattr(self, name) for name in _COUNTS}
         state = counts | {"certified": self.certified, "lost": self.lost, "history": history.rows}
         checkpoints.save(_CHECKPOINT, tensors, state)
 
@@ -237,7 +258,8 @@ class _Rounds:
         self.control = tensors["control"]
         self.best = Optimized.of(tensors["best"], self.knots, energy.config)
         self.best_places = tensors["best_parameters"].numpy(), tensors["best_cube_faces"].numpy()
-        self.number, self.parting, self.polished = (int(state[name]) for name in ("number", "parting", "polished"))
+        for name in _COUNTS:
+            setattr(self, name, int(state[name]))
         self.certified, self.lost = bool(state["certified"]), bool(state["lost"])
         history.rows[:] = [tuple(row) for row in state["history"]]
 
