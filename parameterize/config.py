@@ -126,7 +126,6 @@ class SplineConfig:
     coarse: float = 5 / 9  # of the spans a direction, in the first rounds
     coarse_rounds: int = 2
     polish: int = 6  # of them, after the map is certified for the first time, at most
-    patience: int = 3  # such rounds in turn that fold F again; the polish then ends
     stalling: int = 8  # rounds in which the unproved spans are not halved; they then end without a certified map
     parting: int = 6  # before these, while the boundary of a certified map meets itself, at most
     patient_rounds: int = 2  # after these the anchors let go, and the penalty grows at unproved spans
@@ -134,9 +133,11 @@ class SplineConfig:
     span_most: float = 125.0  # of these factors together
     firm_rounds: int = 4  # after these the surface gives way at unproved spans
     giving_way: float = 0.25  # factor of its weights there, each round: an edge in a valley cannot lie on the surface
+    smoothing_rounds: int = 2  # in which the unproved spans are not halved; F is then smoothed there
     most_smoothed: int = 10  # spans that stay unproved: to smooth F near more of them would take its shape away
     smoothing_tolerance: float = 1e-8  # of the solve for this, relative
     smoothing_iterations: int = 5000  # of it, at most
+    mendings: int = 6  # times that more is moved back to where it was certified, at most
     steps: int = 60  # a round, at most
     growth: GrowthConfig | None = None  # set by `growth.growing` from Config.growth, where F grows into the solid
     usual_steps: tuple[int, ...] = (13, 21, 27, 7, 6, 6)  # of the rounds of most runs: tells the time left

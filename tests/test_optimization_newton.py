@@ -155,25 +155,25 @@ def test_a_polish_that_folds_is_mended_before_more_is_taken_back(monkeypatch):
     fit.give_way(np.full(len(fit.points), 0.1))
     steps = iter(range(1, 9))
     monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control + 1e-6 * next(steps))
-    optimize(control, KNOTS, fit, replace(CONFIG, rounds=9), history=History())
+    optimize(control, KNOTS, fit, replace(CONFIG, rounds=9, mendings=0), history=History())
     assert len(taken_back) == 2 and np.all(fit.yielding == 1.0)  # 0.1, 0.4, folded, 1
 
 
-def test_a_polish_ends_after_three_rounds_that_fold(monkeypatch):
-    certified = certify(as_volume(wavy_control(0.0)))
-    folded = replace(certified, verdict="folded", unproved=np.array([[1, 1, 1]]))
-    answers, seen = iter([certified, certified, folded, certified, folded, folded, folded]), []
-
-    def found(control, *_):
-        seen.append(Optimized(control, next(answers), True))
-        return seen[-1]
-
-    monkeypatch.setattr(Optimized, "of", found)
-    fit, steps = surface_fit(), count(1)
-    fit.give_way(np.full(len(fit.points), 1e-6))
-    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control + 1e-6 * next(steps))
-    kept = optimize(wavy_control(0.0), KNOTS, fit, replace(CONFIG, rounds=9), history=History())
-    assert kept is seen[3] and len(seen) == 7
+def test_what_a_polish_folds_is_moved_back_there_and_nowhere_else(monkeypatch):
+    knots = (open_uniform_knots(14, 3),) * 3
+    row = greville(knots[0], 3)
+    start = torch.as_tensor(np.stack(np.meshgrid(row, row, row, indexing="ij")))
+    better = 1.001 * start
+    better[:, 2, 2, 2] += 0.4  # folds around the spans next to a corner
+    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: better if rounds.polished == 1 else rounds.control)
+    fit = surface_fit().on_knots(knots)
+    fit.give_way(np.full(len(fit.points), 0.2))
+    kept = optimize(start, knots, fit, replace(CONFIG, rounds=2), history=History())
+    assert kept.certificate.verdict == "certified"
+    moved_back, moved = (kept.control == start).all(dim=0), (kept.control == better).all(dim=0)
+    assert moved_back[2, 2, 2] and moved[9:].all() and bool((moved_back | moved).all())
+    near = (fit.places.parameters < 0.2).all(axis=1)
+    assert np.all(fit.yielding[near] == 0.2) and np.median(fit.yielding) == 0.8  # 0.2 times 4, near the fold a quarter
 
 
 @pytest.mark.parametrize(("counts", "rounds"), [((9, 8, 7, 6, 5), 4), ((9, 8, 4, 4, 3), 5)])
@@ -260,7 +260,7 @@ def test_spans_that_stay_unproved_are_smoothed_where_fewer_are_left_then(monkeyp
     )
     monkeypatch.setattr(SplineEnergy, "smoothed", lambda *_: smooth)
     monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control)
-    start, config = wavy_control(0.0), replace(CONFIG, rounds=3, firm_rounds=2, most_smoothed=most)
+    start, config = wavy_control(0.0), replace(CONFIG, rounds=3, firm_rounds=2, smoothing_rounds=1, most_smoothed=most)
     kept = optimize(start, KNOTS, surface_fit(), config, history=History())
     assert torch.equal(kept.control, smooth if left < 2 <= most else start)
 
@@ -279,7 +279,7 @@ def test_a_try_with_too_much_folded_is_given_up(monkeypatch, most, rounds):
 def test_what_gave_way_counts_again_once_the_map_is_certified():
     start, fit, history = wavy_control(0.08), surface_fit(), History()
     fit.give_way(np.full(len(fit.points), 0.05))
-    found = optimize(start, KNOTS, fit, replace(CONFIG, rounds=10, polish=8, patience=8), history=history)
+    found = optimize(start, KNOTS, fit, replace(CONFIG, rounds=10, polish=8), history=history)
     assert found.certificate.verdict == "certified"
     assert np.median(fit.yielding) == 1.0
     assert history.arrays()["step"].max() >= 3 * CONFIG.steps  # rounds after the certificate: 0.05 times 4 a round

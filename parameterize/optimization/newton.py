@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -25,14 +26,14 @@ from ..progress import History, Progress, ProgressCallback, ignore
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
 from .acceleration import Acceleration
-from .determinant_penalty import edge_spans
+from .determinant_penalty import acting_on, edge_spans, with_neighbours
 from .energy import SplineEnergy
 from .surface_distance import SurfaceFit
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
 _SHORTEST_STEP = 1e-6
-_COUNTS = ("number", "parting", "polished", "folding", "fewest", "halved")  # of rounds and spans, in a checkpoint
+_COUNTS = ("number", "parting", "polished", "fewest", "halved")  # of rounds and spans, in a checkpoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +107,8 @@ def optimize(
             energy.barrier.activate(watched)
         first = Optimized.of(control, knots, config)
         places = surface.places.parameters, surface.places.cube_faces
-        rounds = _Rounds(energy, knots, control, first, places, near=energy.anchors.near(control), number=begun)
+        near = energy.anchors.near(control)
+        rounds = _Rounds(energy, knots, control, first, places, near=near, number=begun, halved=begun)
         if (saved := checkpoints.load(_CHECKPOINT)) is not None:
             rounds.restore(*saved, history)
         while not rounds.finished:
@@ -146,7 +148,6 @@ class _Rounds:
     certified: bool = False  # whether a round on these knots has ended with a certified map
     parting: int = 0  # rounds in which the boundary of a certified map that meets itself is pushed apart
     polished: int = 0  # rounds after that, or after the map was certified for the first time
-    folding: int = 0  # rounds of polish in turn that have ended with a map that folds again
     fewest: int = sys.maxsize  # spans unproved when their number was last halved
     halved: int = 0  # the round in which that was
     lost: bool = False  # whether the rounds end without a certified map: too much is folded, or no more unfolds
@@ -155,8 +156,7 @@ class _Rounds:
     def finished(self) -> bool:
         """Whether no round is left, or the last polish has left nothing to take back."""
         config = self.energy.config
-        done = self.polished > 0 and self.settled and not self.energy.yields
-        polished = done or self.polished == config.polish or self.folding == config.patience
+        polished = self.polished == config.polish or (self.polished > 0 and self.settled and not self.energy.yields)
         return self.number >= config.rounds or polished or self.lost
 
     @property
@@ -197,7 +197,8 @@ class _Rounds:
     def conclude(self, control: Tensor) -> None:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
         config = self.energy.config
-        found = self._smoothed(Optimized.of(control, self.knots, config))
+        found = Optimized.of(control, self.knots, config)
+        found = self._mended(found) if self.certified else self._smoothed(found)
         self.control, unproved = found.control, found.certificate.unproved
         meets = ", the boundary meets itself" if found.meets_itself else ""
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
@@ -212,7 +213,6 @@ class _Rounds:
             self.energy.barrier.stiffen(unproved, config.span_growth, config.span_most)
         if self.number >= config.firm_rounds and not self.polished and len(unproved):
             self.energy.give_way(unproved, config.giving_way)
-        self.folding = self.folding + 1 if self.polished and len(unproved) else 0
         if 2 * len(unproved) <= self.fewest or self.number <= len(self.shares):
             self.fewest, self.halved = len(unproved), self.number
         self.number += 1
@@ -222,12 +222,31 @@ class _Rounds:
     def _smoothed(self, found: Optimized) -> Optimized:
         """Smooth the map near spans that the last rounds have not unfolded; return it where fewer are unproved then."""
         unproved, config = found.certificate.unproved, self.energy.config
-        stalled = self.number >= config.firm_rounds and not self.growing and found.faults >= self.best.faults
-        if not stalled or self.polished or not 0 < len(unproved) <= config.most_smoothed:
+        stalled = not self.growing and self.number >= max(config.firm_rounds, self.halved + config.smoothing_rounds)
+        if not stalled or not 0 < len(unproved) <= config.most_smoothed:
             return found
         smoothed = Optimized.of(self.energy.smoothed(found.control, unproved), self.knots, config)
         _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.certificate.unproved))
         return smoothed if smoothed.faults < found.faults else found
+
+    def _mended(self, found: Optimized) -> Optimized:
+        """Move what folds again back to where it was certified; return the map found where that does not suffice."""
+        config, held = self.energy.config, np.zeros(self.energy.barrier.weights.shape, dtype=bool)
+        mended = found
+        for _ in range(config.mendings):
+            unproved = mended.certificate.unproved
+            if not 0 < len(unproved) <= config.most_watched:
+                break
+            held |= with_neighbours(unproved, held.shape)
+            back = torch.from_numpy(acting_on(held, config.degree))
+            mended = Optimized.of(torch.where(back, self.best.control, found.control), self.knots, config)
+        if mended is found or mended.rank > self.best.rank:
+            return found
+        self.energy.barrier.activate(found.certificate.unproved)
+        self.energy.give_way(found.certificate.unproved, config.giving_way)
+        self.energy.slide(mended.control)
+        _log.info("moved back near %d spans", len(found.certificate.unproved))
+        return mended
 
     def save(self, checkpoints: Checkpoints, history: History) -> None:
         """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
