@@ -127,6 +127,7 @@ class SplineConfig:
     coarse_rounds: int = 2
     polish: int = 6  # of them, after the map is certified for the first time, at most
     stalling: int = 8  # rounds in which the unproved spans are not halved; they then end without a certified map
+    far: float = 0.02  # from the surface, root mean square: such rounds end without a certified map, too
     parting: int = 6  # before these, while the boundary of a certified map meets itself, at most
     patient_rounds: int = 2  # after these the anchors let go, and the penalty grows at unproved spans
     span_growth: float = 5.0  # factor of the penalty's weight there, each round

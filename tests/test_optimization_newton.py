@@ -22,7 +22,7 @@ from parameterize.spline.bspline import gauss_points, greville, open_uniform_kno
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
-CONFIG = SplineConfig(control_points=7, steps=5, penalties=(20.0, 100.0, 500.0, 2500.0), rounds=6)
+CONFIG = SplineConfig(control_points=7, steps=5, penalties=(20.0, 100.0, 500.0, 2500.0), rounds=6, far=1.0)
 KNOTS = (open_uniform_knots(7, 3),) * 3
 
 
@@ -184,9 +184,21 @@ def test_rounds_end_where_they_unfold_no_more(monkeypatch, counts, rounds):
         Optimized, "of", lambda control, *_: Optimized(control, replace(folded, unproved=next(unproved)), None)
     )
     monkeypatch.setattr(newton, "_descend", lambda rounds, *_: rounds.control)
-    config = replace(CONFIG, rounds=5, firm_rounds=9, stalling=3)
+    config = replace(CONFIG, rounds=5, firm_rounds=1, stalling=3, most_smoothed=0)
     optimize(wavy_control(0.0), KNOTS, surface_fit(), config, history=History())
     assert len(list(unproved)) == 5 - rounds
+
+
+@pytest.mark.parametrize(("far", "rounds"), [(0.02, 2), (10.0, 5)])
+def test_rounds_end_where_what_is_folded_is_far_from_the_surface(monkeypatch, far, rounds):
+    certificate = replace(certify(as_volume(wavy_control(0.0))), verdict="folded", unproved=np.ones((20, 3), dtype=int))
+    monkeypatch.setattr(Optimized, "of", lambda control, *_: Optimized(control, certificate, None))
+    ended = []
+    monkeypatch.setattr(newton, "_descend", lambda rounds, *_: ended.append(1) or rounds.control + 0.1)
+    optimize(
+        wavy_control(0.0), KNOTS, surface_fit(), replace(CONFIG, rounds=5, firm_rounds=2, far=far), history=History()
+    )
+    assert len(ended) == rounds
 
 
 def test_the_number_of_threads_changes_no_bit(monkeypatch):

@@ -88,14 +88,17 @@ def optimize(
 
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the penalty on them and their neighbours grows further, and after
-    `firm_rounds` the surface data near them loses weight, and where they are few, F is smoothed there. The rounds end
-    without a certified map where more than `most_watched` spans are unproved then, or `stalling` rounds do not halve
-    their number. Where the boundary of a certified map meets itself, further rounds push it apart, and the surface data
-    there lose weight. Once the map is certified, a few more rounds take back what the data has lost, step by step, as
-    far as they can. Anchors along the cube's edges draw F to the surface in those last rounds and, where it is close to
-    begin with, in the first ones: not while what is folded comes apart. The result is the last certified map whose
-    boundary is proved not to meet itself, else the last one where that is not decided, else the last certified one,
-    else the one with the fewest unproved spans.
+    `firm_rounds` the surface data near them loses weight. Where few of them stay for `smoothing_rounds`, F is smoothed
+    there. The rounds end without a certified map where more than `most_watched` spans are unproved, where `stalling`
+    rounds do not halve their number, and where F is farther than `far` from the surface, root mean square.
+
+    Where the boundary of a certified map meets itself, further rounds push it apart, and the surface data there lose
+    weight. Once the map is certified, a few more rounds take back what the data has lost, step by step, as far as they
+    can. What these rounds fold again is moved back. Anchors along the cube's edges draw F to the surface in those last
+    rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The result is
+    the last certified map whose boundary is proved not to meet itself, else the last one where that is not decided,
+    else the last certified one, else the one with the fewest unproved spans.
+
     begun: of how many rounds `control` is the result, on other knots; watched (k, 3): spans that nearly fold there.
     A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
     """
@@ -150,7 +153,7 @@ class _Rounds:
     polished: int = 0  # rounds after that, or after the map was certified for the first time
     fewest: int = sys.maxsize  # spans unproved when their number was last halved
     halved: int = 0  # the round in which that was
-    lost: bool = False  # whether the rounds end without a certified map: too much is folded, or no more unfolds
+    lost: bool = False  # whether the rounds end without a certified map
 
     @property
     def finished(self) -> bool:
@@ -216,8 +219,16 @@ class _Rounds:
         if 2 * len(unproved) <= self.fewest or self.number <= len(self.shares):
             self.fewest, self.halved = len(unproved), self.number
         self.number += 1
-        stalled = not self.certified and self.number > self.halved + config.stalling
-        self.lost = stalled or (many and self.number >= config.firm_rounds)
+        self.lost = self.number >= config.firm_rounds and (many or self._hopeless)
+
+    @property
+    def _hopeless(self) -> bool:
+        """Whether nothing is certified, and the last rounds unfold no more, or only by leaving the surface."""
+        if self.growing or self.certified:
+            return False
+        config, surface = self.energy.config, self.energy.surface
+        off = np.square(surface.residuals(self.control)).sum(axis=1).mean()
+        return self.number > self.halved + config.stalling or bool(off > config.far**2)
 
     def _smoothed(self, found: Optimized) -> Optimized:
         """Smooth the map near spans that the last rounds have not unfolded; return it where fewer are unproved then."""
