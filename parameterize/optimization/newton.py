@@ -201,7 +201,10 @@ class _Rounds:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
         config = self.energy.config
         found = Optimized.of(control, self.knots, config)
-        found = self._mended(found) if self.certified else self._smoothed(found)
+        if self.polished:
+            found = self._mended(found)
+        elif not self.certified:
+            found = self._smoothed(found)
         self.control, unproved = found.control, found.certificate.unproved
         meets = ", the boundary meets itself" if found.meets_itself else ""
         _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
