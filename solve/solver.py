@@ -14,8 +14,7 @@ from parameterize.threads import default_threads
 from .discretization.operator import free_window
 from .discretization.planes import map_planes
 from .discretization.quadrature import gauss_rule
-from .discretization.slab import Slab
-from .discretization.space import trial_space
+from .discretization.space import agreed, trial_space
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
@@ -132,7 +131,7 @@ def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, *
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up(volume.degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
     if options.comm is not None:
-        space = Slab.of(space, options.comm, free)
+        space = space.slab(options.comm, free)
     threads = options.threads or (default_threads() if options.comm is None else 1)
     return build(volume, placed, space, threads, options.quadrature)
 
@@ -145,13 +144,13 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     """
     problem, space = problem.on(volume), trial_space(volume)
     if comm is not None:
-        space = Slab.of(space, comm, free_window(space, problem.dirichlet))
+        space = space.slab(comm, free_window(space, problem.dirichlet))
     assembled, _, _ = assemble_data(volume, problem, space, quadrature="gauss")
     if len(problem.natural) == 6 and not problem.form.has_reaction:
         space.add(assembled.load)
         balanced(assembled.load[:, *assembled.operator.window], space)
     if problem.exact is not None:
-        with space.agreed():
+        with agreed(space.comm):
             for _, _, x in map_planes(volume, gauss_rule(space)):
                 problem.exact_at(x)
 

@@ -18,7 +18,7 @@ from .discretization.boundary import FaceRule, boundary_coefficients, face_rule,
 from .discretization.errors import error_estimate, error_norms, missing_mean
 from .discretization.operator import Assembled, FormOperator, Operator, assemble, free_window
 from .discretization.planes import rule_of
-from .discretization.space import TrialSpace, embedded, longest_edge
+from .discretization.space import TrialSpace, agreed, embedded, longest_edge
 from .field import Points, SplineField
 from .forms.form import Form, check_law
 from .forms.poisson import Poisson
@@ -177,7 +177,7 @@ class System:
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
-        for notice in solution.report.notices if self.space.rank == 0 else ():
+        for notice in solution.report.notices if self.space.comm.rank == 0 else ():
             log.warning("%s", notice)
         if options.strict and not solution.report.converged:
             raise ConvergenceError(solution)
@@ -314,7 +314,7 @@ def assemble_data(
         threads=threads,
     )
     robin = {}
-    with space.agreed():
+    with agreed(space.comm):
         for name in FACE_NAMES:
             if name in problem.dirichlet or not has_face(space, name):
                 continue

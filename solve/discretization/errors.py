@@ -17,7 +17,7 @@ from ..forms.problem import BoundaryValueProblem
 from . import kernels
 from .planes import geometry_planes
 from .quadrature import GaussRule, gauss_rule
-from .space import TrialSpace
+from .space import TrialSpace, agreed
 
 PLANES = 16  # of points of u, in a piece of work
 POINTS = 2**16  # of a plane that are evaluated at once: they take dozens of arrays
@@ -75,7 +75,7 @@ def error_norms(
                 sums[q, 2:] += kernels.squares(gradients, scale, slopes)
 
     planes = range(whole.shape[0])
-    with space.agreed():
+    with agreed(space.comm):
         in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
     l2, norm, seminorm, slope = np.sqrt(space.total(sums.sum(axis=0))).tolist()
     if not all(space.shared(all(has_gradient))):
@@ -93,7 +93,7 @@ def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, 
     tables, spline = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients)
     plane = np.empty((4, *rule.plane_shape))
     lack = size = 0.0
-    with space.agreed():
+    with agreed(space.comm):
         for q, _, measure, x in geometry_planes(volume, rule):
             kernels.evaluate_plane(spline, q, tables, plane)
             wanted = 0.0 if problem.exact is None else problem.exact_at(x)[0][0]
@@ -127,7 +127,7 @@ def error_estimate(
         for place, field in enumerate((error, solution[0, 0, 0])):
             sums[place] += np.einsum("ijk,i,j,k", np.abs(det) * (field**2).sum(axis=0), w_u[layer], w_v, w_w)
 
-    with space.agreed():
+    with agreed(space.comm):
         for start in range(0, rule.shape[0], counts[0]):  # layer by layer of elements in u
             integrate(slice(start, start + counts[0]))
     l2, norm = np.sqrt(space.total(sums)).tolist()

@@ -24,7 +24,7 @@ from ..threads import colours
 from . import kernels
 from .planes import geometry_planes
 from .quadrature import GaussRule, operator_rule
-from .space import TrialSpace, Window
+from .space import TrialSpace, Window, agreed
 
 
 def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> Window:
@@ -232,7 +232,7 @@ def assemble(
                 for density, total in zip(source(x), load, strict=True):
                     add_integrals(basis.tables, q, density * size, total)
 
-    with space.agreed():
+    with agreed(space.comm):
         if component is not None:
             factors = np.empty((rule.shape[0], 6 + form.has_reaction, *rule.plane_shape))
         elif form.constant:
