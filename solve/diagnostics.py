@@ -147,7 +147,7 @@ def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list
     found = []
     if not problem.exact_formulas:
         return []
-    if not problem.knows("source"):
+    if "source" not in problem.data:
         if any("abs" in formula.text for formula in problem.exact_formulas):
             found.append(
                 "exact contains abs: where its argument changes sign, u has a kink that the source derived from it "
@@ -158,7 +158,7 @@ def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list
         # rounding is measured by the terms of the law, which may cancel in the source
         if not _agree(problem.source_at(x), lambda: (problem.source_of_exact(x), problem.size_of_exact(x))):
             found.append(f"{problem.label('source')} is not that of exact: {TWO_PROBLEMS}")
-    if problem.knows("boundary") and not all(_values_fit(volume, problem, face) for face in problem.dirichlet):
+    if "boundary" in problem.data and not all(_values_fit(volume, problem, face) for face in problem.dirichlet):
         found.append(f"{problem.label('boundary')} differs from exact: {TWO_PROBLEMS}")
     return found
 

@@ -18,9 +18,8 @@ from .discretization.space import agreed, trial_space
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
-from .options import SolverOptions, SpaceOptions
 from .solution import Solution
-from .system import System, assemble_data, balanced, build, check_device
+from .system import SolverOptions, System, assemble_data, balanced, build, check_device
 
 log = logging.getLogger(__name__)
 
@@ -46,7 +45,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     threads : int, optional
         The result is the same for any number. Default: NUMBA_NUM_THREADS, OMP_NUM_THREADS, or the cores at hand.
     quadrature : str
-        "spline", "gauss" or "gauss+1" (`solve.options.SpaceOptions`).
+        Of the operator: "spline", Gauss rules of the spline space, as many points as the map and the law need; "gauss",
+        `degree` Gauss points a span; "gauss+1", one more. Errors have degree + 2 points a span in any case.
     comm : mpi4py.MPI.Comm, optional
         Its processes share the work, a thread each by default, and each returns the whole solution.
     tolerance : float
@@ -58,7 +58,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     device : str
         "cpu", or "cuda" for the iteration on a GPU (Poisson's equation without Robin faces).
     start : SplineField, optional
-        A solution in a space that this one contains, where the iteration starts.
+        A solution in a space that this one contains, as that of one refinement less: the iteration starts there instead
+        of at zero, and saves a third on maps that take many.
     estimate : bool, optional
         Of the error from the residual; by default where the problem has no exact solution.
     strict : bool
@@ -86,34 +87,31 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     >>> solution.report.dofs, solution.report.l2_relative < 1e-3
     (343, True)
     """
-    of_space = {field.name for field in fields(SpaceOptions)} & how.keys()
-    of_solver = {name: value for name, value in how.items() if name not in of_space}
-    options = SolverOptions(**of_solver)
-    _check_types(volume, problem)
-    check_device(options.device, problem)
-    return discretize(volume, problem, **{name: how[name] for name in of_space}).solve(**of_solver)
+    of_solver = {field.name: how.pop(field.name) for field in fields(SolverOptions) if field.name in how}
+    check_device(SolverOptions(**of_solver).device, problem)
+    return discretize(volume, problem, **how).solve(**of_solver)
 
 
-def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> System:
+def discretize(
+    volume: BSplineVolume,
+    problem: Poisson | Elasticity | Problem,
+    *,
+    refine: int = 0,
+    degree: int | None = None,
+    threads: int | None = None,
+    quadrature: str = "spline",
+    comm: Any = None,
+) -> System:
     """Return the linear system of a problem, for loops of one's own.
 
     Parameters
     ----------
-    volume : BSplineVolume
-        The map.
-    problem : Poisson, Elasticity or Problem
-        The law and its data.
-    **how
-        refine, degree, threads, quadrature and comm, as in `iga_nn.solve`.
+    volume, problem, refine, degree, threads, quadrature, comm
+        As in `iga_nn.solve`, whose errors are raised.
 
     Returns
     -------
     System
-
-    Raises
-    ------
-    ValueError, ExpressionError, TypeError
-        What `iga_nn.solve` raises.
 
     Examples
     --------
@@ -123,17 +121,20 @@ def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, *
     >>> system.operator.shape, system.load.shape
     ((125, 125), (125,))
     """
-    options = SpaceOptions(**how)
-    _check_types(volume, problem)
-    placed, space = problem.on(volume), trial_space(volume, options.refine, options.degree)
+    if not isinstance(volume, BSplineVolume):
+        raise TypeError(f"volume must be a BSplineVolume, got {type(volume).__name__}")
+    if not isinstance(problem, BoundaryValueProblem):
+        raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be at least 1, got {threads}; leave it out for {default_threads()}")
+    placed, space = problem.on(volume), trial_space(volume, refine, degree)
     free = free_window(space, placed.dirichlet)
     if any(part.stop <= part.start for part in free):
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
-    _warm_up(volume.degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
-    if options.comm is not None:
-        space = space.slab(options.comm, free)
-    threads = options.threads or (default_threads() if options.comm is None else 1)
-    return build(volume, placed, space, threads, options.quadrature)
+    _warm_up(volume.degrees, degree, placed.form.components == 1 and placed.form.symmetric)
+    if comm is not None:
+        space = space.slab(comm, free)
+    return build(volume, placed, space, threads or (default_threads() if comm is None else 1), quadrature)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
@@ -153,13 +154,6 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
         with agreed(space.comm):
             for _, _, x in map_planes(volume, gauss_rule(space)):
                 problem.exact_at(x)
-
-
-def _check_types(volume: object, problem: object) -> None:
-    if not isinstance(volume, BSplineVolume):
-        raise TypeError(f"volume must be a BSplineVolume, got {type(volume).__name__}")
-    if not isinstance(problem, BoundaryValueProblem):
-        raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
 
 
 @functools.cache

@@ -1,14 +1,15 @@
 """System: the linear system of a problem on a volume, to be solved here or in a loop of one's own."""
 
+import functools
 import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
+from threadpoolctl import ThreadpoolController
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
@@ -25,9 +26,7 @@ from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
-from .options import SolverOptions
 from .solution import Solution, SolveReport
-from .threads import one_blas_thread
 
 DEVICES = ("cpu", "cuda")
 SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
@@ -37,6 +36,34 @@ Robin = Mapping[str, tuple[FaceRule, Array]]
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
 log = logging.getLogger(__name__)
+_controller = functools.cache(ThreadpoolController)  # looks for the libraries at its first use, when they are loaded
+
+
+def one_blas_thread() -> Any:
+    """Context in which each matrix product stays in the thread that calls it: the threads are ours to share out."""
+    return _controller().limit(limits=1, user_api="blas")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolverOptions:
+    """Hold what the linear solver is told: keywords of `iga_nn.solve`, which describes them.
+
+    Raises ValueError where a tolerance or a number of iterations is out of range.
+    """
+
+    tolerance: float = 1e-10
+    max_iterations: int = 1000
+    certified: str | None = None
+    device: str = "cpu"
+    start: SplineField | None = None
+    estimate: bool | None = None
+    strict: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < 1.0:
+            raise ValueError(f"tolerance must lie between 0 and 1, got {self.tolerance}")
+        if self.max_iterations < 1:
+            raise ValueError(f"max_iterations must be at least 1, got {self.max_iterations}")
 
 
 def check_device(device: str, problem: BoundaryValueProblem) -> None:
@@ -102,7 +129,7 @@ class System:
         """A, Robin's terms included."""
         return self._linear(self.multiply)
 
-    @cached_property
+    @functools.cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
         window = self.assembled.operator.free
@@ -153,7 +180,7 @@ class System:
 
     def multiply(self, free: Array) -> Array:
         """Return A times the free coefficients (c, m_u, m_v, m_w)."""
-        return self.assembled.operator.restricted(partial(_product, self.assembled, self.robin), free)
+        return self.assembled.operator.restricted(functools.partial(_product, self.assembled, self.robin), free)
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
@@ -169,7 +196,7 @@ class System:
         return LinearOperator((size, size), matvec=product, dtype=np.float64, **adjoint)
 
     def solve(self, **how: Any) -> Solution:
-        """Solve, and return the solution with its errors and notices. how: the fields of `SolverOptions`.
+        """Solve, and return the solution with its errors and notices. how: tolerance to strict, as in `iga_nn.solve`.
 
         Raises ConvergenceError where the linear solver fails and `strict` is asked for.
         """
@@ -319,10 +346,8 @@ def assemble_data(
             if name in problem.dirichlet or not has_face(space, name):
                 continue
             face = face_rule(volume, space, name)
-            if name in problem.natural:
-                data = problem.flux_at(name, face.points, face.normal)
-            else:
-                alpha, data = problem.robin_at(name, face.points, face.normal)
+            alpha, data = problem.on_face(name, face.points, face.normal)
+            if alpha is not None:
                 robin[name] = (face, alpha * face.measure)
             for density, total in zip(data, assembled.load, strict=True):
                 total[face.layer] += face.integrate(density * face.measure)

@@ -48,8 +48,8 @@ def test_data_from_the_exact_solution_are_the_derivatives_by_hand():
     normal = np.array([[0.6], [0.0], [0.8]])
     flux = 0.6 * (2 * x + y * y) + 0.8 * (2 * x * y + y)
     assert problem.source_at(points)[0] == pytest.approx(-2.0 + z * (x**2 + y * z))
-    assert problem.flux_at("u1", points, normal)[0] == pytest.approx(flux)
-    alpha, g = problem.robin_at("w0", points, normal)
+    assert problem.on_face("u1", points, normal)[1][0] == pytest.approx(flux)
+    alpha, g = problem.on_face("w0", points, normal)
     assert alpha == 3.0 and g[0] == pytest.approx(flux + 3.0 * (x**2 + y * z))
 
 

@@ -12,6 +12,7 @@ from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
 from ..field import Points
+from ..forms.form import strong_form
 from ..forms.jets import PAIRS, SYMMETRIC, Jet
 from ..forms.problem import BoundaryValueProblem
 from . import kernels
@@ -176,7 +177,7 @@ def _local_error(
         hessian = (_dot([row[i] for row in inverse], [row[j] for row in rows]) for i, j in PAIRS)
         jets.append(Jet(value, tuple(gradient), tuple(hessian)))
     symbols = [problem.form.symbol(2.0 * np.pi / spacing[a] * inverse[a], x) for a in range(3)]
-    return problem.residual_at(jets, x) / np.min(symbols, axis=0), det
+    return (problem.source_at(x) - strong_form(problem.form, jets, x)) / np.min(symbols, axis=0), det
 
 
 def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:

@@ -20,11 +20,27 @@ from parameterize.threads import in_parallel
 from ..forms.data import check_faces
 from ..forms.form import Form, reaction
 from ..forms.jets import PAIRS
-from ..threads import colours
 from . import kernels
 from .planes import geometry_planes
 from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace, Window, agreed
+
+SHARES = 4  # of the pieces of one colour a thread: some wait less where others take longer
+LAYERS = 4  # of elements in a piece of work, where the degree allows so few
+
+
+def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
+    """Return consecutive points in pieces, every other piece in the first list, the rest in the second.
+
+    first: (q,) number of the first function that is not zero at each point. A piece covers at least as many layers of
+    elements as the degree, so that no two of one list share a basis function: they may add to the same array at the
+    same time, and each sum has one order. Pieces of one list are joined to some shares a thread, to one for a single.
+    """
+    layers = np.unique(first, return_inverse=True)[1]
+    pieces = np.split(np.arange(len(first)), np.flatnonzero(np.diff(layers // max(degree, LAYERS))) + 1)
+    shares = SHARES * threads if threads > 1 else 1
+    halves = pieces[0::2], pieces[1::2]
+    return [[np.concatenate(half[i::shares]) for i in range(min(len(half), shares))] for half in halves]
 
 
 def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> Window:

@@ -55,7 +55,7 @@ def geometry_planes(
 
 
 def rule_of(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array], quadrature: str) -> GaussRule:
-    """Return the rule of a law's operator on a volume. tensor: as in `is_rough`. quadrature: as in `SpaceOptions`."""
+    """Return the rule of a law's operator on a volume; tensor as in `is_rough`, quadrature as in `operator_rule`."""
     return operator_rule(space, quadrature, quadrature == "spline" and is_rough(volume, space.whole, tensor))
 
 

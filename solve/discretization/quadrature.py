@@ -82,7 +82,7 @@ def gauss_rule(space: TrialSpace, counts: Sequence[int] | None = None) -> GaussR
 def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = True) -> GaussRule:
     """Return the rule of the operator.
 
-    quadrature: as in `SpaceOptions`. rough: whether the factors vary much from span to span (`planes.is_rough`), which
+    quadrature: as in `solve_problem`. rough: whether the factors vary much from span to span (`planes.is_rough`), which
         takes more points.
     Raises ValueError for any other quadrature.
     """

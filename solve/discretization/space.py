@@ -294,8 +294,13 @@ def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = Non
     """Return the trial space of a volume: every span halved `refine` times, in a degree, by default the map's own.
 
     It is as smooth as the map at the map's own knots, and as its degree allows at the knots that halving adds.
-    Raises ValueError for a negative `refine`, one that gives more than MOST_ELEMENTS, or a degree below 1.
+    Raises ValueError for numbers that are not whole, a negative `refine`, one that gives more than MOST_ELEMENTS, or a
+    degree below 1.
     """
+    if not isinstance(refine, int | np.integer):
+        raise ValueError(f"refine must be a whole number, 0 or more, got {refine!r:.80}")
+    if degree is not None and not isinstance(degree, int | np.integer):
+        raise ValueError(f"degree must be a whole number, 1 or more, got {degree!r:.80}")
     if refine < 0:
         raise ValueError(f"refine must be 0 or more (each level halves every span), got {refine}")
     elements = math.prod((len(breakpoints(knots)) - 1) << int(refine) for knots in volume.knots)
