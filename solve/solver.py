@@ -146,7 +146,7 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     problem, space = problem.on(volume), trial_space(volume)
     if comm is not None:
         space = space.slab(comm, free_window(space, problem.dirichlet))
-    assembled, _, _ = assemble_data(volume, problem, space, quadrature="gauss")
+    assembled, _ = assemble_data(volume, problem, space, quadrature="gauss")
     if len(problem.natural) == 6 and not problem.form.has_reaction:
         space.add(assembled.load)
         balanced(assembled.load[:, *assembled.operator.window], space)

@@ -3,7 +3,7 @@
 import functools
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .diagnostics import ConvergenceError, judge, solve_notices
-from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
+from .discretization.boundary import boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_estimate, error_norms, missing_mean
 from .discretization.operator import Assembled, FormOperator, Operator, assemble, free_window
 from .discretization.planes import rule_of
@@ -31,7 +31,6 @@ from .solution import Solution, SolveReport
 DEVICES = ("cpu", "cuda")
 SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
 ALL = slice(None)
-Robin = Mapping[str, tuple[FaceRule, Array]]
 
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
@@ -117,7 +116,6 @@ class System:
     problem: BoundaryValueProblem
     space: TrialSpace
     assembled: Assembled
-    robin: Robin  # face name -> its rule, and the weights of Robin's term
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
     right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
@@ -180,7 +178,7 @@ class System:
 
     def multiply(self, free: Array) -> Array:
         """Return A times the free coefficients (c, m_u, m_v, m_w)."""
-        return self.assembled.operator.restricted(functools.partial(_product, self.assembled, self.robin), free)
+        return self.assembled.operator.apply_free(free)
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
@@ -284,38 +282,21 @@ def build(
     """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space."""
     start = time.process_time()
     with one_blas_thread():
-        assembled, robin, known = assemble_data(volume, problem, space, threads, quadrature)
-        operator, others = assembled.operator, {*problem.dirichlet, *problem.natural}
-        extra = np.zeros(space.shape)
-        for face, weights in robin.values():
-            face.add_mass_diagonal(weights, extra)
+        assembled, known = assemble_data(volume, problem, space, threads, quadrature)
+        operator = assembled.operator
         blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
-        means = {
-            name: float(space.total(robin[name][1].sum() if name in robin else 0.0))
-            for name in FACE_NAMES
-            if name not in others
-        }
-        inverses = tuple(fast_diagonalization(block, means, extra) for block in blocks)
+        inverses = tuple(map(fast_diagonalization, blocks))
         if isinstance(operator, FormOperator) and inverses[0].singular:
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
                 "solution open: give one face to boundary or robin"
             )
-        load = assembled.load - _product(assembled, robin, known)
+        load = assembled.load - operator.apply(known)
         space.add(load)
         right = np.ascontiguousarray(load[:, *operator.window])
         right = balanced(right, space) if inverses[0].singular else right
         setup = time.process_time() - start
-    return System(volume, problem, space, assembled, robin, known, inverses, right, threads, setup)
-
-
-def _product(assembled: Assembled, robin: Robin, coefficients: Array) -> Array:
-    """Return operator and Robin's terms times coefficients (c, n_u, n_v, n_w), as far as this process integrates."""
-    result = assembled.operator.apply(coefficients)
-    for face, weights in robin.values():
-        for component, total in zip(coefficients, result, strict=True):
-            face.add_mass(weights, component, total)
-    return result
+    return System(volume, problem, space, assembled, known, inverses, right, threads, setup)
 
 
 def assemble_data(
@@ -324,8 +305,8 @@ def assemble_data(
     space: TrialSpace,
     threads: int = 1,
     quadrature: str = "spline",
-) -> tuple[Assembled, Robin, Array]:
-    """Return operator and load with the data on faces, Robin's terms by face, and the coefficients that are fixed."""
+) -> tuple[Assembled, Array]:
+    """Return operator and load, the data on faces included, and the coefficients that are fixed."""
     form, couples = problem.form, False
     if isinstance(problem, Problem):
         samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
@@ -352,7 +333,8 @@ def assemble_data(
             for density, total in zip(data, assembled.load, strict=True):
                 total[face.layer] += face.integrate(density * face.measure)
     known = boundary_coefficients(volume, space.whole, problem.boundary_at, problem.dirichlet, form.components)
-    return assembled, robin, known[:, space.rows].copy()
+    assembled = replace(assembled, operator=replace(assembled.operator, robin=robin))
+    return assembled, known[:, space.rows].copy()
 
 
 def balanced(load: Array, space: TrialSpace) -> Array:

@@ -5,8 +5,8 @@ planes of points: gradients are pulled back, the law turns them into fluxes, and
 """
 
 import math
-from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,7 @@ from ..forms.data import check_faces
 from ..forms.form import Form, reaction
 from ..forms.jets import PAIRS
 from . import kernels
+from .boundary import FaceRule
 from .planes import geometry_planes
 from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace, Window, agreed
@@ -58,13 +59,15 @@ def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> W
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    free: the free coefficients of each component, in the whole space. threads: of a product.
+    free: the free coefficients of each component, in the whole space. threads: of a product. robin: of the faces that
+    have Robin's term, the rule and its weights, as far as this process integrates.
     """
 
     space: TrialSpace
     rule: GaussRule
     free: Window
     threads: int
+    robin: Mapping[str, tuple[FaceRule, Array]] = field(default_factory=dict, kw_only=True)
 
     @property
     def window(self) -> Window:
@@ -86,18 +89,17 @@ class MatrixFree:
         source = np.ascontiguousarray(coefficients).reshape(math.prod(coefficients.shape[:-3]), *self.space.shape)
         result = np.zeros_like(source)
         self.on_planes(lambda points: self._multiply(points, source, result))
+        for face, weights in self.robin.values():
+            for component, total in zip(source, result, strict=True):
+                face.add_mass(weights, component, total)
         return result.reshape(coefficients.shape)
 
     def apply_free(self, free: Array) -> Array:
-        """Return the product restricted to the free coefficients, (c, ...) or (...) of the window's shape."""
-        return self.restricted(self.apply, free)
-
-    def restricted(self, product: Callable[[Array], Array], free: Array) -> Array:
-        """Return a product with coefficients (.., n_u, n_v, n_w) restricted to the free ones, this process's own."""
+        """Return the product restricted to this process's free coefficients, (c, ..) or (..) of the window's shape."""
         full = np.zeros((*free.shape[:-3], *self.space.shape))
         full[..., *self.window] = free
         self.space.fill(full)
-        result = product(full)
+        result = self.apply(full)
         self.space.add(result)
         return np.ascontiguousarray(result[..., *self.window])
 
@@ -130,22 +132,21 @@ class Operator(MatrixFree):
 
         def add(points: IntArray) -> None:
             for q in points:
-                for field, pair in zip(self.factors[q], (*PAIRS, ()), strict=False):
+                for entry, pair in zip(self.factors[q], (*PAIRS, ()), strict=False):
                     twice = 2.0 if len(set(pair)) == 2 else 1.0
-                    add_integrals(products, q, twice * field, result, tuple(pair.count(a) for a in range(3)))
+                    add_integrals(products, q, twice * entry, result, tuple(pair.count(a) for a in range(3)))
 
         self.on_planes(add)
-        return result
+        on_faces = np.zeros(self.space.shape)
+        for face, weights in self.robin.values():
+            face.add_mass_diagonal(weights, on_faces)
+        return result + on_faces
 
     def dense(self, axis: int, derivative: int) -> Array:
         """Return the matrix (q, n) of a direction's functions, or of their derivatives, at its points."""
         knots, degree = self.space.knots[axis], self.space.degrees[axis]
         matrix: Array = collocation(knots, degree, self.rule.points[axis], derivative).toarray()
         return matrix
-
-    def mean_mass(self) -> float:
-        """Return the average over the cube of c |det J|."""
-        return float(self.space.total(sum(plane[6:].sum() for plane in self.factors)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +165,8 @@ class FormOperator(MatrixFree):
         form, planes = self.form, self.rule.plane_shape
         fields, gradient = np.empty((len(coefficients), 4, *planes)), np.empty((len(coefficients), 3, *planes))
         for q, rows, measure, x in self._geometry(points):
-            for component, field in zip(coefficients, fields, strict=True):
-                kernels.evaluate_plane(component, q, self.tables, field)
+            for component, plane in zip(coefficients, fields, strict=True):
+                kernels.evaluate_plane(component, q, self.tables, plane)
             kernels.turn(rows, fields[:, 1:], gradient, False)
             values = fields[:, 0]
             if measure is not None:
@@ -174,8 +175,8 @@ class FormOperator(MatrixFree):
                 fields[:, 0] = reaction(form, values, gradient, x) * scale
             flux = np.ascontiguousarray(form.flux(values, gradient, x), dtype=np.float64)
             kernels.turn(rows, flux, fields[:, 1:], True)
-            for field, total in zip(fields, result, strict=True):
-                kernels.spread_plane(field, q, self.tables, form.has_reaction, total)
+            for plane, total in zip(fields, result, strict=True):
+                kernels.spread_plane(plane, q, self.tables, form.has_reaction, total)
 
     def _geometry(self, points: IntArray) -> Iterable[tuple[int, Array, Array | None, Any]]:
         """Return what `geometry_planes` yields, of a constant law q and R alone."""
@@ -188,7 +189,7 @@ class FormOperator(MatrixFree):
         law, rule = (self.volume, self.space, self.form), self.rule
         block = assemble(*law, rule=rule, window=self.free, component=component, threads=self.threads).operator
         assert isinstance(block, Operator)
-        return block
+        return replace(block, robin=self.robin)
 
 
 @dataclass(frozen=True, eq=False)
