@@ -119,20 +119,19 @@ class System:
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
     right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
-    threads: int
     setup: float  # process seconds
 
     @property
     def operator(self) -> LinearOperator:
         """A, Robin's terms included."""
-        return self._linear(self.multiply)
+        return self._linear(self.assembled.operator.apply_free)
 
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
-        window = self.assembled.operator.free
-        single = assemble(self.volume, self.space, MassForm(), window=window, threads=self.threads).operator
-        return self._linear(lambda free: np.stack([single.apply_free(component) for component in free]))
+        free, threads = self.assembled.operator.free, self.assembled.operator.threads
+        single = assemble(self.volume, self.space, MassForm(), window=free, threads=threads).operator
+        return self._linear(single.apply_free)
 
     @property
     def load(self) -> Array:
@@ -146,7 +145,7 @@ class System:
 
     def field(self, x: Array) -> SplineField:
         """Return the spline of the free coefficients x (N,) and of those that are fixed."""
-        return self._spline(self._whole(self._filled(np.reshape(x, self.right.shape))))
+        return self._spline(self._filled(np.reshape(x, self.right.shape)))
 
     def _filled(self, free: Array) -> Array:
         """Return the coefficients (c, n_u, n_v, n_w), those that are fixed included."""
@@ -154,10 +153,6 @@ class System:
         full[self.window] = free
         self.space.fill(full)
         return full
-
-    def _whole(self, full: Array) -> Array:
-        """Return the coefficients of all processes."""
-        return self.space.gather(full[:, *self.space.own((slice(0, self.space.whole.shape[0]), ALL, ALL))])
 
     def vector(self, field: SplineField) -> Array:
         """Return the free coefficients (N,) of a field of this space, or of one that it contains.
@@ -168,17 +163,16 @@ class System:
         return (full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))[self.window].ravel()
 
     def _spline(self, full: Array) -> SplineField:
-        coefficients = full[0] if len(full) == 1 else np.moveaxis(full, 0, -1)
+        """Return the spline of coefficients (c, n_u, n_v, n_w), those of all processes together."""
+        own = self.space.own((slice(0, self.space.whole.shape[0]), ALL, ALL))
+        whole = self.space.gather(full[:, *own])
+        coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
 
     @property
     def window(self) -> tuple[slice, ...]:
         """The free coefficients in an array (c, n_u, n_v, n_w)."""
         return (slice(None), *self.assembled.operator.window)
-
-    def multiply(self, free: Array) -> Array:
-        """Return A times the free coefficients (c, m_u, m_v, m_w)."""
-        return self.assembled.operator.apply_free(free)
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
@@ -221,7 +215,7 @@ class System:
         clock.append(time.process_time())
         errors = estimate = None
         if problem.exact is not None:
-            errors = error_norms(volume, space, full, problem.exact_at, self.threads)
+            errors = error_norms(volume, space, full, problem.exact_at, self.assembled.operator.threads)
         if options.estimate or (options.estimate is None and problem.exact is None):
             estimate = error_estimate(volume, space, full, problem)
         clock.append(time.process_time())
@@ -242,33 +236,30 @@ class System:
             residuals=result.residuals,
             traffic=traffic,
         )
-        field = self._spline(self._whole(full))
+        field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
 
     def iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
-        limits = options.tolerance, options.max_iterations
+        operator, limits = self.assembled.operator, (options.tolerance, options.max_iterations)
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
-            assert isinstance(self.assembled.operator, Operator)
-            return solve_on_device(self.assembled.operator, self.blocks[0], self.right, *limits, options.device, guess)
-        system = self.multiply, self.right, self.precondition
+            assert isinstance(operator, Operator)
+            return solve_on_device(operator, self.blocks[0], self.right, *limits, options.device, guess)
         if self.problem.form.symmetric:
+            system = operator.apply_free, self.right, self.precondition
             return conjugate_gradients(*system, *limits, guess, self.space.total)
-        return self._on_whole_vectors(*limits, guess)
-
-    def _on_whole_vectors(self, tolerance: float, max_iterations: int, guess: Array | None) -> LinearResult:
-        """Return what GMRES finds: its vectors are whole on every process, products and preconditioner are shared."""
-        gather, own = self.space.gather, (slice(None), self.space.place)
-
-        def on_whole(apply: Callable[[Array], Array]) -> Callable[[Array], Array]:
-            return lambda x: gather(apply(x[own]))
-
-        start = None if guess is None else gather(guess)
-        multiply, precondition = on_whole(self.multiply), on_whole(self.precondition)
-        found = generalized_residuals(multiply, gather(self.right), precondition, tolerance, max_iterations, start)
+        # the vectors of GMRES are whole on every process, products and preconditioner are shared
+        gather, own = self.space.gather, (ALL, self.space.place)
+        found = generalized_residuals(
+            lambda x: gather(operator.apply_free(x[own])),
+            gather(self.right),
+            lambda x: gather(self.precondition(x[own])),
+            *limits,
+            None if guess is None else gather(guess),
+        )
         return replace(found, x=found.x[own])
 
 
@@ -296,7 +287,7 @@ def build(
         right = np.ascontiguousarray(load[:, *operator.window])
         right = balanced(right, space) if inverses[0].singular else right
         setup = time.process_time() - start
-    return System(volume, problem, space, assembled, known, inverses, right, threads, setup)
+    return System(volume, problem, space, assembled, known, inverses, right, setup)
 
 
 def assemble_data(

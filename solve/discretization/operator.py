@@ -110,7 +110,7 @@ class MatrixFree:
 
 @dataclass(frozen=True, eq=False)
 class Operator(MatrixFree):
-    """The positive semidefinite matrix of a scalar symmetric law.
+    """The positive semidefinite matrix of a scalar symmetric law, for each component the same.
 
     factors: (q_u, 6 or 7, q_w, q_v), the six of G and c |det J| where there is a reaction; weights included.
     """
@@ -118,7 +118,8 @@ class Operator(MatrixFree):
     factors: Array
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
-        kernels.multiply_planes(coefficients[0], points, self.tables, self.factors, result[0])
+        for component, total in zip(coefficients, result, strict=True):
+            kernels.multiply_planes(component, points, self.tables, self.factors, total)
 
     def diagonal(self) -> Array:
         """Return the diagonal of the matrix, shape `space.shape`: squared basis functions in place of the basis.
