@@ -10,8 +10,7 @@ from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .discretization.errors import Errors
 from .discretization.operator import Assembled
-from .discretization.planes import map_planes
-from .discretization.quadrature import gauss_rule
+from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.space import TrialSpace
 from .field import Points
 from .forms.data import in_scaled

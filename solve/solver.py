@@ -11,9 +11,7 @@ from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import default_threads
 
-from .discretization.operator import free_window
-from .discretization.planes import map_planes
-from .discretization.quadrature import gauss_rule
+from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.space import agreed, trial_space
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
@@ -127,13 +125,12 @@ def discretize(
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, got {threads}; leave it out for {default_threads()}")
-    placed, space = problem.on(volume), trial_space(volume, refine, degree)
-    free = free_window(space, placed.dirichlet)
-    if any(part.stop <= part.start for part in free):
+    placed, space = problem.on(volume), trial_space(volume, refine, degree, problem.dirichlet)
+    if any(part.stop <= part.start for part in space.free):
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up(volume.degrees, degree, placed.form.components == 1 and placed.form.symmetric)
     if comm is not None:
-        space = space.slab(comm, free)
+        space = space.slab(comm)
     return build(volume, placed, space, threads or (default_threads() if comm is None else 1), quadrature)
 
 
@@ -143,13 +140,13 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     comm: a communicator of mpi4py whose processes share the work.
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
-    problem, space = problem.on(volume), trial_space(volume)
+    problem, space = problem.on(volume), trial_space(volume, dirichlet=problem.dirichlet)
     if comm is not None:
-        space = space.slab(comm, free_window(space, problem.dirichlet))
+        space = space.slab(comm)
     assembled, _ = assemble_data(volume, problem, space, quadrature="gauss")
     if len(problem.natural) == 6 and not problem.form.has_reaction:
         space.add(assembled.load)
-        balanced(assembled.load[:, *assembled.operator.window], space)
+        balanced(assembled.load[:, *space.window], space)
     if problem.exact is not None:
         with agreed(space.comm):
             for _, _, x in map_planes(volume, gauss_rule(space)):

@@ -17,8 +17,8 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from .diagnostics import ConvergenceError, judge, solve_notices
 from .discretization.boundary import boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_estimate, error_norms, missing_mean
-from .discretization.operator import Assembled, FormOperator, Operator, assemble, free_window
-from .discretization.planes import rule_of
+from .discretization.operator import Assembled, FormOperator, Operator, assemble
+from .discretization.quadrature import rule_of
 from .discretization.space import TrialSpace, agreed, embedded, longest_edge
 from .field import Points, SplineField
 from .forms.form import Form, check_law
@@ -129,8 +129,7 @@ class System:
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
-        free, threads = self.assembled.operator.free, self.assembled.operator.threads
-        single = assemble(self.volume, self.space, MassForm(), window=free, threads=threads).operator
+        single = assemble(self.volume, self.space, MassForm(), threads=self.assembled.operator.threads).operator
         return self._linear(single.apply_free)
 
     @property
@@ -164,15 +163,15 @@ class System:
 
     def _spline(self, full: Array) -> SplineField:
         """Return the spline of coefficients (c, n_u, n_v, n_w), those of all processes together."""
-        own = self.space.own((slice(0, self.space.whole.shape[0]), ALL, ALL))
-        whole = self.space.gather(full[:, *own])
+        own = self.space.owned[self.space.comm.rank]
+        whole = self.space.gather(full[:, : own.stop - own.start])
         coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
 
     @property
     def window(self) -> tuple[slice, ...]:
         """The free coefficients in an array (c, n_u, n_v, n_w)."""
-        return (slice(None), *self.assembled.operator.window)
+        return (slice(None), *self.space.window)
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
@@ -284,7 +283,7 @@ def build(
             )
         load = assembled.load - operator.apply(known)
         space.add(load)
-        right = np.ascontiguousarray(load[:, *operator.window])
+        right = np.ascontiguousarray(load[:, *space.window])
         right = balanced(right, space) if inverses[0].singular else right
         setup = time.process_time() - start
     return System(volume, problem, space, assembled, known, inverses, right, setup)
@@ -308,7 +307,6 @@ def assemble_data(
         form,
         problem.source_at,
         rule_of(volume, space, form.tensor, quadrature),
-        window=free_window(space.whole, problem.dirichlet),
         component=0 if form.components == 1 and form.symmetric and not couples else None,
         threads=threads,
     )

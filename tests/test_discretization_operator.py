@@ -5,7 +5,7 @@ from volumes import mapped, scalar_system
 from parameterize.spline.bspline import collocation
 from parameterize.spline.volume import BSplineVolume
 from solve import Elasticity, Form, Poisson
-from solve.discretization.operator import FormOperator, assemble, colours, free_window
+from solve.discretization.operator import FormOperator, assemble, colours
 from solve.discretization.quadrature import gauss_rule, operator_rule
 from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
@@ -142,12 +142,10 @@ def test_coefficients_equal_the_assembled_matrix(kappa, degree):
 
 
 def test_window_leaves_out_the_faces_with_dirichlet_data():
-    space = trial_space(benchmark_volume(2))
-    assert free_window(space) == (slice(1, 4),) * 3
-    assert free_window(space, ()) == (slice(0, 5),) * 3
-    assert free_window(space, {"u1", "w0"}) == (slice(0, 4), slice(0, 5), slice(1, 5))
-    with pytest.raises(ValueError, match="'top' is no face"):
-        free_window(space, {"top"})
+    volume = benchmark_volume(2)
+    assert trial_space(volume).free == (slice(1, 4),) * 3
+    assert trial_space(volume, dirichlet=()).free == (slice(0, 5),) * 3
+    assert trial_space(volume, dirichlet={"u1", "w0"}).free == (slice(0, 4), slice(0, 5), slice(1, 5))
 
 
 UNEQUAL = mapped(
@@ -209,7 +207,7 @@ def test_product_equals_the_matrix_with_unequal_degrees(form, threads):
     x = np.random.default_rng(1).standard_normal((form.components, *space.shape))
     expected = (matrix @ x.ravel()).reshape(x.shape)
     assert np.allclose(operator.apply(x), expected, atol=1e-11 * np.abs(expected).max())
-    free = operator.window
+    free = operator.space.window
     x[:, 0], x[:, -1], x[:, :, 0], x[:, :, -1], x[..., 0], x[..., -1] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     assert np.allclose(operator.apply_free(x[:, *free]), operator.apply(x)[:, *free], atol=1e-12)
     if form.symmetric:  # without coupling of u and its gradient, which the blocks leave out
@@ -222,7 +220,7 @@ def test_the_six_factors_equal_the_matrix_with_unequal_degrees(threads):
     space = trial_space(UNEQUAL, refine=1)
     law = {"kappa": ("2+x*x", "0.3*y", "0.1", "1.5", "0.2*sin(z)", "1+z*z"), "reaction": "1+x*x"}
     form = Poisson(**law)
-    operator = assemble(UNEQUAL, space, form, None, window=free_window(space, ()), threads=threads).operator
+    operator = assemble(UNEQUAL, space, form, None, threads=threads).operator
     x = np.random.default_rng(1).standard_normal(space.shape)
     expected = (dense_of_law(UNEQUAL, form, space, operator.rule) @ x.ravel()).reshape(x.shape)
     assert np.allclose(operator.apply(x), expected, atol=1e-11 * np.abs(expected).max())

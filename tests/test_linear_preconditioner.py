@@ -71,7 +71,7 @@ def test_exact_on_a_box_with_a_reaction_whatever_faces_are_free(dirichlet):
     """Tensor-product Gauss rules make the mass matrix, too, the Kronecker product of the three of one dimension."""
     box = mapped(lambda x, y, z: (4.0 * x, y, 0.25 * z))
     operator, preconditioner = build(box, dirichlet, reaction=lambda x, y, z: 2.0 + 0.0 * x)
-    x = np.random.default_rng(1).standard_normal(tuple(s.stop - s.start for s in operator.window))
+    x = np.random.default_rng(1).standard_normal(tuple(s.stop - s.start for s in operator.space.window))
     assert np.allclose(preconditioner(operator.apply_free(x)), x, atol=1e-10)
 
 

@@ -15,7 +15,7 @@ def sheared(slope, shape=(9, 9, 9), degree=3):
 
 
 def free_shape(operator):
-    sizes = zip(operator.window, operator.space.shape, strict=True)
+    sizes = zip(operator.space.window, operator.space.shape, strict=True)
     return tuple(len(range(*free.indices(n))) for free, n in sizes)
 
 

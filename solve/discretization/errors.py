@@ -16,8 +16,7 @@ from ..forms.form import strong_form
 from ..forms.jets import PAIRS, SYMMETRIC, Jet
 from ..forms.problem import BoundaryValueProblem
 from . import kernels
-from .planes import geometry_planes
-from .quadrature import gauss_rule
+from .quadrature import gauss_rule, geometry_planes
 from .space import TrialSpace, agreed
 
 PLANES = 16  # of points of u, in a piece of work

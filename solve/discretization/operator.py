@@ -14,17 +14,15 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import collocation
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
-from ..forms.data import check_faces
 from ..forms.form import Form, reaction
 from ..forms.jets import PAIRS
 from . import kernels
 from .boundary import FaceRule
-from .planes import geometry_planes
-from .quadrature import GaussRule, operator_rule
-from .space import TrialSpace, Window, agreed
+from .quadrature import GaussRule, geometry_planes, operator_rule
+from .space import TrialSpace, agreed
 
 SHARES = 4  # of the pieces of one colour a thread: some wait less where others take longer
 LAYERS = 4  # of elements in a piece of work, where the degree allows so few
@@ -44,35 +42,18 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
     return [[np.concatenate(half[i::shares]) for i in range(min(len(half), shares))] for half in halves]
 
 
-def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> Window:
-    """Return the coefficients that Dirichlet data on the named cube faces ("u0" ... "w1") leave free, a box.
-
-    Raises ValueError for a name that is no face.
-    """
-    check_faces("dirichlet", dirichlet)
-    sides = [[name in dirichlet for name in FACE_NAMES[2 * a : 2 * a + 2]] for a in range(3)]
-    u, v, w = (slice(int(low), n - int(high)) for (low, high), n in zip(sides, space.shape, strict=True))
-    return u, v, w
-
-
 @dataclass(frozen=True, eq=False)
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    free: the free coefficients of each component, in the whole space. threads: of a product. robin: of the faces that
-    have Robin's term, the rule and its weights, as far as this process integrates.
+    threads: of a product. robin: of the faces that have Robin's term, the rule and its weights, as far as this process
+    integrates.
     """
 
     space: TrialSpace
     rule: GaussRule
-    free: Window
     threads: int
     robin: Mapping[str, tuple[FaceRule, Array]] = field(default_factory=dict, kw_only=True)
-
-    @property
-    def window(self) -> Window:
-        """The free coefficients of each component that are this process's own."""
-        return self.space.own(self.free)
 
     @cached_property
     def tables(self) -> kernels.Tables:
@@ -95,13 +76,13 @@ class MatrixFree:
         return result.reshape(coefficients.shape)
 
     def apply_free(self, free: Array) -> Array:
-        """Return the product restricted to this process's free coefficients, (c, ..) or (..) of the window's shape."""
+        """Return the product restricted to this process's free coefficients, of shape (c, ..) or (..)."""
         full = np.zeros((*free.shape[:-3], *self.space.shape))
-        full[..., *self.window] = free
+        full[..., *self.space.window] = free
         self.space.fill(full)
         result = self.apply(full)
         self.space.add(result)
-        return np.ascontiguousarray(result[..., *self.window])
+        return np.ascontiguousarray(result[..., *self.space.window])
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
         """Add the part of some points of u to the product with coefficients (c, n_u, n_v, n_w)."""
@@ -188,7 +169,7 @@ class FormOperator(MatrixFree):
     def block(self, component: int) -> Operator:
         """Return the symmetric part of a component's diagonal block: the law of its own gradient and value."""
         law, rule = (self.volume, self.space, self.form), self.rule
-        block = assemble(*law, rule=rule, window=self.free, component=component, threads=self.threads).operator
+        block = assemble(*law, rule=rule, component=component, threads=self.threads).operator
         assert isinstance(block, Operator)
         return replace(block, robin=self.robin)
 
@@ -213,15 +194,12 @@ def assemble(
     source: Callable[[Array], Array] | None = None,
     rule: GaussRule | None = None,
     *,
-    window: Window | None = None,
     component: int | None = 0,
     threads: int = 1,
 ) -> Assembled:
     """Return operator and load of a law on a volume.
 
     source: takes the points (3, q_w, q_v) of a plane and returns (c, q_w, q_v); None for zero.
-    window: the free coefficients of the whole space, as `free_window` gives them (default: all but those of the six
-        faces).
     component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
     threads: of this pass and of the operator; the functions must then be safe to call from several at a time.
 
@@ -229,8 +207,8 @@ def assemble(
     trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
     Raises ValueError where det J is zero at a point, naming it.
     """
-    rule, window = rule or operator_rule(space), window or free_window(space.whole)
-    parts = space, rule, window, threads
+    rule = rule or operator_rule(space)
+    parts = space, rule, threads
     basis, part = MatrixFree(*parts), component or 0
     load = np.zeros((form.components, *space.shape))
     folded = []

@@ -8,7 +8,7 @@ spans it is not zero; the others have copies, up to `degree` rows after their ow
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,7 +19,7 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray, Knots
 from parameterize.spline.bspline import apply_along, breakpoints, find_spans, insert_knots, insertion_into, midpoints
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 log = logging.getLogger(__name__)
 
@@ -57,21 +57,21 @@ def agreed(comm: Any) -> Iterator[None]:
 class TrialSpace:
     """Scalar trivariate splines on the unit cube, of three degrees on three open knot vectors on [0, 1].
 
+    dirichlet: names of the cube's faces on which boundary data fix the coefficients. comm: a communicator of mpi4py.
     Of a slab the knots of u are those of its rows, which are not open, and `parent` is the space that all share.
-    comm: a communicator of mpi4py. free: the free coefficients of the whole space, where processes share it.
     sent: bytes that this process has sent so far, by what for.
     """
 
     degrees: tuple[int, int, int]
     knots: Knots
+    dirichlet: Collection[str] = FACE_NAMES
     comm: Any = Alone()
-    free: Window | None = None
     parent: "TrialSpace | None" = None
     sent: Counter[str] = field(default_factory=Counter, init=False)
 
-    def slab(self, comm: Any, free: Window) -> "TrialSpace":
+    def slab(self, comm: Any) -> "TrialSpace":
         """Return what this process keeps of the space where the processes of a communicator share it."""
-        slab = replace(self, comm=comm, free=free, parent=self)
+        slab = replace(self, comm=comm, parent=self)
         if comm.size > slab.spans[-1] and comm.rank == 0:
             log.warning("%d processes for %d spans of u: the others have no work", comm.size, slab.spans[-1])
         own = self.knots[0][slab.rows.start : slab.rows.stop + self.degrees[0] + 1]
@@ -150,20 +150,28 @@ class TrialSpace:
         """The rows of the whole space that this process has."""
         return self.kept[self.comm.rank]
 
-    def own(self, free: Window) -> Window:
-        """Return those of the free coefficients of the whole space that are this process's own, in its arrays."""
-        return _common(self.owned[self.comm.rank], free[0], self.rows.start), *free[1:]
+    @property
+    def free(self) -> Window:
+        """The coefficients of the whole space that boundary data leave free, a box."""
+        low, high = ([name in self.dirichlet for name in FACE_NAMES[side::2]] for side in (0, 1))
+        u, v, w = (slice(int(a), n - int(b)) for a, b, n in zip(low, high, self.whole.shape, strict=True))
+        return u, v, w
+
+    @property
+    def window(self) -> Window:
+        """The free coefficients that are this process's own, in its arrays."""
+        u, v, w = self.free
+        return _common(self.owned[self.comm.rank], u, self.rows.start), v, w
 
     @cached_property
     def starts(self) -> IntArray:
         """Where the own rows of each process begin among all free rows, and the number of these: (size + 1,)."""
-        return np.cumsum([0] + [len(_rows(_common(own, self.free[0] if self.free else own))) for own in self.owned])
+        return np.cumsum([0] + [len(_rows(_common(own, self.free[0]))) for own in self.owned])
 
     @cached_property
     def column_starts(self) -> IntArray:
         """Where the columns of each process begin among the free functions of v, and the number of these."""
-        count = len(_rows(self.free[1])) if self.free else self.shape[1]
-        return count * np.arange(self.comm.size + 1) // self.comm.size
+        return len(_rows(self.free[1])) * np.arange(self.comm.size + 1) // self.comm.size
 
     @property
     def place(self) -> slice:
@@ -290,7 +298,9 @@ def _is_only_continuous(knots: Array, degree: int) -> bool:
     return degree == 1 or bool(np.any(inner == degree))
 
 
-def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = None) -> TrialSpace:
+def trial_space(
+    volume: BSplineVolume, refine: int = 0, degree: int | None = None, dirichlet: Collection[str] = FACE_NAMES
+) -> TrialSpace:
     """Return the trial space of a volume: every span halved `refine` times, in a degree, by default the map's own.
 
     It is as smooth as the map at the map's own knots, and as its degree allows at the knots that halving adds.
@@ -312,7 +322,7 @@ def trial_space(volume: BSplineVolume, refine: int = 0, degree: int | None = Non
     rows = list(map(same_smoothness, volume.knots, volume.degrees, degrees))
     for _ in range(refine):
         rows = [insert_knots(row, p, midpoints(row))[0] for row, p in zip(rows, degrees, strict=True)]
-    return TrialSpace(degrees, (rows[0], rows[1], rows[2]))
+    return TrialSpace(degrees, (rows[0], rows[1], rows[2]), dirichlet)
 
 
 def embedded(coefficients: Array, degrees: tuple[int, int, int], knots: Knots, space: TrialSpace) -> Array:

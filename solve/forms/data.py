@@ -1,6 +1,6 @@
 """Data of a problem: formulas in x, y, z and X, Y, Z, functions or fields, checked at every point."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from parameterize.arrays import Array
-from parameterize.spline.volume import FACE_NAMES
 
 from ..field import SplineField
 from .frame import UnitFrame
@@ -154,13 +153,6 @@ def demand_definite(tensor: Array, name: str, x: Array) -> None:
     minor = xx * yy - xy * xy
     determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
     demand((xx > 0.0) & (minor > 0.0) & (determinant > 0.0), name, "positive definite", x)
-
-
-def check_faces(name: str, faces: Collection[str]) -> None:
-    """Raise ValueError for a name that is no face of the cube."""
-    for face in faces:
-        if face not in FACE_NAMES:
-            raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
 
 
 def _first(bad: NDArray[np.bool_], x: Array) -> str:

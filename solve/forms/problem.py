@@ -13,7 +13,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import SplineField
-from .data import Data, Datum, check_faces, demand, finite, parse
+from .data import Data, Datum, demand, finite, parse
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
 from .jets import Jet, Numbers, coordinates, known
@@ -50,10 +50,11 @@ class BoundaryValueProblem:
         for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
             if not isinstance(faces, Mapping):
                 raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
+            for face in faces:
+                if face not in FACE_NAMES:
+                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
         if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
             raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
-        check_faces(self.label("neumann"), neumann)
-        check_faces("robin", robin)
         if both := neumann.keys() & robin.keys():
             raise ValueError(f"face {min(both)} has both Neumann and Robin data; give one of them")
         on_faces = {f"neumann {face}": entry for face, entry in neumann.items()}

@@ -121,7 +121,7 @@ def fast_diagonalization(operator: Operator) -> FastDiagonalization:
     values, vectors = zip(*(eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
     spectrum = values[0][:, None, None] + values[1][space.columns, None] + values[2] + reaction
     scaling = _scaling(operator, slopes, masses, reaction)
-    whole = all(free == slice(0, n) for free, n in zip(operator.free, space.whole.shape, strict=True))
+    whole = all(free == slice(0, n) for free, n in zip(space.free, space.whole.shape, strict=True))
     singular = whole and reaction == 0.0 and not any(robin.values())
     if singular:
         spectrum[0, : int(space.columns.start == 0), 0] = np.inf
@@ -142,7 +142,7 @@ def _directional_matrices(
     averages = [float(w @ b) for w, b in zip(operator.rule.weights, across, strict=True)]
     averages[0] = operator.space.total(averages[0])
     slopes, masses = [], []
-    for axis, free in enumerate(operator.free):
+    for axis, free in enumerate(operator.space.free):
         mass = _gram(operator, axis, operator.rule.weights[axis] * across[axis], 0)
         slope = _gram(operator, axis, operator.rule.weights[axis] * along[axis], 1)
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
@@ -165,7 +165,7 @@ def _scaling(operator: Operator, slopes: list[Array], masses: list[Array], react
     wanted = operator.diagonal()
     operator.space.add(wanted)
     # A folded map has diagonal entries below zero; their size is all a scaling can use.
-    scaling: Array = np.sqrt(np.abs(diagonal / wanted[operator.window]))
+    scaling: Array = np.sqrt(np.abs(diagonal / wanted[operator.space.window]))
     return scaling
 
 
