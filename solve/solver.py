@@ -143,10 +143,10 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     problem, space = problem.on(volume), trial_space(volume, dirichlet=problem.dirichlet)
     if comm is not None:
         space = space.slab(comm)
-    assembled, _ = assemble_data(volume, problem, space, quadrature="gauss")
+    _, load, _ = assemble_data(volume, problem, space, quadrature="gauss")
     if len(problem.natural) == 6 and not problem.form.has_reaction:
-        space.add(assembled.load)
-        balanced(assembled.load[:, *space.window], space)
+        space.add(load)
+        balanced(load[:, *space.window], space)
     if problem.exact is not None:
         with agreed(space.comm):
             for _, _, x in map_planes(volume, gauss_rule(space)):

@@ -17,7 +17,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from .diagnostics import ConvergenceError, judge, solve_notices
 from .discretization.boundary import boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_estimate, error_norms, missing_mean
-from .discretization.operator import Assembled, FormOperator, Operator, assemble
+from .discretization.operator import FormOperator, Operator, assemble
 from .discretization.quadrature import rule_of
 from .discretization.space import TrialSpace, agreed, embedded, longest_edge
 from .field import Points, SplineField
@@ -115,7 +115,7 @@ class System:
     volume: BSplineVolume
     problem: BoundaryValueProblem
     space: TrialSpace
-    assembled: Assembled
+    matrix: Operator | FormOperator  # A, its products with all coefficients included
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
     right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
@@ -124,12 +124,12 @@ class System:
     @property
     def operator(self) -> LinearOperator:
         """A, Robin's terms included."""
-        return self._linear(self.assembled.operator.apply_free)
+        return self._linear(self.matrix.apply_free)
 
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
-        single = assemble(self.volume, self.space, MassForm(), threads=self.assembled.operator.threads).operator
+        single, _ = assemble(self.volume, self.space, MassForm(), threads=self.matrix.threads)
         return self._linear(single.apply_free)
 
     @property
@@ -214,12 +214,12 @@ class System:
         clock.append(time.process_time())
         errors = estimate = None
         if problem.exact is not None:
-            errors = error_norms(volume, space, full, problem.exact_at, self.assembled.operator.threads)
+            errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
         if options.estimate or (options.estimate is None and problem.exact is None):
             estimate = error_estimate(volume, space, full, problem)
         clock.append(time.process_time())
         doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
-        failed = solve_notices(volume, space, self.assembled, options.certified, result)
+        failed = solve_notices(volume, self.matrix, options.certified, result)
         report = SolveReport(
             elements=space.elements,
             dofs=dofs,
@@ -240,7 +240,7 @@ class System:
 
     def iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
-        operator, limits = self.assembled.operator, (options.tolerance, options.max_iterations)
+        operator, limits = self.matrix, (options.tolerance, options.max_iterations)
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
@@ -272,8 +272,7 @@ def build(
     """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space."""
     start = time.process_time()
     with one_blas_thread():
-        assembled, known = assemble_data(volume, problem, space, threads, quadrature)
-        operator = assembled.operator
+        operator, load, known = assemble_data(volume, problem, space, threads, quadrature)
         blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
         inverses = tuple(map(fast_diagonalization, blocks))
         if isinstance(operator, FormOperator) and inverses[0].singular:
@@ -281,12 +280,12 @@ def build(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
                 "solution open: give one face to boundary or robin"
             )
-        load = assembled.load - operator.apply(known)
+        load = load - operator.apply(known)
         space.add(load)
         right = np.ascontiguousarray(load[:, *space.window])
         right = balanced(right, space) if inverses[0].singular else right
         setup = time.process_time() - start
-    return System(volume, problem, space, assembled, known, inverses, right, setup)
+    return System(volume, problem, space, operator, known, inverses, right, setup)
 
 
 def assemble_data(
@@ -295,13 +294,13 @@ def assemble_data(
     space: TrialSpace,
     threads: int = 1,
     quadrature: str = "spline",
-) -> tuple[Assembled, Array]:
+) -> tuple[Operator | FormOperator, Array, Array]:
     """Return operator and load, the data on faces included, and the coefficients that are fixed."""
     form, couples = problem.form, False
     if isinstance(problem, Problem):
         samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
         couples = check_law(form, Points.of(samples, (SAMPLES, SAMPLES, SAMPLES)))
-    assembled = assemble(
+    operator, load = assemble(
         volume,
         space,
         form,
@@ -319,11 +318,10 @@ def assemble_data(
             alpha, data = problem.on_face(name, face.points, face.normal)
             if alpha is not None:
                 robin[name] = (face, alpha * face.measure)
-            for density, total in zip(data, assembled.load, strict=True):
+            for density, total in zip(data, load, strict=True):
                 total[face.layer] += face.integrate(density * face.measure)
     known = boundary_coefficients(volume, space.whole, problem.boundary_at, problem.dirichlet, form.components)
-    assembled = replace(assembled, operator=replace(assembled.operator, robin=robin))
-    return assembled, known[:, space.rows].copy()
+    return replace(operator, robin=robin), load, known[:, space.rows].copy()
 
 
 def balanced(load: Array, space: TrialSpace) -> Array:

@@ -18,7 +18,7 @@ DEVICES = ["cpu", pytest.param("cuda", marks=pytest.mark.skipif(not torch.cuda.i
 def build(degree, dirichlet=FACE_NAMES, reaction=None):
     volume = benchmark_volume(4, degree)
     space = trial_space(volume, refine=1)
-    operator = scalar_system(volume, space, reaction=reaction, dirichlet=dirichlet).operator
+    operator = scalar_system(volume, space, reaction=reaction, dirichlet=dirichlet)[0]
     return operator, fast_diagonalization(operator)
 
 

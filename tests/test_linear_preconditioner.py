@@ -14,7 +14,7 @@ from solve.study import benchmark_volume
 
 
 def build(volume, dirichlet=FACE_NAMES, reaction=None):
-    operator = scalar_system(volume, reaction=reaction, dirichlet=dirichlet).operator
+    operator = scalar_system(volume, reaction=reaction, dirichlet=dirichlet)[0]
     return operator, fast_diagonalization(operator)
 
 

@@ -46,13 +46,14 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    threads: of a product. robin: of the faces that have Robin's term, the rule and its weights, as far as this process
-    integrates.
+    threads: of a product. folded: at how many of the points of all processes det J < 0. robin: of the faces that have
+    Robin's term, the rule and its weights, as far as this process integrates.
     """
 
     space: TrialSpace
     rule: GaussRule
     threads: int
+    folded: int = field(default=0, kw_only=True)
     robin: Mapping[str, tuple[FaceRule, Array]] = field(default_factory=dict, kw_only=True)
 
     @cached_property
@@ -144,9 +145,13 @@ class FormOperator(MatrixFree):
     rows: Array | None
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
-        form, planes = self.form, self.rule.plane_shape
-        fields, gradient = np.empty((len(coefficients), 4, *planes)), np.empty((len(coefficients), 3, *planes))
-        for q, rows, measure, x in self._geometry(points):
+        form, shape = self.form, self.rule.plane_shape
+        fields, gradient = np.empty((len(coefficients), 4, *shape)), np.empty((len(coefficients), 3, *shape))
+        kept = self.rows
+        planes: Iterable[tuple[int, Array, Any, Any]] = geometry_planes(self.volume, self.rule, points)
+        if kept is not None:
+            planes = ((q, kept[q], None, None) for q in points)
+        for q, rows, measure, x in planes:
             for component, plane in zip(coefficients, fields, strict=True):
                 kernels.evaluate_plane(component, q, self.tables, plane)
             kernels.turn(rows, fields[:, 1:], gradient, False)
@@ -160,31 +165,12 @@ class FormOperator(MatrixFree):
             for plane, total in zip(fields, result, strict=True):
                 kernels.spread_plane(plane, q, self.tables, form.has_reaction, total)
 
-    def _geometry(self, points: IntArray) -> Iterable[tuple[int, Array, Array | None, Any]]:
-        """Return what `geometry_planes` yields, of a constant law q and R alone."""
-        if self.rows is not None:
-            return ((q, self.rows[q], None, None) for q in points)
-        return geometry_planes(self.volume, self.rule, points)
-
     def block(self, component: int) -> Operator:
         """Return the symmetric part of a component's diagonal block: the law of its own gradient and value."""
         law, rule = (self.volume, self.space, self.form), self.rule
-        block = assemble(*law, rule=rule, component=component, threads=self.threads).operator
+        block, _ = assemble(*law, rule=rule, component=component, threads=self.threads)
         assert isinstance(block, Operator)
         return replace(block, robin=self.robin)
-
-
-@dataclass(frozen=True, eq=False)
-class Assembled:
-    """Operator, load (c, n_u, n_v, n_w), and how many of the quadrature points have det J < 0.
-
-    Of a slab the load is that of the integrals over it; the numbers of points are those of all processes.
-    """
-
-    operator: Operator | FormOperator
-    load: Array
-    folded: int
-    points: int
 
 
 def assemble(
@@ -196,8 +182,8 @@ def assemble(
     *,
     component: int | None = 0,
     threads: int = 1,
-) -> Assembled:
-    """Return operator and load of a law on a volume.
+) -> tuple[Operator | FormOperator, Array]:
+    """Return operator and load (c, n_u, n_v, n_w) of a law on a volume; of a slab the load is what it integrates.
 
     source: takes the points (3, q_w, q_v) of a plane and returns (c, q_w, q_v); None for zero.
     component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
@@ -234,8 +220,10 @@ def assemble(
         elif form.constant:
             kept = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
         basis.on_planes(fill)
-    operator = FormOperator(*parts, volume, form, kept) if factors is None else Operator(*parts, factors)
-    return Assembled(operator, load, space.total(sum(folded)), space.total(int(np.prod(rule.shape))))
+    total = space.total(sum(folded))
+    if factors is None:
+        return FormOperator(*parts, volume, form, kept, folded=total), load
+    return Operator(*parts, factors, folded=total), load
 
 
 def add_integrals(
