@@ -149,7 +149,7 @@ class System:
     def _filled(self, free: Array) -> Array:
         """Return the coefficients (c, n_u, n_v, n_w), those that are fixed included."""
         full = self.known.copy()
-        full[self.window] = free
+        full[:, *self.space.window] = free
         self.space.fill(full)
         return full
 
@@ -159,7 +159,8 @@ class System:
         Raises ValueError for any other field.
         """
         full = embedded(field.coefficients, field.degrees, field.knots, self.space)
-        return (full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))[self.window].ravel()
+        full = full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0)
+        return full[:, *self.space.window].ravel()
 
     def _spline(self, full: Array) -> SplineField:
         """Return the spline of coefficients (c, n_u, n_v, n_w), those of all processes together."""
@@ -167,11 +168,6 @@ class System:
         whole = self.space.gather(full[:, : own.stop - own.start])
         coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
-
-    @property
-    def window(self) -> tuple[slice, ...]:
-        """The free coefficients in an array (c, n_u, n_v, n_w)."""
-        return (slice(None), *self.space.window)
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
