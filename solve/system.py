@@ -140,7 +140,7 @@ class System:
     @property
     def preconditioner(self) -> LinearOperator:
         """An approximation of the inverse of A; symmetric, and positive unless the solution's constant is open."""
-        return self._linear(self.precondition)
+        return self._linear(self._precondition)
 
     def field(self, x: Array) -> SplineField:
         """Return the spline of the free coefficients x (N,) and of those that are fixed."""
@@ -169,7 +169,7 @@ class System:
         coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
 
-    def precondition(self, residual: Array) -> Array:
+    def _precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
         return np.stack([block(part) for block, part in zip(self.blocks, residual, strict=True)])
 
@@ -201,7 +201,7 @@ class System:
         volume, problem, space = self.volume, self.problem, self.space
         dofs = len(self.known) * space.dofs
         clock, sent = [time.process_time()], space.traffic()
-        result = self.iterate(options)
+        result = self._iterate(options)
         steps = result.iterations + (options.start is not None)  # products made
         traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in space.traffic().items() if steps}
         full = self._filled(result.x)
@@ -234,7 +234,7 @@ class System:
         field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
 
-    def iterate(self, options: SolverOptions) -> LinearResult:
+    def _iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
         operator, limits = self.matrix, (options.tolerance, options.max_iterations)
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
@@ -244,14 +244,14 @@ class System:
             assert isinstance(operator, Operator)
             return solve_on_device(operator, self.blocks[0], self.right, *limits, options.device, guess)
         if self.problem.form.symmetric:
-            system = operator.apply_free, self.right, self.precondition
+            system = operator.apply_free, self.right, self._precondition
             return conjugate_gradients(*system, *limits, guess, self.space.total)
         # the vectors of GMRES are whole on every process, products and preconditioner are shared
         gather, own = self.space.gather, (ALL, self.space.place)
         found = generalized_residuals(
             lambda x: gather(operator.apply_free(x[own])),
             gather(self.right),
-            lambda x: gather(self.precondition(x[own])),
+            lambda x: gather(self._precondition(x[own])),
             *limits,
             None if guess is None else gather(guess),
         )

@@ -12,7 +12,6 @@ from parameterize.arrays import Array
 
 from ..field import SplineField
 from .frame import UnitFrame
-from .jets import Jet
 from .parser import Expression, ExpressionError
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
@@ -73,11 +72,6 @@ class Datum:
                 raise ValueError(message) from None
             parts.append(finite(self.name, found, x, entry))
         return np.stack(parts).reshape(self.components, *x.shape[1:])
-
-    def jets(self, x: Sequence[Jet]) -> list[Jet]:
-        """Return the jets of its entries, which are formulas, from those of x, y, z."""
-        assert self.is_formula
-        return [entry.jet(x) for entry in self.formulas]
 
 
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:

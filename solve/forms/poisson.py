@@ -143,5 +143,5 @@ def _coefficient(datum: Datum, x: Any) -> Any:
     if x.dtype != object:
         return datum(x)
     if datum.is_formula:
-        return datum.jets(list(x))
+        return [formula.jet(list(x)) for formula in datum.formulas]
     return [Jet(value, (np.nan,) * 3, ()) for value in datum(np.stack(np.broadcast_arrays(*(jet.value for jet in x))))]

@@ -150,7 +150,7 @@ class BoundaryValueProblem:
         return max(float(np.abs(t).max()) for row in strong_terms(self.form, self._exact_jets(x), x) for t in row)
 
     def _exact_jets(self, x: Array, hessian: Numbers = (0.0,) * 6) -> list[Jet]:
-        return self.data["exact"].jets(coordinates(np.asarray(x), hessian))
+        return [formula.jet(coordinates(np.asarray(x), hessian)) for formula in self.exact_formulas]
 
     def boundary_at(self, x: Array) -> Array:
         """Return the values of u (c, ...) given on the boundary: those of `exact` or zero where none are given."""
