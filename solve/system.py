@@ -30,7 +30,6 @@ from .solution import Solution, SolveReport
 
 DEVICES = ("cpu", "cuda")
 SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
-ALL = slice(None)
 
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
@@ -79,18 +78,14 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
         check_available(device)
 
 
-class MassForm(Form):
+class _Mass(Form):
     """The law of the mass matrix: int u . v."""
 
-    has_reaction = True
-
     def tensor(self, x: Array, component: int = 0) -> Array:
-        """Return zeros."""
         return np.zeros((6, *x.shape[1:]))
 
-    def mass(self, x: Array, component: int = 0) -> Array:
-        """Return ones."""
-        return np.ones(x.shape[1:])
+    def react(self, u: Any, grad: Any, x: Any) -> Any:
+        return u
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +124,7 @@ class System:
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
-        single, _ = assemble(self.volume, self.space, MassForm(), threads=self.matrix.threads)
+        single, _ = assemble(self.volume, self.space, _Mass(), threads=self.matrix.threads)
         return self._linear(single.apply_free)
 
     @property
@@ -247,7 +242,7 @@ class System:
             system = operator.apply_free, self.right, self._precondition
             return conjugate_gradients(*system, *limits, guess, self.space.total)
         # the vectors of GMRES are whole on every process, products and preconditioner are shared
-        gather, own = self.space.gather, (ALL, self.space.place)
+        gather, own = self.space.gather, (slice(None), self.space.place)
         found = generalized_residuals(
             lambda x: gather(operator.apply_free(x[own])),
             gather(self.right),
@@ -313,9 +308,9 @@ def assemble_data(
             face = face_rule(volume, space, name)
             alpha, data = problem.on_face(name, face.points, face.normal)
             if alpha is not None:
-                robin[name] = (face, alpha * face.measure)
+                robin[name] = replace(face, measure=alpha * face.measure)
             for density, total in zip(data, load, strict=True):
-                total[face.layer] += face.integrate(density * face.measure)
+                total[face.layer] += face.integrate(density)
     known = boundary_coefficients(volume, space.whole, problem.boundary_at, problem.dirichlet, form.components)
     return replace(operator, robin=robin), load, known[:, space.rows].copy()
 

@@ -67,7 +67,7 @@ class FaceRule:
     """Gauss points on the image of one face, degree + 1 a span and direction, and the trial functions there.
 
     points, normal: (3, q_b, q_c) in space, the normal outward and of unit length. measure: (q_b, q_c), surface element
-    times weight. bases: (q_b, n_b) and (q_c, n_c), of the two directions that run along the face.
+    times weight, for Robin's term times alpha. bases: (q_b, n_b) and (q_c, n_c), of the two directions along the face.
     layer: the face's coefficients in an array (n_u, n_v, n_w).
     """
 
@@ -78,21 +78,18 @@ class FaceRule:
     layer: tuple[int | slice, ...]
 
     def integrate(self, density: Array) -> Array:
-        """Return integrals (n_b, n_c) of a density (q_b, q_c), weights included, times each trial function."""
-        return self.bases[0].T @ density @ self.bases[1]
+        """Return integrals (n_b, n_c) of a density (q_b, q_c) times each trial function."""
+        return self.bases[0].T @ (density * self.measure) @ self.bases[1]
 
-    def add_mass(self, weights: Array, coefficients: Array, result: Array) -> None:
-        """Add Robin's term, the integral of alpha u v, of coefficients (n_u, n_v, n_w) to `result` of the same shape.
-
-        weights: (q_b, q_c), alpha times `measure`.
-        """
+    def add_mass(self, coefficients: Array, result: Array) -> None:
+        """Add Robin's term, the integral of alpha u v, of coefficients (n_u, n_v, n_w) to `result`, shaped alike."""
         values = self.bases[0] @ coefficients[self.layer] @ self.bases[1].T
-        result[self.layer] += self.integrate(weights * values)
+        result[self.layer] += self.integrate(values)
 
-    def add_mass_diagonal(self, weights: Array, diagonal: Array) -> None:
+    def add_mass_diagonal(self, diagonal: Array) -> None:
         """Add the diagonal of Robin's term to an array (n_u, n_v, n_w)."""
         b, c = (basis.power(2) for basis in self.bases)
-        diagonal[self.layer] += b.T @ weights @ c
+        diagonal[self.layer] += b.T @ self.measure @ c
 
 
 def has_face(space: TrialSpace, name: str) -> bool:

@@ -46,15 +46,15 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    threads: of a product. folded: at how many of the points of all processes det J < 0. robin: of the faces that have
-    Robin's term, the rule and its weights, as far as this process integrates.
+    threads: of a product. folded: at how many of the points of all processes det J < 0. robin: the rules of the faces
+    that have Robin's term, as far as this process integrates.
     """
 
     space: TrialSpace
     rule: GaussRule
     threads: int
     folded: int = field(default=0, kw_only=True)
-    robin: Mapping[str, tuple[FaceRule, Array]] = field(default_factory=dict, kw_only=True)
+    robin: Mapping[str, FaceRule] = field(default_factory=dict, kw_only=True)
 
     @cached_property
     def tables(self) -> kernels.Tables:
@@ -71,9 +71,9 @@ class MatrixFree:
         source = np.ascontiguousarray(coefficients).reshape(math.prod(coefficients.shape[:-3]), *self.space.shape)
         result = np.zeros_like(source)
         self.on_planes(lambda points: self._multiply(points, source, result))
-        for face, weights in self.robin.values():
+        for face in self.robin.values():
             for component, total in zip(source, result, strict=True):
-                face.add_mass(weights, component, total)
+                face.add_mass(component, total)
         return result.reshape(coefficients.shape)
 
     def apply_free(self, free: Array) -> Array:
@@ -121,8 +121,8 @@ class Operator(MatrixFree):
 
         self.on_planes(add)
         on_faces = np.zeros(self.space.shape)
-        for face, weights in self.robin.values():
-            face.add_mass_diagonal(weights, on_faces)
+        for face in self.robin.values():
+            face.add_mass_diagonal(on_faces)
         return result + on_faces
 
     def dense(self, axis: int, derivative: int) -> Array:

@@ -113,7 +113,7 @@ def fast_diagonalization(operator: Operator) -> FastDiagonalization:
     All processes that share the space call it.
     """
     space = operator.space
-    here = {name: float(weights.sum()) for name, (_, weights) in operator.robin.items()}
+    here = {name: float(face.measure.sum()) for name, face in operator.robin.items()}
     robin = {name: float(space.total(here.get(name, 0.0))) for name in FACE_NAMES}
     slopes, masses, averages = _directional_matrices(operator, robin)
     mean_mass = float(space.total(sum(plane[6:].sum() for plane in operator.factors)))  # of c |det J|, over the cube
