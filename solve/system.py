@@ -303,7 +303,7 @@ def assemble_data(
     robin = {}
     with agreed(space.comm):
         for name in FACE_NAMES:
-            if name in problem.dirichlet or not has_face(space, name):
+            if name in space.dirichlet or not has_face(space, name):
                 continue
             face = face_rule(volume, space, name)
             alpha, data = problem.on_face(name, face.points, face.normal)
@@ -311,7 +311,7 @@ def assemble_data(
                 robin[name] = replace(face, measure=alpha * face.measure)
             for density, total in zip(data, load, strict=True):
                 total[face.layer] += face.integrate(density)
-    known = boundary_coefficients(volume, space.whole, problem.boundary_at, problem.dirichlet, form.components)
+    known = boundary_coefficients(volume, space.whole, problem.boundary_at, form.components)
     return replace(operator, robin=robin), load, known[:, space.rows].copy()
 
 

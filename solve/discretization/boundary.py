@@ -1,6 +1,6 @@
 """Data on the images of the cube's faces: Dirichlet's values projected, Neumann's load and Robin's term integrated."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
@@ -20,13 +20,9 @@ FREE = None
 
 
 def boundary_coefficients(
-    volume: BSplineVolume,
-    space: TrialSpace,
-    values: Callable[[Array], Array],
-    faces: Collection[str] = FACE_NAMES,
-    components: int = 1,
+    volume: BSplineVolume, space: TrialSpace, values: Callable[[Array], Array], components: int = 1
 ) -> Array:
-    """Return coefficients (c, n_u, n_v, n_w) of an approximation of boundary data on the named faces, zero elsewhere.
+    """Return coefficients (c, n_u, n_v, n_w) of an approximation of Dirichlet data on their faces, zero elsewhere.
 
     values: takes points (3, ...) and returns (c, ...), one row for each of the components. Corners are interpolated,
     then edges and faces projected in L2, in the parametric measure; each takes up what the smaller ones have fixed.
@@ -34,7 +30,9 @@ def boundary_coefficients(
     coefficients = np.zeros((components, *space.shape))
     points, bases, projections = zip(*map(_projection, space.knots, space.degrees), strict=True)
     for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
-        if not any(FACE_NAMES[2 * axis + side] in faces for axis, side in enumerate(entity) if side is not FREE):
+        if not any(
+            FACE_NAMES[2 * axis + side] in space.dirichlet for axis, side in enumerate(entity) if side is not FREE
+        ):
             continue
         free = [a for a in range(3) if entity[a] is FREE]
         u, v, w = (points[a] if side is FREE else np.array([float(side)]) for a, side in enumerate(entity))

@@ -121,8 +121,7 @@ def fast_diagonalization(operator: Operator) -> FastDiagonalization:
     values, vectors = zip(*(eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
     spectrum = values[0][:, None, None] + values[1][space.columns, None] + values[2] + reaction
     scaling = _scaling(operator, slopes, masses, reaction)
-    whole = all(free == slice(0, n) for free, n in zip(space.free, space.whole.shape, strict=True))
-    singular = whole and reaction == 0.0 and not any(robin.values())
+    singular = not space.dirichlet and reaction == 0.0 and not any(robin.values())
     if singular:
         spectrum[0, : int(space.columns.start == 0), 0] = np.inf
     u, v, w = vectors
@@ -165,8 +164,7 @@ def _scaling(operator: Operator, slopes: list[Array], masses: list[Array], react
     wanted = operator.diagonal()
     operator.space.add(wanted)
     # A folded map has diagonal entries below zero; their size is all a scaling can use.
-    scaling: Array = np.sqrt(np.abs(diagonal / wanted[operator.space.window]))
-    return scaling
+    return np.asarray(np.sqrt(np.abs(diagonal / wanted[operator.space.window])))
 
 
 def _separable_coefficients(operator: Operator) -> tuple[list[Array], list[Array]]:
