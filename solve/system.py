@@ -271,7 +271,7 @@ def build(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
                 "solution open: give one face to boundary or robin"
             )
-        load = load - operator.apply(known)
+        load -= operator.apply(known)
         space.add(load)
         right = np.ascontiguousarray(load[:, *space.window])
         right = balanced(right, space) if inverses[0].singular else right
