@@ -17,37 +17,23 @@ The formulas stand in docs/solver.md.
 True
 """
 
-from .diagnostics import ConvergenceError
-from .field import SplineField
-from .forms.elasticity import Elasticity
-from .forms.form import Form
-from .forms.parser import Expression, ExpressionError
-from .forms.poisson import Poisson
-from .forms.problem import Problem
-from .solution import Solution, SolveReport
-from .solver import check_problem, discretize, solve_problem
-from .study import Convergence, ConvergenceRow, benchmark_volume, convergence, rates
-from .system import System, check_device
-
-__all__ = [
-    "Convergence",
-    "ConvergenceError",
-    "ConvergenceRow",
-    "Elasticity",
-    "Expression",
-    "ExpressionError",
-    "Form",
-    "Poisson",
-    "Problem",
-    "Solution",
-    "SolveReport",
-    "SplineField",
-    "System",
-    "benchmark_volume",
-    "check_device",
-    "check_problem",
-    "convergence",
-    "discretize",
-    "rates",
-    "solve_problem",
-]
+from .diagnostics import ConvergenceError as ConvergenceError
+from .field import SplineField as SplineField
+from .forms.elasticity import Elasticity as Elasticity
+from .forms.form import Form as Form
+from .forms.parser import Expression as Expression
+from .forms.parser import ExpressionError as ExpressionError
+from .forms.poisson import Poisson as Poisson
+from .forms.problem import Problem as Problem
+from .solution import Solution as Solution
+from .solution import SolveReport as SolveReport
+from .solver import check_problem as check_problem
+from .solver import discretize as discretize
+from .solver import solve_problem as solve_problem
+from .study import Convergence as Convergence
+from .study import ConvergenceRow as ConvergenceRow
+from .study import benchmark_volume as benchmark_volume
+from .study import convergence as convergence
+from .study import rates as rates
+from .system import System as System
+from .system import check_device as check_device

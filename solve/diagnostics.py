@@ -9,9 +9,8 @@ from parameterize.quality.quality import scaled_jacobian
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .discretization.errors import Errors
-from .discretization.operator import Assembled
-from .discretization.planes import map_planes
-from .discretization.quadrature import gauss_rule
+from .discretization.operator import MatrixFree
+from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.space import TrialSpace
 from .field import Points
 from .forms.data import in_scaled
@@ -147,7 +146,7 @@ def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list
     found = []
     if not problem.exact_formulas:
         return []
-    if not problem.knows("source"):
+    if "source" not in problem.data:
         if any("abs" in formula.text for formula in problem.exact_formulas):
             found.append(
                 "exact contains abs: where its argument changes sign, u has a kink that the source derived from it "
@@ -158,7 +157,7 @@ def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list
         # rounding is measured by the terms of the law, which may cancel in the source
         if not _agree(problem.source_at(x), lambda: (problem.source_of_exact(x), problem.size_of_exact(x))):
             found.append(f"{problem.label('source')} is not that of exact: {TWO_PROBLEMS}")
-    if problem.knows("boundary") and not all(_values_fit(volume, problem, face) for face in problem.dirichlet):
+    if "boundary" in problem.data and not all(_values_fit(volume, problem, face) for face in problem.dirichlet):
         found.append(f"{problem.label('boundary')} differs from exact: {TWO_PROBLEMS}")
     return found
 
@@ -178,24 +177,21 @@ def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:
     return bool(np.abs(given - derived).max() <= AGREEMENT * size)
 
 
-def solve_notices(
-    volume: BSplineVolume, space: TrialSpace, assembled: Assembled, certified: str | None, result: LinearResult
-) -> list[str]:
+def solve_notices(volume: BSplineVolume, matrix: MatrixFree, certified: str | None, result: LinearResult) -> list[str]:
     """Return what is to be said of map and linear solver; the last line is that of a solver that did not converge."""
     notices = []
     if certified not in (None, "certified"):
         notices.append(f"the map is {certified}, not certified: do not trust the solution")
-    if assembled.folded:
-        notices.append(
-            f"det J < 0 at {assembled.folded} of {assembled.points} Gauss points: solved with |det J| instead"
-        )
+    if matrix.folded:
+        points = matrix.space.total(int(np.prod(matrix.rule.shape)))
+        notices.append(f"det J < 0 at {matrix.folded} of {points} Gauss points: solved with |det J| instead")
     if result.indefinite:
         notices.append(
             f"no convergence: after {result.iterations} iterations the matrix turned out not to be positive definite, "
             "as with a negative reaction; in a law of one's own, set `symmetric = False`, and GMRES solves it"
         )
     elif not result.converged:
-        parameters, point, scaled = worst_place(volume, space)
+        parameters, point, scaled = worst_place(volume, matrix.space)
         cube, where = (
             ", ".join(f"{axis}={value:.4g}" for axis, value in zip(axes, place, strict=True))
             for axes, place in ((AXES, parameters), ("xyz", point))

@@ -11,17 +11,13 @@ from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import default_threads
 
-from .discretization.operator import free_window
-from .discretization.planes import map_planes
-from .discretization.quadrature import gauss_rule
-from .discretization.slab import Slab
-from .discretization.space import trial_space
+from .discretization.quadrature import gauss_rule, map_planes
+from .discretization.space import agreed, trial_space
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
-from .options import SolverOptions, SpaceOptions
 from .solution import Solution
-from .system import System, assemble_data, balanced, build, check_device
+from .system import SolverOptions, System, assemble_data, balanced, build, check_device
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +43,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     threads : int, optional
         The result is the same for any number. Default: NUMBA_NUM_THREADS, OMP_NUM_THREADS, or the cores at hand.
     quadrature : str
-        "spline", "gauss" or "gauss+1" (`solve.options.SpaceOptions`).
+        Of the operator: "spline", Gauss rules of the spline space, as many points as the map and the law need; "gauss",
+        `degree` Gauss points a span; "gauss+1", one more. Errors have degree + 2 points a span in any case.
     comm : mpi4py.MPI.Comm, optional
         Its processes share the work, a thread each by default, and each returns the whole solution.
     tolerance : float
@@ -59,7 +56,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     device : str
         "cpu", or "cuda" for the iteration on a GPU (Poisson's equation without Robin faces).
     start : SplineField, optional
-        A solution in a space that this one contains, where the iteration starts.
+        A solution in a space that this one contains, as that of one refinement less: the iteration starts there instead
+        of at zero, and saves a third on maps that take many.
     estimate : bool, optional
         Of the error from the residual; by default where the problem has no exact solution.
     strict : bool
@@ -87,34 +85,31 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     >>> solution.report.dofs, solution.report.l2_relative < 1e-3
     (343, True)
     """
-    of_space = {field.name for field in fields(SpaceOptions)} & how.keys()
-    of_solver = {name: value for name, value in how.items() if name not in of_space}
-    options = SolverOptions(**of_solver)
-    _check_types(volume, problem)
-    check_device(options.device, problem)
-    return discretize(volume, problem, **{name: how[name] for name in of_space}).solve(**of_solver)
+    of_solver = {field.name: how.pop(field.name) for field in fields(SolverOptions) if field.name in how}
+    check_device(SolverOptions(**of_solver).device, problem)
+    return discretize(volume, problem, **how).solve(**of_solver)
 
 
-def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> System:
+def discretize(
+    volume: BSplineVolume,
+    problem: Poisson | Elasticity | Problem,
+    *,
+    refine: int = 0,
+    degree: int | None = None,
+    threads: int | None = None,
+    quadrature: str = "spline",
+    comm: Any = None,
+) -> System:
     """Return the linear system of a problem, for loops of one's own.
 
     Parameters
     ----------
-    volume : BSplineVolume
-        The map.
-    problem : Poisson, Elasticity or Problem
-        The law and its data.
-    **how
-        refine, degree, threads, quadrature and comm, as in `iga_nn.solve`.
+    volume, problem, refine, degree, threads, quadrature, comm
+        As in `iga_nn.solve`, whose errors are raised.
 
     Returns
     -------
     System
-
-    Raises
-    ------
-    ValueError, ExpressionError, TypeError
-        What `iga_nn.solve` raises.
 
     Examples
     --------
@@ -124,17 +119,19 @@ def discretize(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, *
     >>> system.operator.shape, system.load.shape
     ((125, 125), (125,))
     """
-    options = SpaceOptions(**how)
-    _check_types(volume, problem)
-    placed, space = problem.on(volume), trial_space(volume, options.refine, options.degree)
-    free = free_window(space, placed.dirichlet)
-    if any(part.stop <= part.start for part in free):
+    if not isinstance(volume, BSplineVolume):
+        raise TypeError(f"volume must be a BSplineVolume, got {type(volume).__name__}")
+    if not isinstance(problem, BoundaryValueProblem):
+        raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be at least 1, got {threads}; leave it out for {default_threads()}")
+    placed, space = problem.on(volume), trial_space(volume, refine, degree, problem.dirichlet)
+    if any(part.stop <= part.start for part in space.free):
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
-    _warm_up(volume.degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
-    if options.comm is not None:
-        space = Slab.of(space, options.comm, free)
-    threads = options.threads or (default_threads() if options.comm is None else 1)
-    return build(volume, placed, space, threads, options.quadrature)
+    _warm_up(volume.degrees, degree, placed.form.components == 1 and placed.form.symmetric)
+    if comm is not None:
+        space = space.slab(comm)
+    return build(volume, placed, space, threads or (default_threads() if comm is None else 1), quadrature)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
@@ -143,24 +140,17 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     comm: a communicator of mpi4py whose processes share the work.
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
-    problem, space = problem.on(volume), trial_space(volume)
+    problem, space = problem.on(volume), trial_space(volume, dirichlet=problem.dirichlet)
     if comm is not None:
-        space = Slab.of(space, comm, free_window(space, problem.dirichlet))
-    assembled, _, _ = assemble_data(volume, problem, space, quadrature="gauss")
+        space = space.slab(comm)
+    _, load, _ = assemble_data(volume, problem, space, quadrature="gauss")
     if len(problem.natural) == 6 and not problem.form.has_reaction:
-        space.add(assembled.load)
-        balanced(assembled.load[:, *assembled.operator.window], space)
+        space.add(load)
+        balanced(load[:, *space.window], space)
     if problem.exact is not None:
-        with space.agreed():
+        with agreed(space.comm):
             for _, _, x in map_planes(volume, gauss_rule(space)):
                 problem.exact_at(x)
-
-
-def _check_types(volume: object, problem: object) -> None:
-    if not isinstance(volume, BSplineVolume):
-        raise TypeError(f"volume must be a BSplineVolume, got {type(volume).__name__}")
-    if not isinstance(problem, BoundaryValueProblem):
-        raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
 
 
 @functools.cache

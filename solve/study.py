@@ -74,16 +74,10 @@ def convergence(
 
     Parameters
     ----------
-    volume : BSplineVolume
-        The map.
-    problem : Poisson, Elasticity or Problem
-        The law and its data.
+    volume, problem, degree, certified
+        As in `iga_nn.solve`, whose errors are raised.
     refine : iterable of int
         Levels; level n halves every span n times.
-    degree : int, optional
-        Of the trial space; the map's own by default.
-    certified : str, optional
-        The verdict of the map's certificate, if known.
     tolerance : float
         Of the linear solver; a degree of 5 needs less than its default to show its rate.
 
@@ -91,11 +85,6 @@ def convergence(
     -------
     Convergence
         A list of ConvergenceRow, one a level.
-
-    Raises
-    ------
-    ValueError, TypeError
-        What `solve` raises.
 
     Examples
     --------

@@ -1,42 +1,67 @@
 """System: the linear system of a problem on a volume, to be solved here or in a loop of one's own."""
 
+import functools
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
+from threadpoolctl import ThreadpoolController
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .diagnostics import ConvergenceError, judge, solve_notices
-from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
+from .discretization.boundary import boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_estimate, error_norms, missing_mean
-from .discretization.operator import Assembled, FormOperator, Operator, assemble, free_window
-from .discretization.planes import rule_of
-from .discretization.space import TrialSpace, embedded, longest_edge
+from .discretization.operator import FormOperator, Operator, assemble
+from .discretization.quadrature import rule_of
+from .discretization.space import TrialSpace, agreed, embedded, longest_edge
 from .field import Points, SplineField
 from .forms.form import Form, check_law
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
-from .options import SolverOptions
 from .solution import Solution, SolveReport
-from .threads import one_blas_thread
 
 DEVICES = ("cpu", "cuda")
 SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
-ALL = slice(None)
-Robin = Mapping[str, tuple[FaceRule, Array]]
 
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
 log = logging.getLogger(__name__)
+_controller = functools.cache(ThreadpoolController)  # looks for the libraries at its first use, when they are loaded
+
+
+def one_blas_thread() -> Any:
+    """Context in which each matrix product stays in the thread that calls it: the threads are ours to share out."""
+    return _controller().limit(limits=1, user_api="blas")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolverOptions:
+    """Hold what the linear solver is told: keywords of `iga_nn.solve`, which describes them.
+
+    Raises ValueError where a tolerance or a number of iterations is out of range.
+    """
+
+    tolerance: float = 1e-10
+    max_iterations: int = 1000
+    certified: str | None = None
+    device: str = "cpu"
+    start: SplineField | None = None
+    estimate: bool | None = None
+    strict: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < 1.0:
+            raise ValueError(f"tolerance must lie between 0 and 1, got {self.tolerance}")
+        if self.max_iterations < 1:
+            raise ValueError(f"max_iterations must be at least 1, got {self.max_iterations}")
 
 
 def check_device(device: str, problem: BoundaryValueProblem) -> None:
@@ -53,18 +78,14 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
         check_available(device)
 
 
-class MassForm(Form):
+class _Mass(Form):
     """The law of the mass matrix: int u . v."""
 
-    has_reaction = True
-
     def tensor(self, x: Array, component: int = 0) -> Array:
-        """Return zeros."""
         return np.zeros((6, *x.shape[1:]))
 
-    def mass(self, x: Array, component: int = 0) -> Array:
-        """Return ones."""
-        return np.ones(x.shape[1:])
+    def react(self, u: Any, grad: Any, x: Any) -> Any:
+        return u
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,25 +110,22 @@ class System:
     volume: BSplineVolume
     problem: BoundaryValueProblem
     space: TrialSpace
-    assembled: Assembled
-    robin: Robin  # face name -> its rule, and the weights of Robin's term
+    matrix: Operator | FormOperator  # A, its products with all coefficients included
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
     right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
-    threads: int
     setup: float  # process seconds
 
     @property
     def operator(self) -> LinearOperator:
         """A, Robin's terms included."""
-        return self._linear(self.multiply)
+        return self._linear(self.matrix.apply_free)
 
-    @cached_property
+    @functools.cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
-        window = self.assembled.operator.free
-        single = assemble(self.volume, self.space, MassForm(), window=window, threads=self.threads).operator
-        return self._linear(lambda free: np.stack([single.apply_free(component) for component in free]))
+        single, _ = assemble(self.volume, self.space, _Mass(), threads=self.matrix.threads)
+        return self._linear(single.apply_free)
 
     @property
     def load(self) -> Array:
@@ -117,22 +135,18 @@ class System:
     @property
     def preconditioner(self) -> LinearOperator:
         """An approximation of the inverse of A; symmetric, and positive unless the solution's constant is open."""
-        return self._linear(self.precondition)
+        return self._linear(self._precondition)
 
     def field(self, x: Array) -> SplineField:
         """Return the spline of the free coefficients x (N,) and of those that are fixed."""
-        return self._spline(self._whole(self._filled(np.reshape(x, self.right.shape))))
+        return self._spline(self._filled(np.reshape(x, self.right.shape)))
 
     def _filled(self, free: Array) -> Array:
         """Return the coefficients (c, n_u, n_v, n_w), those that are fixed included."""
         full = self.known.copy()
-        full[self.window] = free
+        full[:, *self.space.window] = free
         self.space.fill(full)
         return full
-
-    def _whole(self, full: Array) -> Array:
-        """Return the coefficients of all processes."""
-        return self.space.gather(full[:, *self.space.own((slice(0, self.space.whole.shape[0]), ALL, ALL))])
 
     def vector(self, field: SplineField) -> Array:
         """Return the free coefficients (N,) of a field of this space, or of one that it contains.
@@ -140,22 +154,17 @@ class System:
         Raises ValueError for any other field.
         """
         full = embedded(field.coefficients, field.degrees, field.knots, self.space)
-        return (full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))[self.window].ravel()
+        full = full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0)
+        return full[:, *self.space.window].ravel()
 
     def _spline(self, full: Array) -> SplineField:
-        coefficients = full[0] if len(full) == 1 else np.moveaxis(full, 0, -1)
+        """Return the spline of coefficients (c, n_u, n_v, n_w), those of all processes together."""
+        own = self.space.owned[self.space.comm.rank]
+        whole = self.space.gather(full[:, : own.stop - own.start])
+        coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
 
-    @property
-    def window(self) -> tuple[slice, ...]:
-        """The free coefficients in an array (c, n_u, n_v, n_w)."""
-        return (slice(None), *self.assembled.operator.window)
-
-    def multiply(self, free: Array) -> Array:
-        """Return A times the free coefficients (c, m_u, m_v, m_w)."""
-        return self.assembled.operator.restricted(partial(_product, self.assembled, self.robin), free)
-
-    def precondition(self, residual: Array) -> Array:
+    def _precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
         return np.stack([block(part) for block, part in zip(self.blocks, residual, strict=True)])
 
@@ -169,7 +178,7 @@ class System:
         return LinearOperator((size, size), matvec=product, dtype=np.float64, **adjoint)
 
     def solve(self, **how: Any) -> Solution:
-        """Solve, and return the solution with its errors and notices. how: the fields of `SolverOptions`.
+        """Solve, and return the solution with its errors and notices. how: tolerance to strict, as in `iga_nn.solve`.
 
         Raises ConvergenceError where the linear solver fails and `strict` is asked for.
         """
@@ -177,7 +186,7 @@ class System:
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
-        for notice in solution.report.notices if self.space.rank == 0 else ():
+        for notice in solution.report.notices if self.space.comm.rank == 0 else ():
             log.warning("%s", notice)
         if options.strict and not solution.report.converged:
             raise ConvergenceError(solution)
@@ -187,7 +196,7 @@ class System:
         volume, problem, space = self.volume, self.problem, self.space
         dofs = len(self.known) * space.dofs
         clock, sent = [time.process_time()], space.traffic()
-        result = self.iterate(options)
+        result = self._iterate(options)
         steps = result.iterations + (options.start is not None)  # products made
         traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in space.traffic().items() if steps}
         full = self._filled(result.x)
@@ -196,12 +205,12 @@ class System:
         clock.append(time.process_time())
         errors = estimate = None
         if problem.exact is not None:
-            errors = error_norms(volume, space, full, problem.exact_at, self.threads)
+            errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
         if options.estimate or (options.estimate is None and problem.exact is None):
             estimate = error_estimate(volume, space, full, problem)
         clock.append(time.process_time())
         doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
-        failed = solve_notices(volume, space, self.assembled, options.certified, result)
+        failed = solve_notices(volume, self.matrix, options.certified, result)
         report = SolveReport(
             elements=space.elements,
             dofs=dofs,
@@ -217,33 +226,30 @@ class System:
             residuals=result.residuals,
             traffic=traffic,
         )
-        field = self._spline(self._whole(full))
+        field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
 
-    def iterate(self, options: SolverOptions) -> LinearResult:
+    def _iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
-        limits = options.tolerance, options.max_iterations
+        operator, limits = self.matrix, (options.tolerance, options.max_iterations)
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
-            assert isinstance(self.assembled.operator, Operator)
-            return solve_on_device(self.assembled.operator, self.blocks[0], self.right, *limits, options.device, guess)
-        system = self.multiply, self.right, self.precondition
+            assert isinstance(operator, Operator)
+            return solve_on_device(operator, self.blocks[0], self.right, *limits, options.device, guess)
         if self.problem.form.symmetric:
+            system = operator.apply_free, self.right, self._precondition
             return conjugate_gradients(*system, *limits, guess, self.space.total)
-        return self._on_whole_vectors(*limits, guess)
-
-    def _on_whole_vectors(self, tolerance: float, max_iterations: int, guess: Array | None) -> LinearResult:
-        """Return what GMRES finds: its vectors are whole on every process, products and preconditioner are shared."""
+        # the vectors of GMRES are whole on every process, products and preconditioner are shared
         gather, own = self.space.gather, (slice(None), self.space.place)
-
-        def on_whole(apply: Callable[[Array], Array]) -> Callable[[Array], Array]:
-            return lambda x: gather(apply(x[own]))
-
-        start = None if guess is None else gather(guess)
-        multiply, precondition = on_whole(self.multiply), on_whole(self.precondition)
-        found = generalized_residuals(multiply, gather(self.right), precondition, tolerance, max_iterations, start)
+        found = generalized_residuals(
+            lambda x: gather(operator.apply_free(x[own])),
+            gather(self.right),
+            lambda x: gather(self._precondition(x[own])),
+            *limits,
+            None if guess is None else gather(guess),
+        )
         return replace(found, x=found.x[own])
 
 
@@ -257,38 +263,20 @@ def build(
     """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space."""
     start = time.process_time()
     with one_blas_thread():
-        assembled, robin, known = assemble_data(volume, problem, space, threads, quadrature)
-        operator, others = assembled.operator, {*problem.dirichlet, *problem.natural}
-        extra = np.zeros(space.shape)
-        for face, weights in robin.values():
-            face.add_mass_diagonal(weights, extra)
+        operator, load, known = assemble_data(volume, problem, space, threads, quadrature)
         blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
-        means = {
-            name: float(space.total(robin[name][1].sum() if name in robin else 0.0))
-            for name in FACE_NAMES
-            if name not in others
-        }
-        inverses = tuple(fast_diagonalization(block, means, extra) for block in blocks)
+        inverses = tuple(map(fast_diagonalization, blocks))
         if isinstance(operator, FormOperator) and inverses[0].singular:
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
                 "solution open: give one face to boundary or robin"
             )
-        load = assembled.load - _product(assembled, robin, known)
+        load -= operator.apply(known)
         space.add(load)
-        right = np.ascontiguousarray(load[:, *operator.window])
+        right = np.ascontiguousarray(load[:, *space.window])
         right = balanced(right, space) if inverses[0].singular else right
         setup = time.process_time() - start
-    return System(volume, problem, space, assembled, robin, known, inverses, right, threads, setup)
-
-
-def _product(assembled: Assembled, robin: Robin, coefficients: Array) -> Array:
-    """Return operator and Robin's terms times coefficients (c, n_u, n_v, n_w), as far as this process integrates."""
-    result = assembled.operator.apply(coefficients)
-    for face, weights in robin.values():
-        for component, total in zip(coefficients, result, strict=True):
-            face.add_mass(weights, component, total)
-    return result
+    return System(volume, problem, space, operator, known, inverses, right, setup)
 
 
 def assemble_data(
@@ -297,37 +285,34 @@ def assemble_data(
     space: TrialSpace,
     threads: int = 1,
     quadrature: str = "spline",
-) -> tuple[Assembled, Robin, Array]:
-    """Return operator and load with the data on faces, Robin's terms by face, and the coefficients that are fixed."""
+) -> tuple[Operator | FormOperator, Array, Array]:
+    """Return operator and load, the data on faces included, and the coefficients that are fixed."""
     form, couples = problem.form, False
     if isinstance(problem, Problem):
         samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
         couples = check_law(form, Points.of(samples, (SAMPLES, SAMPLES, SAMPLES)))
-    assembled = assemble(
+    operator, load = assemble(
         volume,
         space,
         form,
         problem.source_at,
         rule_of(volume, space, form.tensor, quadrature),
-        window=free_window(space.whole, problem.dirichlet),
         component=0 if form.components == 1 and form.symmetric and not couples else None,
         threads=threads,
     )
     robin = {}
-    with space.agreed():
+    with agreed(space.comm):
         for name in FACE_NAMES:
-            if name in problem.dirichlet or not has_face(space, name):
+            if name in space.dirichlet or not has_face(space, name):
                 continue
             face = face_rule(volume, space, name)
-            if name in problem.natural:
-                data = problem.flux_at(name, face.points, face.normal)
-            else:
-                alpha, data = problem.robin_at(name, face.points, face.normal)
-                robin[name] = (face, alpha * face.measure)
-            for density, total in zip(data, assembled.load, strict=True):
-                total[face.layer] += face.integrate(density * face.measure)
-    known = boundary_coefficients(volume, space.whole, problem.boundary_at, problem.dirichlet, form.components)
-    return assembled, robin, known[:, space.rows].copy()
+            alpha, data = problem.on_face(name, face.points, face.normal)
+            if alpha is not None:
+                robin[name] = replace(face, measure=alpha * face.measure)
+            for density, total in zip(data, load, strict=True):
+                total[face.layer] += face.integrate(density)
+    known = boundary_coefficients(volume, space.whole, problem.boundary_at, form.components)
+    return replace(operator, robin=robin), load, known[:, space.rows].copy()
 
 
 def balanced(load: Array, space: TrialSpace) -> Array:

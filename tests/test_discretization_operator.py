@@ -5,7 +5,7 @@ from volumes import mapped, scalar_system
 from parameterize.spline.bspline import collocation
 from parameterize.spline.volume import BSplineVolume
 from solve import Elasticity, Form, Poisson
-from solve.discretization.operator import FormOperator, assemble, free_window
+from solve.discretization.operator import FormOperator, assemble, colours
 from solve.discretization.quadrature import gauss_rule, operator_rule
 from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
@@ -50,28 +50,28 @@ def case(request):
     def source(x, y, z):
         return x * y + np.sin(z)
 
-    return scalar_system(volume, space, source), *assemble_dense(volume, space, rule, source)
+    return *scalar_system(volume, space, source), *assemble_dense(volume, space, rule, source)
 
 
 def test_operator_equals_the_assembled_matrix(case):
-    system, matrix, _ = case
-    x = np.random.default_rng(1).standard_normal(system.operator.space.shape)
+    operator, _, matrix, _ = case
+    x = np.random.default_rng(1).standard_normal(operator.space.shape)
     expected = (matrix @ x.ravel()).reshape(x.shape)
-    assert np.allclose(system.operator.apply(x), expected, atol=1e-12 * np.abs(expected).max())
+    assert np.allclose(operator.apply(x), expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_diagonal_equals_that_of_the_assembled_matrix(case):
-    system, matrix, _ = case
-    assert np.allclose(system.operator.diagonal().ravel(), np.diag(matrix), rtol=1e-12)
+    operator, _, matrix, _ = case
+    assert np.allclose(operator.diagonal().ravel(), np.diag(matrix), rtol=1e-12)
 
 
 def test_load_equals_the_assembled_vector(case):
-    system, _, load = case
-    assert np.allclose(system.load.ravel(), load, atol=1e-13 * np.abs(load).max())
+    _, load, _, expected = case
+    assert np.allclose(load.ravel(), expected, atol=1e-13 * np.abs(expected).max())
 
 
 def test_interior_product_is_the_full_one_with_zero_boundary():
-    stiffness = scalar_system(benchmark_volume(3)).operator
+    stiffness = scalar_system(benchmark_volume(3))[0]
     x = np.zeros(stiffness.space.shape)
     x[1:-1, 1:-1, 1:-1] = np.random.default_rng(2).standard_normal((4, 4, 4))
     assert np.array_equal(stiffness.apply_free(x[1:-1, 1:-1, 1:-1]), stiffness.apply(x)[1:-1, 1:-1, 1:-1])
@@ -79,7 +79,7 @@ def test_interior_product_is_the_full_one_with_zero_boundary():
 
 def test_symmetric_positive_and_constants_in_the_kernel():
     volume = benchmark_volume(4)
-    stiffness = scalar_system(volume).operator
+    stiffness = scalar_system(volume)[0]
     rng = np.random.default_rng(3)
     a, b = rng.standard_normal((2, *stiffness.space.shape))
     assert np.vdot(a, stiffness.apply(b)) == pytest.approx(np.vdot(b, stiffness.apply(a)), rel=1e-12)
@@ -91,7 +91,7 @@ def test_linear_functions_are_in_balance_inside_a_curved_map_once_the_rule_is_ex
     """The integrand has degree 3 p - 1 per direction: 5 Gauss points for p = 3."""
     volume = benchmark_volume(4)
     space = trial_space(volume)
-    stiffness = scalar_system(volume, rule=gauss_rule(space, (5, 5, 5))).operator
+    stiffness = scalar_system(volume, rule=gauss_rule(space, (5, 5, 5)))[0]
     for component in range(3):
         inside = stiffness.apply(volume.control_points[..., component])[1:-1, 1:-1, 1:-1]
         assert np.abs(inside).max() < 1e-13
@@ -100,9 +100,9 @@ def test_linear_functions_are_in_balance_inside_a_curved_map_once_the_rule_is_ex
 def test_folded_points_are_counted_and_a_flat_map_is_refused():
     smooth = benchmark_volume(4)
     mirrored = BSplineVolume(smooth.degrees, smooth.knots, smooth.control_points * [1.0, 1.0, -1.0])
-    system = scalar_system(mirrored)
-    assert system.folded == system.points == np.prod(system.operator.rule.shape)
-    assert scalar_system(smooth).folded == 0
+    operator, _ = scalar_system(mirrored)
+    assert operator.folded == np.prod(operator.rule.shape)
+    assert scalar_system(smooth)[0].folded == 0
     flat = BSplineVolume(smooth.degrees, smooth.knots, 0.0 * smooth.control_points)
     with pytest.raises(ValueError, match=r"det J is zero at the parameters \(0\.0\d"):
         scalar_system(flat)
@@ -133,7 +133,7 @@ def test_coefficients_equal_the_assembled_matrix(kappa, degree):
     def reaction(x, y, z):
         return 3.0 + x - y
 
-    operator = scalar_system(volume, space, kappa=kappa, reaction=reaction).operator
+    operator = scalar_system(volume, space, kappa=kappa, reaction=reaction)[0]
     matrix, _ = assemble_dense(volume, space, operator.rule, lambda x, y, z: x, dense_kappa, lambda p: reaction(*p))
     x = np.random.default_rng(1).standard_normal(space.shape)
     expected = (matrix @ x.ravel()).reshape(x.shape)
@@ -142,12 +142,10 @@ def test_coefficients_equal_the_assembled_matrix(kappa, degree):
 
 
 def test_window_leaves_out_the_faces_with_dirichlet_data():
-    space = trial_space(benchmark_volume(2))
-    assert free_window(space) == (slice(1, 4),) * 3
-    assert free_window(space, ()) == (slice(0, 5),) * 3
-    assert free_window(space, {"u1", "w0"}) == (slice(0, 4), slice(0, 5), slice(1, 5))
-    with pytest.raises(ValueError, match="'top' is no face"):
-        free_window(space, {"top"})
+    volume = benchmark_volume(2)
+    assert trial_space(volume).free == (slice(1, 4),) * 3
+    assert trial_space(volume, dirichlet=()).free == (slice(0, 5),) * 3
+    assert trial_space(volume, dirichlet={"u1", "w0"}).free == (slice(0, 4), slice(0, 5), slice(1, 5))
 
 
 UNEQUAL = mapped(
@@ -203,13 +201,13 @@ def dense_of_law(volume, form, space, rule):
 def test_product_equals_the_matrix_with_unequal_degrees(form, threads):
     space = trial_space(UNEQUAL, refine=1)
     rule = gauss_rule(space)
-    operator = assemble(UNEQUAL, space, form, None, rule, component=None, threads=threads).operator
+    operator = assemble(UNEQUAL, space, form, None, rule, component=None, threads=threads)[0]
     assert isinstance(operator, FormOperator)
     matrix = dense_of_law(UNEQUAL, form, space, rule)
     x = np.random.default_rng(1).standard_normal((form.components, *space.shape))
     expected = (matrix @ x.ravel()).reshape(x.shape)
     assert np.allclose(operator.apply(x), expected, atol=1e-11 * np.abs(expected).max())
-    free = operator.window
+    free = operator.space.window
     x[:, 0], x[:, -1], x[:, :, 0], x[:, :, -1], x[..., 0], x[..., -1] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     assert np.allclose(operator.apply_free(x[:, *free]), operator.apply(x)[:, *free], atol=1e-12)
     if form.symmetric:  # without coupling of u and its gradient, which the blocks leave out
@@ -222,7 +220,31 @@ def test_the_six_factors_equal_the_matrix_with_unequal_degrees(threads):
     space = trial_space(UNEQUAL, refine=1)
     law = {"kappa": ("2+x*x", "0.3*y", "0.1", "1.5", "0.2*sin(z)", "1+z*z"), "reaction": "1+x*x"}
     form = Poisson(**law)
-    operator = assemble(UNEQUAL, space, form, None, window=free_window(space, ()), threads=threads).operator
+    operator = assemble(UNEQUAL, space, form, None, threads=threads)[0]
     x = np.random.default_rng(1).standard_normal(space.shape)
     expected = (dense_of_law(UNEQUAL, form, space, operator.rule) @ x.ravel()).reshape(x.shape)
     assert np.allclose(operator.apply(x), expected, atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+@pytest.mark.parametrize("layers", [1, 4, 5, 27])
+def test_pieces_cover_all_layers_and_those_of_one_colour_share_no_function(degree, layers):
+    both = colours(np.arange(layers), degree, 10)
+    assert np.array_equal(np.sort(np.concatenate([*both[0], *both[1]])), np.arange(layers))
+    for pieces in both:
+        for before, after in zip(pieces, pieces[1:], strict=False):
+            assert after[0] > before[-1] + degree  # function i lives on the spans i - degree to i
+
+
+def test_points_of_one_layer_stay_together_whatever_their_number():
+    pieces, others = colours(np.repeat(np.arange(10), [3, 1, 0, 2, 5, 1, 1, 1, 1, 1]), 3, 10)
+    assert [piece.tolist() for piece in pieces] == [list(range(11)), [15]]
+    assert [piece.tolist() for piece in others] == [[11, 12, 13, 14]]
+
+
+@pytest.mark.parametrize(("threads", "shares"), [(1, 1), (2, 8), (50, 13)])
+def test_pieces_of_one_colour_are_joined_to_some_shares_a_thread(threads, shares):
+    both, alone = colours(np.arange(104), 3, threads), colours(np.arange(104), 3, 100)
+    for joined, pieces in zip(both, alone, strict=True):
+        assert len(joined) == shares and len(pieces) == 13
+        assert np.array_equal(np.sort(np.concatenate(joined)), np.concatenate(pieces))

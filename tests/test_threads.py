@@ -4,31 +4,6 @@ import numpy as np
 import pytest
 
 from parameterize.threads import default_threads, in_parallel
-from solve.threads import colours
-
-
-@pytest.mark.parametrize("degree", [1, 3, 5])
-@pytest.mark.parametrize("layers", [1, 4, 5, 27])
-def test_pieces_cover_all_layers_and_those_of_one_colour_share_no_function(degree, layers):
-    both = colours(np.arange(layers), degree, 10)
-    assert np.array_equal(np.sort(np.concatenate([*both[0], *both[1]])), np.arange(layers))
-    for pieces in both:
-        for before, after in zip(pieces, pieces[1:], strict=False):
-            assert after[0] > before[-1] + degree  # function i lives on the spans i - degree to i
-
-
-def test_points_of_one_layer_stay_together_whatever_their_number():
-    pieces, others = colours(np.repeat(np.arange(10), [3, 1, 0, 2, 5, 1, 1, 1, 1, 1]), 3, 10)
-    assert [piece.tolist() for piece in pieces] == [list(range(11)), [15]]
-    assert [piece.tolist() for piece in others] == [[11, 12, 13, 14]]
-
-
-@pytest.mark.parametrize(("threads", "shares"), [(1, 1), (2, 8), (50, 13)])
-def test_pieces_of_one_colour_are_joined_to_some_shares_a_thread(threads, shares):
-    both, alone = colours(np.arange(104), 3, threads), colours(np.arange(104), 3, 100)
-    for joined, pieces in zip(both, alone, strict=True):
-        assert len(joined) == shares and len(pieces) == 13
-        assert np.array_equal(np.sort(np.concatenate(joined)), np.concatenate(pieces))
 
 
 @pytest.mark.parametrize("threads", [1, 3])

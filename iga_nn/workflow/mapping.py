@@ -126,8 +126,7 @@ def _check_data(equation: Equation, surface: Surface) -> None:
     normals = vertex_normals(surface.vertices, surface.faces)
     for face in FACE_NAMES:
         if face not in equation.dirichlet:
-            evaluate_at = equation.flux_at if face in equation.natural else equation.robin_at
-            _check_somewhere(partial(evaluate_at, face), surface.vertices, normals)
+            _check_somewhere(partial(equation.on_face, face), surface.vertices, normals)
 
 
 def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:

@@ -40,7 +40,7 @@ class SolveMemory:
 def solve_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptions) -> SolveMemory:
     """Return the forecast for the finest level."""
     from solve.discretization.errors import POINTS
-    from solve.discretization.planes import rule_of
+    from solve.discretization.quadrature import rule_of
     from solve.discretization.space import trial_space
 
     form, space = equation.form, trial_space(volume, max(options.refine), options.degree)

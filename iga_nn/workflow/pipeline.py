@@ -16,7 +16,7 @@ import numpy as np
 
 from parameterize.files import save_text
 from parameterize.spline.volume import BSplineVolume
-from solve.discretization.slab import agreed
+from solve.discretization.space import agreed
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume

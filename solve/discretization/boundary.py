@@ -1,6 +1,6 @@
 """Data on the images of the cube's faces: Dirichlet's values projected, Neumann's load and Robin's term integrated."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
@@ -20,13 +20,9 @@ FREE = None
 
 
 def boundary_coefficients(
-    volume: BSplineVolume,
-    space: TrialSpace,
-    values: Callable[[Array], Array],
-    faces: Collection[str] = FACE_NAMES,
-    components: int = 1,
+    volume: BSplineVolume, space: TrialSpace, values: Callable[[Array], Array], components: int = 1
 ) -> Array:
-    """Return coefficients (c, n_u, n_v, n_w) of an approximation of boundary data on the named faces, zero elsewhere.
+    """Return coefficients (c, n_u, n_v, n_w) of an approximation of Dirichlet data on their faces, zero elsewhere.
 
     values: takes points (3, ...) and returns (c, ...), one row for each of the components. Corners are interpolated,
     then edges and faces projected in L2, in the parametric measure; each takes up what the smaller ones have fixed.
@@ -34,7 +30,9 @@ def boundary_coefficients(
     coefficients = np.zeros((components, *space.shape))
     points, bases, projections = zip(*map(_projection, space.knots, space.degrees), strict=True)
     for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
-        if not any(FACE_NAMES[2 * axis + side] in faces for axis, side in enumerate(entity) if side is not FREE):
+        if not any(
+            FACE_NAMES[2 * axis + side] in space.dirichlet for axis, side in enumerate(entity) if side is not FREE
+        ):
             continue
         free = [a for a in range(3) if entity[a] is FREE]
         u, v, w = (points[a] if side is FREE else np.array([float(side)]) for a, side in enumerate(entity))
@@ -67,7 +65,7 @@ class FaceRule:
     """Gauss points on the image of one face, degree + 1 a span and direction, and the trial functions there.
 
     points, normal: (3, q_b, q_c) in space, the normal outward and of unit length. measure: (q_b, q_c), surface element
-    times weight. bases: (q_b, n_b) and (q_c, n_c), of the two directions that run along the face.
+    times weight, for Robin's term times alpha. bases: (q_b, n_b) and (q_c, n_c), of the two directions along the face.
     layer: the face's coefficients in an array (n_u, n_v, n_w).
     """
 
@@ -78,21 +76,18 @@ class FaceRule:
     layer: tuple[int | slice, ...]
 
     def integrate(self, density: Array) -> Array:
-        """Return integrals (n_b, n_c) of a density (q_b, q_c), weights included, times each trial function."""
-        return self.bases[0].T @ density @ self.bases[1]
+        """Return integrals (n_b, n_c) of a density (q_b, q_c) times each trial function."""
+        return self.bases[0].T @ (density * self.measure) @ self.bases[1]
 
-    def add_mass(self, weights: Array, coefficients: Array, result: Array) -> None:
-        """Add Robin's term, the integral of alpha u v, of coefficients (n_u, n_v, n_w) to `result` of the same shape.
-
-        weights: (q_b, q_c), alpha times `measure`.
-        """
+    def add_mass(self, coefficients: Array, result: Array) -> None:
+        """Add Robin's term, the integral of alpha u v, of coefficients (n_u, n_v, n_w) to `result`, shaped alike."""
         values = self.bases[0] @ coefficients[self.layer] @ self.bases[1].T
-        result[self.layer] += self.integrate(weights * values)
+        result[self.layer] += self.integrate(values)
 
-    def add_mass_diagonal(self, weights: Array, diagonal: Array) -> None:
+    def add_mass_diagonal(self, diagonal: Array) -> None:
         """Add the diagonal of Robin's term to an array (n_u, n_v, n_w)."""
         b, c = (basis.power(2) for basis in self.bases)
-        diagonal[self.layer] += b.T @ weights @ c
+        diagonal[self.layer] += b.T @ self.measure @ c
 
 
 def has_face(space: TrialSpace, name: str) -> bool:

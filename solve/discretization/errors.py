@@ -12,12 +12,12 @@ from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
 from ..field import Points
+from ..forms.form import strong_form
 from ..forms.jets import PAIRS, SYMMETRIC, Jet
 from ..forms.problem import BoundaryValueProblem
 from . import kernels
-from .planes import geometry_planes
-from .quadrature import GaussRule, gauss_rule
-from .space import TrialSpace
+from .quadrature import gauss_rule, geometry_planes
+from .space import TrialSpace, agreed
 
 PLANES = 16  # of points of u, in a piece of work
 POINTS = 2**16  # of a plane that are evaluated at once: they take dozens of arrays
@@ -56,26 +56,23 @@ def error_norms(
     has_gradient = []
 
     def integrate(points: range) -> None:
-        for strip in strips:
-            add(points, *strip)
-
-    def add(points: range, rule: GaussRule, tables: kernels.Tables) -> None:
-        fields = np.empty((len(splines), 4, *rule.plane_shape))
-        slopes = np.empty((len(splines), 3, *rule.plane_shape))
-        for q, rows, measure, x in geometry_planes(volume, rule, points):
-            values, gradients = exact(x)
-            scale = np.sqrt(np.abs(measure))
-            for spline, field in zip(splines, fields, strict=True):
-                kernels.evaluate_plane(spline, q, tables, field)
-            fields[:, 0] *= scale
-            sums[q, :2] += kernels.squares(values[:, None], scale, fields[:, :1])
-            has_gradient.append(gradients is not None)
-            if gradients is not None:
-                kernels.turn(rows, fields[:, 1:], slopes, False)
-                sums[q, 2:] += kernels.squares(gradients, scale, slopes)
+        for rule, tables in strips:
+            fields = np.empty((len(splines), 4, *rule.plane_shape))
+            slopes = np.empty((len(splines), 3, *rule.plane_shape))
+            for q, rows, measure, x in geometry_planes(volume, rule, points):
+                values, gradients = exact(x)
+                scale = np.sqrt(np.abs(measure))
+                for spline, field in zip(splines, fields, strict=True):
+                    kernels.evaluate_plane(spline, q, tables, field)
+                fields[:, 0] *= scale
+                sums[q, :2] += kernels.squares(values[:, None], scale, fields[:, :1])
+                has_gradient.append(gradients is not None)
+                if gradients is not None:
+                    kernels.turn(rows, fields[:, 1:], slopes, False)
+                    sums[q, 2:] += kernels.squares(gradients, scale, slopes)
 
     planes = range(whole.shape[0])
-    with space.agreed():
+    with agreed(space.comm):
         in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
     l2, norm, seminorm, slope = np.sqrt(space.total(sums.sum(axis=0))).tolist()
     if not all(space.shared(all(has_gradient))):
@@ -93,7 +90,7 @@ def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, 
     tables, spline = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients)
     plane = np.empty((4, *rule.plane_shape))
     lack = size = 0.0
-    with space.agreed():
+    with agreed(space.comm):
         for q, _, measure, x in geometry_planes(volume, rule):
             kernels.evaluate_plane(spline, q, tables, plane)
             wanted = 0.0 if problem.exact is None else problem.exact_at(x)[0][0]
@@ -113,23 +110,23 @@ def error_estimate(
     if space.is_only_continuous or problem.not_differentiable:
         return None
     rule, counts = gauss_rule(space), space.gauss_points
-    bases = [_bases(space.degrees, space.knots, rule), _bases(volume.degrees, volume.knots, rule)]
+    bases = [
+        [[collocation(knots[a], degrees[a], rule.points[a], order) for order in range(3)] for a in range(3)]
+        for degrees, knots in ((space.degrees, space.knots), (volume.degrees, volume.knots))
+    ]
     sizes = [np.repeat(np.diff(breaks), count) for breaks, count in zip(space.breaks, counts, strict=True)]
     w_u, w_v, w_w = rule.weights
     sums = np.zeros(2)
-
-    def integrate(layer: slice) -> None:
-        points = (rule.points[0][layer], *rule.points[1:])
-        spacing = (sizes[0][layer, None, None], sizes[1][:, None], sizes[2])
-        solution = _derivatives(bases[0], coefficients, layer)
-        geometry = _derivatives(bases[1], np.moveaxis(volume.control_points, -1, 0), layer)
-        error, det = _local_error(geometry, solution, problem, spacing, Points.of(geometry[0, 0, 0], points))
-        for place, field in enumerate((error, solution[0, 0, 0])):
-            sums[place] += np.einsum("ijk,i,j,k", np.abs(det) * (field**2).sum(axis=0), w_u[layer], w_v, w_w)
-
-    with space.agreed():
+    with agreed(space.comm):
         for start in range(0, rule.shape[0], counts[0]):  # layer by layer of elements in u
-            integrate(slice(start, start + counts[0]))
+            layer = slice(start, start + counts[0])
+            spacing = (sizes[0][layer, None, None], sizes[1][:, None], sizes[2])
+            solution = _derivatives(bases[0], coefficients, layer)
+            geometry = _derivatives(bases[1], np.moveaxis(volume.control_points, -1, 0), layer)
+            x = Points.of(geometry[0, 0, 0], (rule.points[0][layer], *rule.points[1:]))
+            error, det = _local_error(geometry, solution, problem, spacing, x)
+            for place, field in enumerate((error, solution[0, 0, 0])):
+                sums[place] += np.einsum("ijk,i,j,k", np.abs(det) * (field**2).sum(axis=0), w_u[layer], w_v, w_w)
     l2, norm = np.sqrt(space.total(sums)).tolist()
     return Errors(l2, _ratio(l2, norm))
 
@@ -137,11 +134,6 @@ def error_estimate(
 Orders = tuple[int, int, int]
 FIRST: tuple[Orders, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 SECOND: tuple[Orders, ...] = ((2, 0, 0), (1, 1, 0), (1, 0, 1), (0, 2, 0), (0, 1, 1), (0, 0, 2))  # in order of PAIRS
-
-
-def _bases(degrees: Orders, knots: Sequence[Array], rule: GaussRule) -> list[list[csr_array]]:
-    """Return per direction the matrices of values, first and second derivatives at the points of a rule."""
-    return [[collocation(knots[a], degrees[a], rule.points[a], order) for order in range(3)] for a in range(3)]
 
 
 def _derivatives(bases: list[list[csr_array]], coefficients: Array, layer: slice) -> dict[Orders, Array]:
@@ -176,7 +168,7 @@ def _local_error(
         hessian = (_dot([row[i] for row in inverse], [row[j] for row in rows]) for i, j in PAIRS)
         jets.append(Jet(value, tuple(gradient), tuple(hessian)))
     symbols = [problem.form.symbol(2.0 * np.pi / spacing[a] * inverse[a], x) for a in range(3)]
-    return problem.residual_at(jets, x) / np.min(symbols, axis=0), det
+    return (problem.source_at(x) - strong_form(problem.form, jets, x)) / np.min(symbols, axis=0), det
 
 
 def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:

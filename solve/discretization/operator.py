@@ -5,8 +5,8 @@ planes of points: gradients are pulled back, the law turns them into fluxes, and
 """
 
 import math
-from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,46 +14,47 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import collocation
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
-from ..forms.data import check_faces
 from ..forms.form import Form, reaction
 from ..forms.jets import PAIRS
-from ..threads import colours
 from . import kernels
-from .planes import geometry_planes
-from .quadrature import GaussRule, operator_rule
-from .space import TrialSpace, Window
+from .boundary import FaceRule
+from .quadrature import GaussRule, geometry_planes, operator_rule
+from .space import TrialSpace, agreed
+
+SHARES = 4  # of the pieces of one colour a thread: some wait less where others take longer
+LAYERS = 4  # of elements in a piece of work, where the degree allows so few
 
 
-def free_window(space: TrialSpace, dirichlet: Collection[str] = FACE_NAMES) -> Window:
-    """Return the coefficients that Dirichlet data on the named cube faces ("u0" ... "w1") leave free, a box.
+def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
+    """Return consecutive points in pieces, every other piece in the first list, the rest in the second.
 
-    Raises ValueError for a name that is no face.
+    first: (q,) number of the first function that is not zero at each point. A piece covers at least as many layers of
+    elements as the degree, so that no two of one list share a basis function: they may add to the same array at the
+    same time, and each sum has one order. Pieces of one list are joined to some shares a thread, to one for a single.
     """
-    check_faces("dirichlet", dirichlet)
-    sides = [[name in dirichlet for name in FACE_NAMES[2 * a : 2 * a + 2]] for a in range(3)]
-    u, v, w = (slice(int(low), n - int(high)) for (low, high), n in zip(sides, space.shape, strict=True))
-    return u, v, w
+    layers = np.unique(first, return_inverse=True)[1]
+    pieces = np.split(np.arange(len(first)), np.flatnonzero(np.diff(layers // max(degree, LAYERS))) + 1)
+    shares = SHARES * threads if threads > 1 else 1
+    halves = pieces[0::2], pieces[1::2]
+    return [[np.concatenate(half[i::shares]) for i in range(min(len(half), shares))] for half in halves]
 
 
 @dataclass(frozen=True, eq=False)
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    free: the free coefficients of each component, in the whole space. threads: of a product.
+    threads: of a product. folded: at how many of the points of all processes det J < 0. robin: the rules of the faces
+    that have Robin's term, as far as this process integrates.
     """
 
     space: TrialSpace
     rule: GaussRule
-    free: Window
     threads: int
-
-    @property
-    def window(self) -> Window:
-        """The free coefficients of each component that are this process's own."""
-        return self.space.own(self.free)
+    folded: int = field(default=0, kw_only=True)
+    robin: Mapping[str, FaceRule] = field(default_factory=dict, kw_only=True)
 
     @cached_property
     def tables(self) -> kernels.Tables:
@@ -70,20 +71,19 @@ class MatrixFree:
         source = np.ascontiguousarray(coefficients).reshape(math.prod(coefficients.shape[:-3]), *self.space.shape)
         result = np.zeros_like(source)
         self.on_planes(lambda points: self._multiply(points, source, result))
+        for face in self.robin.values():
+            for component, total in zip(source, result, strict=True):
+                face.add_mass(component, total)
         return result.reshape(coefficients.shape)
 
     def apply_free(self, free: Array) -> Array:
-        """Return the product restricted to the free coefficients, (c, ...) or (...) of the window's shape."""
-        return self.restricted(self.apply, free)
-
-    def restricted(self, product: Callable[[Array], Array], free: Array) -> Array:
-        """Return a product with coefficients (.., n_u, n_v, n_w) restricted to the free ones, this process's own."""
+        """Return the product restricted to this process's free coefficients, of shape (c, ..) or (..)."""
         full = np.zeros((*free.shape[:-3], *self.space.shape))
-        full[..., *self.window] = free
+        full[..., *self.space.window] = free
         self.space.fill(full)
-        result = product(full)
+        result = self.apply(full)
         self.space.add(result)
-        return np.ascontiguousarray(result[..., *self.window])
+        return np.ascontiguousarray(result[..., *self.space.window])
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
         """Add the part of some points of u to the product with coefficients (c, n_u, n_v, n_w)."""
@@ -92,7 +92,7 @@ class MatrixFree:
 
 @dataclass(frozen=True, eq=False)
 class Operator(MatrixFree):
-    """The positive semidefinite matrix of a scalar symmetric law.
+    """The positive semidefinite matrix of a scalar symmetric law, for each component the same.
 
     factors: (q_u, 6 or 7, q_w, q_v), the six of G and c |det J| where there is a reaction; weights included.
     """
@@ -100,7 +100,8 @@ class Operator(MatrixFree):
     factors: Array
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
-        kernels.multiply_planes(coefficients[0], points, self.tables, self.factors, result[0])
+        for component, total in zip(coefficients, result, strict=True):
+            kernels.multiply_planes(component, points, self.tables, self.factors, total)
 
     def diagonal(self) -> Array:
         """Return the diagonal of the matrix, shape `space.shape`: squared basis functions in place of the basis.
@@ -114,22 +115,21 @@ class Operator(MatrixFree):
 
         def add(points: IntArray) -> None:
             for q in points:
-                for field, pair in zip(self.factors[q], (*PAIRS, ()), strict=False):
+                for entry, pair in zip(self.factors[q], (*PAIRS, ()), strict=False):
                     twice = 2.0 if len(set(pair)) == 2 else 1.0
-                    add_integrals(products, q, twice * field, result, tuple(pair.count(a) for a in range(3)))
+                    add_integrals(products, q, twice * entry, result, tuple(pair.count(a) for a in range(3)))
 
         self.on_planes(add)
-        return result
+        on_faces = np.zeros(self.space.shape)
+        for face in self.robin.values():
+            face.add_mass_diagonal(on_faces)
+        return result + on_faces
 
     def dense(self, axis: int, derivative: int) -> Array:
         """Return the matrix (q, n) of a direction's functions, or of their derivatives, at its points."""
         knots, degree = self.space.knots[axis], self.space.degrees[axis]
         matrix: Array = collocation(knots, degree, self.rule.points[axis], derivative).toarray()
         return matrix
-
-    def mean_mass(self) -> float:
-        """Return the average over the cube of c |det J|."""
-        return float(self.space.total(sum(plane[6:].sum() for plane in self.factors)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,11 +145,15 @@ class FormOperator(MatrixFree):
     rows: Array | None
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
-        form, planes = self.form, self.rule.plane_shape
-        fields, gradient = np.empty((len(coefficients), 4, *planes)), np.empty((len(coefficients), 3, *planes))
-        for q, rows, measure, x in self._geometry(points):
-            for component, field in zip(coefficients, fields, strict=True):
-                kernels.evaluate_plane(component, q, self.tables, field)
+        form, shape = self.form, self.rule.plane_shape
+        fields, gradient = np.empty((len(coefficients), 4, *shape)), np.empty((len(coefficients), 3, *shape))
+        kept = self.rows
+        planes: Iterable[tuple[int, Array, Any, Any]] = geometry_planes(self.volume, self.rule, points)
+        if kept is not None:
+            planes = ((q, kept[q], None, None) for q in points)
+        for q, rows, measure, x in planes:
+            for component, plane in zip(coefficients, fields, strict=True):
+                kernels.evaluate_plane(component, q, self.tables, plane)
             kernels.turn(rows, fields[:, 1:], gradient, False)
             values = fields[:, 0]
             if measure is not None:
@@ -158,34 +162,15 @@ class FormOperator(MatrixFree):
                 fields[:, 0] = reaction(form, values, gradient, x) * scale
             flux = np.ascontiguousarray(form.flux(values, gradient, x), dtype=np.float64)
             kernels.turn(rows, flux, fields[:, 1:], True)
-            for field, total in zip(fields, result, strict=True):
-                kernels.spread_plane(field, q, self.tables, form.has_reaction, total)
-
-    def _geometry(self, points: IntArray) -> Iterable[tuple[int, Array, Array | None, Any]]:
-        """Return what `geometry_planes` yields, of a constant law q and R alone."""
-        if self.rows is not None:
-            return ((q, self.rows[q], None, None) for q in points)
-        return geometry_planes(self.volume, self.rule, points)
+            for plane, total in zip(fields, result, strict=True):
+                kernels.spread_plane(plane, q, self.tables, form.has_reaction, total)
 
     def block(self, component: int) -> Operator:
         """Return the symmetric part of a component's diagonal block: the law of its own gradient and value."""
         law, rule = (self.volume, self.space, self.form), self.rule
-        block = assemble(*law, rule=rule, window=self.free, component=component, threads=self.threads).operator
+        block, _ = assemble(*law, rule=rule, component=component, threads=self.threads)
         assert isinstance(block, Operator)
-        return block
-
-
-@dataclass(frozen=True, eq=False)
-class Assembled:
-    """Operator, load (c, n_u, n_v, n_w), and how many of the quadrature points have det J < 0.
-
-    Of a slab the load is that of the integrals over it; the numbers of points are those of all processes.
-    """
-
-    operator: Operator | FormOperator
-    load: Array
-    folded: int
-    points: int
+        return replace(block, robin=self.robin)
 
 
 def assemble(
@@ -195,15 +180,12 @@ def assemble(
     source: Callable[[Array], Array] | None = None,
     rule: GaussRule | None = None,
     *,
-    window: Window | None = None,
     component: int | None = 0,
     threads: int = 1,
-) -> Assembled:
-    """Return operator and load of a law on a volume.
+) -> tuple[Operator | FormOperator, Array]:
+    """Return operator and load (c, n_u, n_v, n_w) of a law on a volume; of a slab the load is what it integrates.
 
     source: takes the points (3, q_w, q_v) of a plane and returns (c, q_w, q_v); None for zero.
-    window: the free coefficients of the whole space, as `free_window` gives them (default: all but those of the six
-        faces).
     component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
     threads: of this pass and of the operator; the functions must then be safe to call from several at a time.
 
@@ -211,8 +193,8 @@ def assemble(
     trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
     Raises ValueError where det J is zero at a point, naming it.
     """
-    rule, window = rule or operator_rule(space), window or free_window(space.whole)
-    parts = space, rule, window, threads
+    rule = rule or operator_rule(space)
+    parts = space, rule, threads
     basis, part = MatrixFree(*parts), component or 0
     load = np.zeros((form.components, *space.shape))
     folded = []
@@ -232,14 +214,16 @@ def assemble(
                 for density, total in zip(source(x), load, strict=True):
                     add_integrals(basis.tables, q, density * size, total)
 
-    with space.agreed():
+    with agreed(space.comm):
         if component is not None:
             factors = np.empty((rule.shape[0], 6 + form.has_reaction, *rule.plane_shape))
         elif form.constant:
             kept = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
         basis.on_planes(fill)
-    operator = FormOperator(*parts, volume, form, kept) if factors is None else Operator(*parts, factors)
-    return Assembled(operator, load, space.total(sum(folded)), space.total(int(np.prod(rule.shape))))
+    total = space.total(sum(folded))
+    if factors is None:
+        return FormOperator(*parts, volume, form, kept, folded=total), load
+    return Operator(*parts, factors, folded=total), load
 
 
 def add_integrals(

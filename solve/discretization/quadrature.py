@@ -1,11 +1,11 @@
-"""Quadrature: tensor-product rules, Gauss' on every span or those of a spline space.
+"""Quadrature: tensor-product rules, Gauss' on every span or those of a spline space, and the geometry at their points.
 
 The Gauss rules of a spline space integrate its functions exactly with half as many points as it has dimensions.
 (Bressan, Calo, Hughes; Hiemstra, Calabro, Schillinger, Hughes, CMAME 316 (2017); Johannessen, CMAME 316 (2017).)
 """
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,9 +14,11 @@ from scipy.sparse import csr_array, hstack
 from scipy.sparse.linalg import splu
 
 from parameterize.arrays import Array, Knots
-from parameterize.spline.bspline import basis_derivatives, gauss_points, greville, sparse_rows
+from parameterize.spline.bspline import basis_derivatives, gauss_points, greville, midpoints, sparse_rows
+from parameterize.spline.volume import BSplineVolume
 
-from .kernels import Tables
+from ..field import Points
+from . import kernels
 from .space import TrialSpace, same_smoothness
 
 TOLERANCE = 1e-14  # of an integral, the interval's length being 1
@@ -24,6 +26,9 @@ MAX_STEPS = 60  # of Newton's method: uniform knots take 6 to 10, irregular ones
 SPARE_POINTS = (0, 1, 2)  # the numbers of further points with which it is tried, one after another
 LARGEST_STEP = 0.4  # of a weight over itself, and of a point over the distance to its neighbour
 QUADRATURES = ("spline", "gauss", "gauss+1")
+SAMPLES = 6  # places a direction, each three neighbouring spans, at which a map is measured
+LIMIT = 0.03  # trained maps reach 0.06 and more after two refinements, the twisted cube 0.02 with 14 elements
+TIMES = (1.0, 2.0, 2.0, 1.0, 2.0, 1.0)  # how often each of the six entries stands in a symmetric matrix
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +65,7 @@ class GaussRule:
         parts = [slice(start, start + step) for start in range(0, len(w), step)]
         return [GaussRule((u, v, w[part]), (weights_u, weights_v, weights_w[part])) for part in parts]
 
-    def tabulate(self, degrees: tuple[int, int, int], knots: Knots) -> Tables:
+    def tabulate(self, degrees: tuple[int, int, int], knots: Knots) -> kernels.Tables:
         """Return tables of any spline basis (the trial space's or the map's) at the points of this rule.
 
         A direction's table is the index (q,) of the first function that is nonzero at each point, the values and first
@@ -82,8 +87,8 @@ def gauss_rule(space: TrialSpace, counts: Sequence[int] | None = None) -> GaussR
 def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = True) -> GaussRule:
     """Return the rule of the operator.
 
-    quadrature: as in `SpaceOptions`. rough: whether the factors vary much from span to span (`planes.is_rough`), which
-        takes more points.
+    quadrature: as in `solve_problem`. rough: whether the factors vary much from span to span (`is_rough`), which takes
+        more points.
     Raises ValueError for any other quadrature.
     """
     if quadrature not in QUADRATURES:
@@ -94,6 +99,11 @@ def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = T
         return gauss_rule(space, [degree + 1 for degree in space.degrees])
     each = zip(space.whole.knots, space.degrees, space.gauss_points, strict=True)
     return _tensor_rule(space, [_fewest_points(*direction, rough) for direction in each])
+
+
+def rule_of(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array], quadrature: str) -> GaussRule:
+    """Return the rule of a law's operator on a volume; tensor as in `is_rough`, quadrature as in `operator_rule`."""
+    return operator_rule(space, quadrature, quadrature == "spline" and is_rough(volume, space.whole, tensor))
 
 
 def _fewest_points(knots: Array, degree: int, gauss: int, rough: bool) -> tuple[Array, Array]:
@@ -182,3 +192,73 @@ def _first_guess(knots: Array, degree: int, integrals: Array, spare: int) -> tup
     points = np.interp((np.arange(m) + 0.5) * n / m - 0.5, np.arange(n), greville(knots, degree))
     sums = np.concatenate([[0.0], np.cumsum(integrals)])
     return points, np.diff(np.interp(np.arange(m + 1) * n / m, np.arange(n + 1), sums))
+
+
+def map_planes(
+    volume: BSplineVolume, rule: GaussRule, points: Iterable[int] | None = None
+) -> Iterator[tuple[int, Array, Points]]:
+    """Yield for every point q of direction u: q, the map on its plane, and its points in space, (3, q_w, q_v).
+
+    The map is (3, 4, q_w, q_v): components x value and gradient. points: the q wanted, default all. The arrays are
+    reused from one step to the next.
+    """
+    (first, basis, functions), table_v, table_w = rule.tabulate(volume.degrees, volume.knots)
+    tables = (np.zeros_like(first), basis, functions), table_v, table_w
+    row, components = -1, np.empty((3, 0, 0, 0))
+    fields = np.empty((3, 4, *rule.plane_shape))
+    u, v, w = rule.points
+    for q in range(rule.shape[0]) if points is None else points:
+        if first[q] != row:  # the rows of control points that are not zero on a span: all at once would be a second map
+            row = int(first[q])
+            rows = volume.control_points[row : row + len(functions)]
+            components = np.ascontiguousarray(np.moveaxis(rows, -1, 0))  # (3, p + 1, n_v, n_w)
+        for component, out in zip(components, fields, strict=True):
+            kernels.evaluate_plane(component, q, tables, out)
+        yield q, fields, Points.of(fields[:, 0], (u[q : q + 1], v, w), (2, 1))
+
+
+def geometry_planes(
+    volume: BSplineVolume, rule: GaussRule, points: Iterable[int] | None = None
+) -> Iterator[tuple[int, Array, Array, Points]]:
+    """Yield as `map_planes` does: q, rows R (3, 3, q_w, q_v), w det J (q_w, q_v), and the points in space.
+
+    R is J^-1 times the root of w |det J|: docs/solver.md says how gradients and fluxes go through it.
+    """
+    rows, measure = np.empty((3, 3, *rule.plane_shape)), np.empty(rule.plane_shape)
+    for q, fields, x in map_planes(volume, rule, points):
+        kernels.plane_rows(fields, rule.plane_weights(q), rows, measure)
+        yield q, rows, measure, x
+
+
+def is_rough(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array]) -> bool:
+    """Return whether G = det J J^-1 kappa J^-T varies much from span to span of a trial space.
+
+    Measured are second differences of G between the middles of three neighbouring spans, relative to G, at SAMPLES^3
+    places. G is rough where their root mean square exceeds LIMIT in a direction, and on fewer than three spans.
+    tensor: takes points (3, ...) and returns the six entries of kappa (6, ...).
+    """
+    u, v, w = (_stencils(knots) for knots in space.knots)
+    rule = GaussRule((u, v, w), (np.ones_like(u), np.ones_like(v), np.ones_like(w)))
+    factors = np.empty((len(u), 6, *rule.plane_shape))
+    with np.errstate(all="ignore"):  # of a map without an inverse the assembly speaks
+        for q, rows, _, x in geometry_planes(volume, rule):
+            kernels.tensor_factors(rows, np.ascontiguousarray(tensor(x)), factors[q])
+        return not all(_bend(factors, axis) <= LIMIT for axis in (0, 2, 3))
+
+
+def _stencils(knots: Array) -> Array:
+    """Return the middles of SAMPLES times three neighbouring spans, of all spans where there are fewer than three."""
+    middles = midpoints(knots)
+    if len(middles) < 3:
+        return middles
+    centers = np.linspace(1, len(middles) - 2, SAMPLES).round().astype(int)
+    return middles[(centers[:, None] + [-1, 0, 1]).ravel()]
+
+
+def _bend(factors: Array, axis: int) -> float:
+    """Return the root mean square of relative second differences along an axis of triples; infinite without triples."""
+    if factors.shape[axis] < 3:
+        return np.inf
+    low, middle, high = (np.moveaxis(factors, (1, axis), (-1, 0))[i::3] for i in range(3))  # (triples, .., .., 6)
+    squares = ((low - 2.0 * middle + high) ** 2 @ TIMES) / (middle**2 @ TIMES)
+    return float(np.sqrt(squares.mean()))

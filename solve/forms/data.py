@@ -1,6 +1,6 @@
 """Data of a problem: formulas in x, y, z and X, Y, Z, functions or fields, checked at every point."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from parameterize.arrays import Array
-from parameterize.spline.volume import FACE_NAMES
 
 from ..field import SplineField
 from .frame import UnitFrame
-from .jets import Jet
 from .parser import Expression, ExpressionError
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
@@ -74,11 +72,6 @@ class Datum:
                 raise ValueError(message) from None
             parts.append(finite(self.name, found, x, entry))
         return np.stack(parts).reshape(self.components, *x.shape[1:])
-
-    def jets(self, x: Sequence[Jet]) -> list[Jet]:
-        """Return the jets of its entries, which are formulas, from those of x, y, z."""
-        assert self.is_formula
-        return [entry.jet(x) for entry in self.formulas]
 
 
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:
@@ -154,13 +147,6 @@ def demand_definite(tensor: Array, name: str, x: Array) -> None:
     minor = xx * yy - xy * xy
     determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
     demand((xx > 0.0) & (minor > 0.0) & (determinant > 0.0), name, "positive definite", x)
-
-
-def check_faces(name: str, faces: Collection[str]) -> None:
-    """Raise ValueError for a name that is no face of the cube."""
-    for face in faces:
-        if face not in FACE_NAMES:
-            raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
 
 
 def _first(bad: NDArray[np.bool_], x: Array) -> str:

@@ -50,20 +50,21 @@ class Jet:
     hessian: Numbers = (0.0,) * 6
 
     def __neg__(self) -> "Jet":
-        return self.times(Jet(np.float64(-1.0)))
+        return self * -1.0
 
     def __pow__(self, other: Any) -> Any:
         if isinstance(other, int | float | np.integer):
             return self.power(float(other))
         return (other * self.log()).exp() if isinstance(other, Jet) else NotImplemented  # valid for a positive base
 
-    def plus(self, b: "Jet") -> "Jet":
-        """Add another jet."""
+    @_operation
+    def __add__(self, b: "Jet") -> "Jet":
         gradient, hessian = _each(_plus, self.gradient, b.gradient), _each(_plus, self.hessian, b.hessian)
         return Jet(_plus(self.value, b.value), gradient, hessian)
 
-    def times(self, b: "Jet") -> "Jet":
-        """Multiply by another jet: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
+    @_operation
+    def __mul__(self, b: "Jet") -> "Jet":
+        """Multiply: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
 
         def product(da: Number, db: Number) -> Number:
             return _plus(_times(self.value, db), _times(b.value, da))
@@ -95,8 +96,7 @@ class Jet:
     log = _function(lambda v: (np.log(v), 1.0 / v, -1.0 / (v * v)))
     sqrt = _function(lambda v: ((root := np.sqrt(v)), 0.5 / root, -0.25 / (root * v)))
 
-    __add__ = __radd__ = _operation(lambda a, b: a.plus(b))
-    __mul__ = __rmul__ = _operation(lambda a, b: a.times(b))
+    __radd__, __rmul__ = __add__, __mul__
     __sub__ = _operation(lambda a, b: a + -b)
     __rsub__ = _operation(lambda a, b: -a + b)
     __truediv__ = _operation(lambda a, b: a * b.power(-1.0))

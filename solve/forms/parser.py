@@ -9,6 +9,7 @@ import ast
 import math
 import operator
 import re
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -157,39 +158,34 @@ class _Translator:
     def _node(self, node: ast.expr, depth: int) -> Evaluator:
         if depth > MAX_DEPTH:
             raise self._refuse(node, f"nested more than {MAX_DEPTH} deep")
-        if isinstance(node, ast.Constant):
-            return self._number(node)
-        if isinstance(node, ast.Name):
-            return self._name(node)
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-            inner = self._node(node.operand, depth + 1)
-            return lambda p: -inner(p)
-        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-            return self._binary(node, depth)
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
-            raise self._refuse(node, "a power is written with **, as in x**2")
-        if isinstance(node, ast.Call):
-            return self._call(node, depth)
+        match node:
+            case ast.Constant(value=value):
+                return self._number(node, value)
+            case ast.Name(id=name) if name in CONSTANTS:
+                return _constant(CONSTANTS[name])
+            case ast.Name(id=name) if name in VARIABLES:
+                self.variables.add(name)
+                return operator.itemgetter(VARIABLES.index(name))
+            case ast.Name():
+                names = ", ".join((*VARIABLES, *CONSTANTS, *FUNCTIONS))
+                raise self._refuse(node, f"unknown name; the names are {names}")
+            case ast.UnaryOp(op=ast.USub()):
+                inner = self._node(node.operand, depth + 1)
+                return lambda p: -inner(p)
+            case ast.BinOp(op=ast.BitXor()):
+                raise self._refuse(node, "a power is written with **, as in x**2")
+            case ast.BinOp(op=op) if type(op) in OPERATORS:
+                return self._binary(node, depth)
+            case ast.Call():
+                return self._call(node, depth)
         raise self._refuse(node, f"not allowed; use numbers, x y z X Y Z pi e, + - * / ** and {' '.join(FUNCTIONS)}")
 
-    def _number(self, node: ast.Constant) -> Evaluator:
-        if type(node.value) not in (int, float):
+    def _number(self, node: ast.Constant, value: Any) -> Evaluator:
+        if type(value) not in (int, float):
             raise self._refuse(node, "only real numbers are allowed")
-        try:
-            number = float(node.value)  # type: ignore[arg-type]
-        except OverflowError:
-            number = math.inf
-        if not math.isfinite(number):
+        if not abs(value) <= sys.float_info.max:
             raise self._refuse(node, "the number is too large")
-        return _constant(number)
-
-    def _name(self, node: ast.Name) -> Evaluator:
-        if node.id in CONSTANTS:
-            return _constant(CONSTANTS[node.id])
-        if node.id not in VARIABLES:
-            raise self._refuse(node, f"unknown name; the names are {', '.join((*VARIABLES, *CONSTANTS, *FUNCTIONS))}")
-        self.variables.add(node.id)
-        return operator.itemgetter(VARIABLES.index(node.id))
+        return _constant(float(value))
 
     def _call(self, node: ast.Call, depth: int) -> Evaluator:
         name = node.func.id if isinstance(node.func, ast.Name) else ""

@@ -82,9 +82,9 @@ class Poisson(LawWithData):
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return kappa grad u."""
-        if "kappa" not in self._data:
+        if "kappa" not in self.data:
             return grad
-        kappa = _coefficient(self._data["kappa"], x)
+        kappa = _coefficient(self.data["kappa"], x)
         if len(kappa) == 1:
             return kappa[0] * grad
         rows = [sum(kappa[SYMMETRIC[i][j]] * grad[:, j] for j in range(3)) for i in range(3)]
@@ -92,23 +92,23 @@ class Poisson(LawWithData):
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
         """Return c u."""
-        return _coefficient(self._data["reaction"], x)[0] * u if self.has_reaction else 0.0
+        return _coefficient(self.data["reaction"], x)[0] * u if self.has_reaction else 0.0
 
     @property
     def has_reaction(self) -> bool:
         """Whether there is a term c u."""
-        return "reaction" in self._data
+        return "reaction" in self.data
 
     @property
     def not_differentiable(self) -> str:
         """Why the derivatives of kappa, or the values of c on jets, are unknown; "" where they are known."""
-        if "kappa" in self._data and not self._data["kappa"].is_formula:
+        if "kappa" in self.data and not self.data["kappa"].is_formula:
             return "kappa is a function or a field, whose derivatives are unknown"
         return "reaction is a field" if isinstance(self.reaction, SplineField) else ""
 
     def tensor(self, x: Array, component: int = 0) -> Array:
         """Return kappa (6, ...). Raises ExpressionError where it is not positive definite."""
-        found = self._data["kappa"](x) if "kappa" in self._data else np.ones((1, *x.shape[1:]))
+        found = self.data["kappa"](x) if "kappa" in self.data else np.ones((1, *x.shape[1:]))
         if len(found) == 1:
             demand(found[0] > 0.0, "kappa", "positive", x)
             return found * np.reshape(IDENTITY, (6, *(1,) * (x.ndim - 1)))
@@ -117,7 +117,7 @@ class Poisson(LawWithData):
 
     def mass(self, x: Array, component: int = 0) -> Array:
         """Return the reaction c. Raises ExpressionError where it is negative."""
-        found: Array = self._data["reaction"](x)[0] if self.has_reaction else np.zeros(x.shape[1:])
+        found: Array = self.data["reaction"](x)[0] if self.has_reaction else np.zeros(x.shape[1:])
         demand(found >= 0.0, "reaction", "zero or positive", x)
         return found
 
@@ -143,5 +143,5 @@ def _coefficient(datum: Datum, x: Any) -> Any:
     if x.dtype != object:
         return datum(x)
     if datum.is_formula:
-        return datum.jets(list(x))
+        return [formula.jet(list(x)) for formula in datum.formulas]
     return [Jet(value, (np.nan,) * 3, ()) for value in datum(np.stack(np.broadcast_arrays(*(jet.value for jet in x))))]

@@ -13,7 +13,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import SplineField
-from .data import Data, Datum, check_faces, demand, finite, parse
+from .data import Data, Datum, demand, finite, parse
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
 from .jets import Jet, Numbers, coordinates, known
@@ -36,7 +36,7 @@ class BoundaryValueProblem:
     labels: ClassVar[Mapping[str, str]] = {}  # role -> name in messages, where that is another
     natural: tuple[str, ...]  # faces on which the flux through them is given
     dirichlet: tuple[str, ...]  # faces on which u itself is given
-    _data: dict[str, Datum]
+    data: Mapping[str, Datum]  # by role
 
     def _set(self, given: Mapping[str, Data | None], neumann: Natural, robin: Robin, **counts: int) -> None:
         """Parse the data. Raises ValueError where they do not fit together or cannot be known.
@@ -50,10 +50,11 @@ class BoundaryValueProblem:
         for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
             if not isinstance(faces, Mapping):
                 raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
+            for face in faces:
+                if face not in FACE_NAMES:
+                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
         if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
             raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
-        check_faces(self.label("neumann"), neumann)
-        check_faces("robin", robin)
         if both := neumann.keys() & robin.keys():
             raise ValueError(f"face {min(both)} has both Neumann and Robin data; give one of them")
         on_faces = {f"neumann {face}": entry for face, entry in neumann.items()}
@@ -66,7 +67,7 @@ class BoundaryValueProblem:
                 face = role.split(":")[0].partition(" ")[2]
                 data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
         dirichlet = tuple(face for face in FACE_NAMES if face not in neumann and face not in robin)
-        for name, value in (("_data", data), ("natural", tuple(neumann)), ("dirichlet", dirichlet)):
+        for name, value in (("data", data), ("natural", tuple(neumann)), ("dirichlet", dirichlet)):
             object.__setattr__(self, name, value)
         for role in ("source", *on_faces):
             if role not in data:
@@ -74,7 +75,7 @@ class BoundaryValueProblem:
 
     def _check_derived(self, role: str) -> None:
         """Raise ValueError where data that are not given do not follow from `exact`."""
-        name, exact = self.label(role), self._data.get("exact")
+        name, exact = self.label(role), self.data.get("exact")
         if exact is None:
             zero = '"0"' if self.form.components == 1 else '("0", ...)'
             raise ValueError(f"{name} has no data: give {name}={zero} for none, or the solution as formulas in exact")
@@ -91,14 +92,14 @@ class BoundaryValueProblem:
     @property
     def formulas(self) -> list[tuple[str, Datum, Expression]]:
         """The data that are formulas: role, datum, and each of its formulas."""
-        return [(role, datum, entry) for role, datum in self._data.items() for entry in datum.formulas]
+        return [(role, datum, entry) for role, datum in self.data.items() for entry in datum.formulas]
 
     def on(self, volume: BSplineVolume) -> Self:
         """Return the same problem with X, Y, Z measured in a volume: its size is 1 in them, the middle of its box 0.
 
         Raises ValueError for a field that was found on another volume.
         """
-        for datum in self._data.values():
+        for datum in self.data.values():
             if not all(entry.fits(volume) for entry in datum.entries if isinstance(entry, SplineField)):
                 raise ValueError(
                     f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
@@ -113,7 +114,7 @@ class BoundaryValueProblem:
     def placed(self, frame: UnitFrame) -> Self:
         """Return the same problem with X, Y, Z measured in a frame."""
         other = copy(self)
-        object.__setattr__(other, "_data", {role: datum.placed(frame) for role, datum in self._data.items()})
+        object.__setattr__(other, "data", {role: datum.placed(frame) for role, datum in self.data.items()})
         return other
 
     @property
@@ -129,19 +130,15 @@ class BoundaryValueProblem:
             return f"the law {type(self.form).__name__} does not run on jets ({error})"
         return ""
 
-    def knows(self, role: str) -> bool:
-        """Whether the datum of a role was given."""
-        return role in self._data
-
     @property
     def exact_formulas(self) -> list[Expression]:
         """The formulas of `exact`; none where it is not given as formulas."""
-        exact = self._data.get("exact")
+        exact = self.data.get("exact")
         return exact.formulas if exact and exact.is_formula else []
 
     def source_at(self, x: Array) -> Array:
         """Return the source f (c, ...)."""
-        return self._data["source"](x) if "source" in self._data else self.source_of_exact(x)
+        return self.data["source"](x) if "source" in self.data else self.source_of_exact(x)
 
     def source_of_exact(self, x: Array) -> Array:
         """Return -div flux + react (c, ...) of the formulas `exact`."""
@@ -153,41 +150,35 @@ class BoundaryValueProblem:
         return max(float(np.abs(t).max()) for row in strong_terms(self.form, self._exact_jets(x), x) for t in row)
 
     def _exact_jets(self, x: Array, hessian: Numbers = (0.0,) * 6) -> list[Jet]:
-        return self._data["exact"].jets(coordinates(np.asarray(x), hessian))
-
-    def residual_at(self, u: list[Jet], x: Array) -> Array:
-        """Return f + div flux - react (c, ...) of functions given by their jets with second derivatives."""
-        return self.source_at(x) - strong_form(self.form, u, x)
+        return [formula.jet(coordinates(np.asarray(x), hessian)) for formula in self.exact_formulas]
 
     def boundary_at(self, x: Array) -> Array:
         """Return the values of u (c, ...) given on the boundary: those of `exact` or zero where none are given."""
         for role in ("boundary", "exact"):
-            if role in self._data:
-                return self._data[role](x)
+            if role in self.data:
+                return self.data[role](x)
         return np.zeros((self.form.components, *x.shape[1:]))
 
-    def flux_at(self, face: str, x: Array, normal: Array) -> Array:
-        """Return the flux through a face with Neumann's data (c, ...); normal: (3, ...), outward unit normals."""
-        role = f"neumann {face}"
-        return self._data[role](x) if role in self._data else self._flux_of_exact(role, x, normal)
+    def on_face(self, face: str, x: Array, normal: Array) -> tuple[Array | None, Array]:
+        """Return alpha (...) and g (c, ...) of flux . n + alpha u = g on a face; alpha is None for Neumann's data.
 
-    def robin_at(self, face: str, x: Array, normal: Array) -> tuple[Array, Array]:
-        """Return alpha (...) and g (c, ...) of flux . n + alpha u = g on a face."""
-        role = f"robin {face}"
-        alpha = self._data[f"{role}: alpha"](x)[0]
-        demand(alpha >= 0.0, f"{role}: alpha", "zero or positive", x)
-        if role in self._data:
-            return alpha, self._data[role](x)
-        return alpha, self._flux_of_exact(role, x, normal) + alpha * self._data["exact"](x)
-
-    def _flux_of_exact(self, role: str, x: Array, normal: Array) -> Array:
+        normal: (3, ...), outward unit normals.
+        """
+        role, alpha = f"neumann {face}", None
+        if face not in self.natural:
+            role = f"robin {face}"
+            alpha = self.data[f"{role}: alpha"](x)[0]
+            demand(alpha >= 0.0, f"{role}: alpha", "zero or positive", x)
+        if role in self.data:
+            return alpha, self.data[role](x)
         u, grad = known(self._exact_jets(x, ()), x.shape[1:])
-        flux = np.asarray(self.form.flux(u, grad, x), dtype=np.float64)
-        return finite(f"{self.label(role)} (from exact)", (flux * normal).sum(axis=1), x, self._first_formula)
+        flux = (np.asarray(self.form.flux(u, grad, x), dtype=np.float64) * normal).sum(axis=1)
+        finite(f"{self.label(role)} (from exact)", flux, x, self._first_formula)
+        return alpha, flux if alpha is None else flux + alpha * self.data["exact"](x)
 
     def exact_at(self, x: Array) -> tuple[Array, Array | None]:
         """Return exact u (c, ...) and its gradient (c, 3, ...), None where the derivatives are unknown."""
-        exact = self._data["exact"]
+        exact = self.data["exact"]
         if not exact.is_formula:
             return exact(x), None
         value, gradient = known(self._exact_jets(x, ()), x.shape[1:])
@@ -212,35 +203,28 @@ class LawWithData(BoundaryValueProblem, Form):
 
 @dataclass(frozen=True)
 class Problem(BoundaryValueProblem):
-    """A law of one's own, -div flux + react = f, with data on the images of the cube's six faces.
+    """A law of one's own, -div flux + react = f, with data as those of `Poisson`.
 
-    Each datum is, for c components, a sequence of c entries, or one entry where c = 1. An entry is a formula in x, y, z
-    and X, Y, Z, a function of points x (3, ...) that returns (...), or a field (`solution.field`) on the same volume.
-    A function or a field may also stand for all components: (c, ...).
+    Each datum is, for c components, a sequence of c entries, or one entry where c = 1. Functions take points x (3, ...)
+    and return (...). A function or a field may also stand for all components: (c, ...).
 
     Parameters
     ----------
     form : Form
         The law.
-    exact : datum, optional
-        The solution, where it is known; as formulas it gives the source and all data on faces.
-    source : datum, optional
-        f.
-    boundary : datum, optional
-        Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
+    exact, source, boundary : datum, optional
+        The solution, where it is known, the source f, and the values of u on faces.
     neumann : dict of face name to datum or None
-        flux . n on "u0", ..., "w1", n the outward unit normal; None: from `exact`.
+        flux . n, n the outward unit normal.
     robin : dict of face name to (entry, datum or None)
-        (alpha, g) of flux . n + alpha u = g; alpha one entry, not negative; None for g: from `exact`.
+        (alpha, g) of flux . n + alpha u = g; alpha is one entry.
 
     Raises
     ------
     TypeError
         For what is no instance of a subclass of `Form`.
-    ExpressionError
-        For a formula that is refused.
-    ValueError
-        Where data cannot be known or do not fit.
+    ExpressionError, ValueError
+        As `Poisson` does.
 
     Examples
     --------

@@ -49,7 +49,7 @@ class DeviceOperator:
     """The operator with its factors as a tensor on a device."""
 
     def __init__(self, operator: Operator, device: str) -> None:
-        self._window, self._shape = operator.window, operator.space.shape
+        self._window, self._shape = operator.space.window, operator.space.shape
         self._factors = torch.as_tensor(operator.factors, device=device)
         self._u, self._v, self._w = (
             [torch.as_tensor(operator.dense(axis, d), device=device) for d in (0, 1)] for axis in range(3)
@@ -64,7 +64,7 @@ class DeviceOperator:
         ]
 
     def apply_free(self, free: Tensor) -> Tensor:
-        """The product restricted to the free coefficients, a tensor of the window's shape."""
+        """The product restricted to the free coefficients, a tensor of their shape."""
         full = free.new_zeros(self._shape)
         full[self._window] = free
         result = torch.zeros_like(full)

@@ -51,7 +51,7 @@ def conjugate_gradients(
     """
 
     def dot(one: Vector, other: Vector) -> float:
-        return total(_dot(one, other))
+        return total(float(one.reshape(-1) @ other.reshape(-1)))  # words that NumPy and torch share
 
     norm_b = math.sqrt(dot(b, b))
     x, p, r = 0.0 * b, 0.0 * b, 1.0 * b
@@ -78,11 +78,6 @@ def conjugate_gradients(
         rz_old = rz
         residuals.append(math.sqrt(dot(r, r)) / norm_b)
     return LinearResult(x, tuple(residuals), residuals[-1] <= tolerance)
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    """Inner product, in words that NumPy and torch share."""
-    return float(a.reshape(-1) @ b.reshape(-1))
 
 
 def generalized_residuals(

@@ -107,24 +107,21 @@ class FastDiagonalization:
         return result
 
 
-def fast_diagonalization(
-    operator: Operator, robin: Mapping[str, float] | None = None, extra_diagonal: Array | None = None
-) -> FastDiagonalization:
+def fast_diagonalization(operator: Operator) -> FastDiagonalization:
     """Build the preconditioner of an operator restricted to its free coefficients.
 
-    robin: of the faces with Robin's condition, the average over the face's parameters of alpha times the surface
-    element. extra_diagonal: (n_u, n_v, n_w), the diagonal of what is added to the operator elsewhere (Robin's terms).
     All processes that share the space call it.
     """
     space = operator.space
-    robin = robin or {}
+    here = {name: float(face.measure.sum()) for name, face in operator.robin.items()}
+    robin = {name: float(space.total(here.get(name, 0.0))) for name in FACE_NAMES}
     slopes, masses, averages = _directional_matrices(operator, robin)
-    reaction = operator.mean_mass() / float(np.prod(averages))
+    mean_mass = float(space.total(sum(plane[6:].sum() for plane in operator.factors)))  # of c |det J|, over the cube
+    reaction = mean_mass / float(np.prod(averages))
     values, vectors = zip(*(eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
     spectrum = values[0][:, None, None] + values[1][space.columns, None] + values[2] + reaction
-    scaling = _scaling(operator, slopes, masses, reaction, extra_diagonal)
-    whole = all(free == slice(0, n) for free, n in zip(operator.free, space.whole.shape, strict=True))
-    singular = whole and reaction == 0.0 and not any(robin.values())
+    scaling = _scaling(operator, slopes, masses, reaction)
+    singular = not space.dirichlet and reaction == 0.0 and not any(robin.values())
     if singular:
         spectrum[0, : int(space.columns.start == 0), 0] = np.inf
     u, v, w = vectors
@@ -137,26 +134,25 @@ def _directional_matrices(
 ) -> tuple[list[Array], list[Array], list[float]]:
     """Return per direction the stiffness matrix K_d and the mass matrix M_d on the free coefficients, and M_d's mean.
 
-    The mean is that of the weight b_d over the direction's parameter.
+    The mean is that of the weight b_d over the direction's parameter. robin: of each face, the average over its
+    parameters of alpha times the surface element.
     """
     along, across = _separable_coefficients(operator)
     averages = [float(w @ b) for w, b in zip(operator.rule.weights, across, strict=True)]
     averages[0] = operator.space.total(averages[0])
     slopes, masses = [], []
-    for axis, free in enumerate(operator.free):
+    for axis, free in enumerate(operator.space.free):
         mass = _gram(operator, axis, operator.rule.weights[axis] * across[axis], 0)
         slope = _gram(operator, axis, operator.rule.weights[axis] * along[axis], 1)
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
             # one function only is nonzero at the end, with value 1
-            slope[end, end] += robin.get(name, 0.0) * averages[axis] / float(np.prod(averages))
+            slope[end, end] += robin[name] * averages[axis] / float(np.prod(averages))
         slopes.append(slope[free, free])
         masses.append(mass[free, free])
     return slopes, masses, averages
 
 
-def _scaling(
-    operator: Operator, slopes: list[Array], masses: list[Array], reaction: float, extra_diagonal: Array | None
-) -> Array:
+def _scaling(operator: Operator, slopes: list[Array], masses: list[Array], reaction: float) -> Array:
     """Return D, the square root of the diagonal of P over that of the operator, on the free coefficients."""
     place = operator.space.place, slice(None), slice(None)
     stiff, mass = (
@@ -165,11 +161,10 @@ def _scaling(
     terms = [(stiff[0], mass[1], mass[2]), (mass[0], stiff[1], mass[2]), (mass[0], mass[1], stiff[2])]
     diagonal = sum(np.einsum("i,j,k->ijk", *term) for term in terms)
     diagonal += reaction * np.einsum("i,j,k->ijk", *mass)
-    wanted = operator.diagonal() + (0.0 if extra_diagonal is None else extra_diagonal)
+    wanted = operator.diagonal()
     operator.space.add(wanted)
     # A folded map has diagonal entries below zero; their size is all a scaling can use.
-    scaling: Array = np.sqrt(np.abs(diagonal / wanted[operator.window]))
-    return scaling
+    return np.asarray(np.sqrt(np.abs(diagonal / wanted[operator.space.window])))
 
 
 def _separable_coefficients(operator: Operator) -> tuple[list[Array], list[Array]]:

@@ -75,13 +75,13 @@ def helps(operator: Operator) -> bool:
 def _place(space: TrialSpace, count: int) -> tuple[int, int]:
     """Return where those of this process begin among what all processes count, and the number of all."""
     counts = space.shared(count)
-    return sum(counts[: space.rank]), sum(counts)
+    return sum(counts[: space.comm.rank]), sum(counts)
 
 
 def incomplete_cholesky(operator: Operator) -> IncompleteCholesky:
     """Return the factorization that belongs to an operator's free coefficients."""
     space = operator.space
-    spaces = list(zip(space.whole.knots, space.degrees, operator.free, strict=True))
+    spaces = list(zip(space.whole.knots, space.degrees, space.free, strict=True))
     matrices = [collocation(k, p, greville(k, p)).toarray()[free, free] for k, p, free in spaces]
     u, v, w = (np.linalg.inv(matrix) for matrix in matrices)
     factor = _stencils(operator)
@@ -121,7 +121,7 @@ def _stencils(operator: Operator) -> Array:
             there = tuple(slice(c, c + len(h)) for c, h in zip(corner + origin, widths, strict=True))
             lower[place][there] += np.tensordot(reference[:, i, j], cells, 1)
     space.add(lower)
-    lower = lower[:, *operator.window]
+    lower = lower[:, *space.window]
     for entries, offset in zip(lower, OFFSETS, strict=True):
         for axis, step in enumerate(offset):
             if step and (axis > 0 or space.place.start == 0):  # no neighbour beyond the last free node

@@ -5,7 +5,7 @@ import pytest
 from volumes import mapped
 
 from parameterize.spline.volume import BSplineVolume
-from solve.discretization.planes import is_rough
+from solve.discretization.quadrature import is_rough
 from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
 

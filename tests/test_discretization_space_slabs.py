@@ -1,6 +1,7 @@
 """Slabs of a trial space: several processes find what one finds."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,9 +12,7 @@ from mpi_job import mpiexec
 
 from parameterize.spline.bspline import basis_derivatives
 from solve import benchmark_volume, solve_problem
-from solve.discretization.operator import free_window
 from solve.discretization.quadrature import gauss_rule
-from solve.discretization.slab import Slab
 from solve.discretization.space import TrialSpace, trial_space
 
 REPEATED = np.array([0, 0, 0, 0, 0.2, 0.2, 0.5, 0.5, 0.5, 0.6, 1, 1, 1, 1])
@@ -73,14 +72,13 @@ def _counted_as_the_model_says(found, ranks, alone):
 @pytest.mark.parametrize("name", SPACES)
 @pytest.mark.parametrize("ranks", [1, 2, 3, 7])
 def test_every_row_has_an_owner_and_every_point_its_functions(name, ranks):
-    space = SPACES[name]
-    free = free_window(space, ("u0", "v0"))
-    slabs = [Slab.of(space, SimpleNamespace(size=ranks, rank=rank), free) for rank in range(ranks)]
-    rows = np.concatenate([np.arange(space.shape[0])[slab.owned[slab.rank]] for slab in slabs])
+    space = replace(SPACES[name], dirichlet=("u0", "v0"))
+    slabs = [space.slab(SimpleNamespace(size=ranks, rank=rank)) for rank in range(ranks)]
+    rows = np.concatenate([np.arange(space.shape[0])[slab.owned[slab.comm.rank]] for slab in slabs])
     assert np.array_equal(rows, np.arange(space.shape[0]))
     points = np.concatenate([gauss_rule(slab).points[0] for slab in slabs])
     assert np.array_equal(points, gauss_rule(space).points[0])
-    assert sum(slab.own(free)[0].stop - slab.own(free)[0].start for slab in slabs) == space.shape[0] - 1
+    assert sum(slab.window[0].stop - slab.window[0].start for slab in slabs) == space.shape[0] - 1
     for slab in slabs:
         here = gauss_rule(slab).points[0]
         first, values = basis_derivatives(space.knots[0], space.degrees[0], here)
