@@ -139,7 +139,7 @@ class _Spots:
             u, v, w = (np.bincount(self.unproved[:, d], minlength=n).astype(float) for d, n in enumerate(n_spans))
             return u, v, w
         boundary = totals_along(self.places, self.squares / self.squares.sum(), knots)
-        points, density, weights = arap_grid(self.volume, n_gauss=2)
+        points, (density,), weights = arap_grid(self.volume, n_gauss=2)
         limit = self.arap_limit * (1.0 + float(np.sum(weights * density)))
         excess = weights * np.maximum(density - limit, 0.0) ** 2
         grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
