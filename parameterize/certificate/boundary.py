@@ -1,8 +1,8 @@
 """Is a volume's boundary injective: do its six faces meet nowhere but where they are joined?
 
 With det J > 0 on the whole cube, an injective boundary makes the whole map one-to-one. The faces are cut into Bezier
-patches (bezier_patches.py), and every pair of patches is settled by a proof (patch_proofs.py), or cut in four and
-looked at again. Where nothing is proved, two parameters of one point are searched for.
+patches, and every pair of patches is settled by a proof (patch_proofs.py), or cut in four and looked at again. Where
+nothing is proved, two parameters of one point are searched for.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,7 @@ from ..arrays import Array, IntArray, in_brackets
 from ..cube.cube import VARYING_AXES
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
-from .bezier_patches import Pieces, as_rows, boundary_pieces, contact, halved
-from .patch_proofs import settled
+from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, settled
 
 Point = tuple[float, float, float]
 

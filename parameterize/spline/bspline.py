@@ -194,12 +194,14 @@ def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
     return np.moveaxis(flat.reshape(-1, *moved.shape[1:]), 0, axis)
 
 
-def interpolate_along(knots: Array, degree: int, values: Array, axis: int) -> Array:
-    """Return the coefficients along one axis of the spline that has `values` (..., n, ...) at the Greville points."""
+def interpolate_grid(knots: Sequence[Array], degree: int, values: Array) -> Array:
+    """Return the coefficients of the spline that has `values` (n_u, n_v, n_w, c) at the Greville points."""
     from scipy.interpolate import make_interp_spline
 
-    moved = np.moveaxis(values, axis, 0)
-    return np.moveaxis(make_interp_spline(greville(knots, degree), moved, degree, knots).c, 0, axis)
+    for axis, row in enumerate(knots):
+        moved = np.moveaxis(values, axis, 0)
+        values = np.moveaxis(make_interp_spline(greville(row, degree), moved, degree, row).c, 0, axis)
+    return values
 
 
 def evaluate_at(
