@@ -17,9 +17,8 @@ from .arrays import Knots
 from .config import GrowthConfig, LayoutConfig, SplineConfig
 from .cube.cube import project_radially, snap
 from .cube.cutting import cut_along_rays, subdivide_finely
-from .cube.sphere import SphereLayout
+from .cube.flips import Layout
 from .cube.turning import turned
-from .cube.tutte import Layout
 from .spline.bspline import greville
 from .surface.geometry import vertex_weights
 
@@ -41,7 +40,7 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
 
 
 def surface_on_cube(
-    sphere: SphereLayout, own: int, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
+    sphere: Layout, own: int, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
 ) -> Layout:
     """Lay a closed surface, laid on the sphere, on the cube without a flipped triangle, its long edges cut.
 
@@ -49,7 +48,7 @@ def surface_on_cube(
     best of these ways, 1 the next, ...
     """
     sphere = turned(sphere, options, np.random.default_rng(seed), turn)
-    columns = np.hstack([sphere.vertices, sphere.directions])
+    columns = np.hstack([sphere.vertices, sphere.places])
     columns, faces = subdivide_finely(columns, sphere.faces, own, spline)
     points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])
     cut = cut_along_rays(places, faces, options.path_snap)

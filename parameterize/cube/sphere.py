@@ -7,7 +7,6 @@ Trans. Graphics 34, 2015), which is infinite where a triangle has no area left: 
 """
 
 import math
-from dataclasses import dataclass
 
 import igl
 import numpy as np
@@ -18,29 +17,21 @@ from ..arrays import Array, IntArray, Mask
 from ..config import LayoutConfig
 from ..surface.geometry import doubled_areas, edge_table
 from .cutting import split_edges
+from .flips import Layout
 
 _SHIFT = -1e-6  # below all eigenvalues of the Laplacian, so that it can be factorised
 _THIN = 1e-6  # area of a triangle, and length of an edge, that counts at least, as a share of the mean
 _SHORTEST_STEP = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class SphereLayout:
-    """Surface points (n, 3), those of the mesh first, triangles (m, 3), and directions (n, 3), unit vectors."""
-
-    vertices: Array
-    faces: IntArray
-    directions: Array
-
-
-def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> SphereLayout:
+def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> Layout:
     """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
 
     Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh.
     """
     vertices, faces, upper = _halves(vertices, faces, layout.least_share)
     directions = _hemispheres(vertices, faces, upper)
-    return SphereLayout(vertices, faces, _relaxed(directions, vertices, faces, layout))
+    return Layout(vertices, faces, _relaxed(directions, vertices, faces, layout))
 
 
 def turned_over(directions: Array, faces: IntArray) -> Mask:

@@ -5,8 +5,6 @@ with every inner vertex a convex combination of its neighbours the map onto that
 Floater, Math. Comp. 72, 2003). The combinations reproduce the network's places wherever those are one-to-one already.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array
 from scipy.sparse.linalg import splu
@@ -17,18 +15,10 @@ from ..surface.geometry import edge_table
 from .cube import axis_and_side, tangent_axes
 from .cutting import split_edges
 from .edge_paths import cut_surface, edge_targets
+from .flips import Layout
 
 _FLAT = 1e-12  # area of a triangle on the square that counts as turned over
 _TINY = 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Surface points (n, 3), those of the mesh first, triangles (m, 3) between them, places (n, 3) on the cube."""
-
-    vertices: Array
-    faces: IntArray
-    places: Array
 
 
 def lay_out(

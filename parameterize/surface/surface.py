@@ -12,12 +12,19 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, IntArray, in_brackets
 from ..display import Shown
 from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
-from .geometry import signed_volume
-from .inside import deepest_point
+from .geometry import deepest_point, signed_volume
 from .readers.file import RawMesh, read_mesh
 from .readers.objects import READERS, class_of, read_object
-from .self_intersection import SHOWN, crossing_faces, crossing_places, describe_crossings
-from .topology import check_genus, check_manifold, choose_component, slivers
+from .topology import (
+    SHOWN,
+    check_genus,
+    check_manifold,
+    choose_component,
+    crossing_faces,
+    crossing_places,
+    describe_crossings,
+    slivers,
+)
 from .welding import weld_and_drop, wind_outward
 
 if TYPE_CHECKING:
