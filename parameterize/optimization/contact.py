@@ -25,7 +25,6 @@ _SAMPLES = 110  # a direction and cube face
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
 _REACH = 0.05  # from a contact, in a domain of volume 1: what the steps of a round look at
 _ACCURACY = 2.0  # of the fast winding number
-_NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +84,7 @@ def contact_penalty(
     touching = asked[_in_another_sheet(boundary.points[asked] + gap * normals[asked], boundary)]
     near = _around(boundary.points, touching) if near is None else near
     touching, facing = _facing_samples(boundary.points, normals, touching)
-    first, second = (
-        SlidingParameters(knots, degree, boundary.parameters[chosen], _NO_TRIANGLES) for chosen in (touching, facing)
-    )
+    first, second = (SlidingParameters(knots, degree, boundary.parameters[chosen]) for chosen in (touching, facing))
     return ContactPenalty(
         first.rows,
         second.rows,

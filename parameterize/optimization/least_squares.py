@@ -12,13 +12,7 @@ from .tensor_product import FastDiagonalization, bending_operator, grams
 
 
 def fit_pairs(
-    parameters: Array,
-    points: Array,
-    weights: Array,
-    knots: Knots,
-    degree: int,
-    *,
-    fairness: float,
+    parameters: Array, points: Array, weights: Array, knots: Knots, degree: int, *, fairness: float
 ) -> Tensor:
     """Control points (3, n_u, n_v, n_w) that minimise sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
 
@@ -26,8 +20,9 @@ def fit_pairs(
     least squares on G(F(x)) = x. Where no sample lies, the smoothing term alone decides.
     """
     rows = ControlRows.of(_collocation_3d(parameters, knots, degree))
-    mass, slope, curve = grams(knots, degree)
-    smooth = bending_operator(mass, slope, curve, fairness)
+    matrices = grams(knots, (degree,) * 3)
+    mass, _, curve = matrices
+    smooth = bending_operator(matrices, fairness)
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
     shape = (3, *(len(k) - degree - 1 for k in knots))
 

@@ -58,13 +58,8 @@ def closest_rotation(j: Tensor) -> Tensor:
     r = torch.from_numpy(polar_factors(start.reshape(9, -1)).reshape(start.shape)).to(j.device)
     if not bool(regular.all()):
         rest = ~regular
-        r[:, :, rest] = _rotation_by_svd(torch.nan_to_num(j[:, :, rest], 0.0, 0.0, 0.0))
+        u, _, vh = torch.linalg.svd(torch.nan_to_num(j[:, :, rest], 0.0, 0.0, 0.0).permute(2, 0, 1))
+        sign = torch.linalg.det(u @ vh).sign()
+        u = torch.cat([u[:, :, :2], u[:, :, 2:] * sign[:, None, None]], dim=2)
+        r[:, :, rest] = (u @ vh).permute(1, 2, 0)
     return r
-
-
-def _rotation_by_svd(j: Tensor) -> Tensor:
-    """Return U diag(1, 1, det U V) V^T."""
-    u, _, vh = torch.linalg.svd(j.permute(2, 0, 1))
-    sign = torch.linalg.det(u @ vh).sign()
-    u = torch.cat([u[:, :, :2], u[:, :, 2:] * sign[:, None, None]], dim=2)
-    return (u @ vh).permute(1, 2, 0)

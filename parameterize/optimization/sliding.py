@@ -26,6 +26,7 @@ from .operators import ControlRows
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3
 _POINTS = 4096  # in a piece of work
+_NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
 class SlidingParameters:
@@ -39,7 +40,7 @@ class SlidingParameters:
         knots: Knots,
         degree: int,
         parameters: Array,
-        triangles: IntArray,
+        triangles: IntArray = _NO_TRIANGLES,
         layout: LayoutConfig = LAYOUT,
     ) -> None:
         self.knots, self.degree = knots, degree

@@ -217,29 +217,26 @@ def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
     return points, weights
 
 
-def gram(knots: Array, degree: int, derivative: int) -> Tensor:
-    """Return the matrix of integrals of products of `derivative`-th derivatives (n, n): mass, stiffness, bending."""
-    points, weights = gauss_points(knots, degree + 1)
-    table = collocation(knots, degree, points.ravel(), derivative).toarray()
-    return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
+Grams = list[tuple[Tensor, ...]]  # mass, stiffness and bending matrices (n, n), each for the three directions
 
 
-def grams(knots: tuple[Array, ...], degree: int) -> list[tuple[Tensor, ...]]:
-    """Mass, stiffness and bending matrices, each for the three directions."""
-    return [tuple(gram(k, degree, d) for k in knots) for d in range(3)]
+def grams(knots: tuple[Array, ...], degrees: tuple[int, ...]) -> Grams:
+    """Return the matrices of integrals of products of basis functions, of their first and of their second derivatives.
+
+    Gauss quadrature, exact.
+    """
+
+    def of(row: Array, degree: int, derivative: int) -> Tensor:
+        points, weights = gauss_points(row, degree + 1)
+        table = collocation(row, degree, points.ravel(), derivative).toarray()
+        return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
+
+    return [tuple(of(row, p, d) for row, p in zip(knots, degrees, strict=True)) for d in range(3)]
 
 
-def bending_operator(
-    mass: tuple[Tensor, ...],
-    slope: tuple[Tensor, ...],
-    curve: tuple[Tensor, ...],
-    weight: float,
-    dtype: torch.dtype = torch.float64,
-) -> PiecewiseOperator:
+def bending_operator(matrices: Grams, weight: float, dtype: torch.dtype = torch.float64) -> PiecewiseOperator:
     """Return x -> weight * H x with x^T H x = int |Hessian F|^2 (exact); a piece of work is one component of F."""
-    m0, m1, m2 = (m.to(dtype) for m in mass)
-    k0, k1, k2 = (k.to(dtype) for k in slope)
-    h0, h1, h2 = (h.to(dtype) for h in curve)
+    (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = ([m.to(dtype) for m in row] for row in matrices)
 
     def bend(component: int, control: Tensor) -> Tensor:
         x = control[component : component + 1]

@@ -23,6 +23,7 @@ from .ply import read_ply
 from .stl import read_stl
 from .vtu import read_vtu
 
+# Each takes the bytes of a file, and how many faces it may have; MeshError, without the file's name, for a bad one.
 READERS: dict[str, Callable[[bytes, int], Content]] = {
     ".obj": read_obj,
     ".stl": read_stl,
