@@ -56,10 +56,7 @@ class BoundaryCheck:
 
 
 def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryCheck:
-    """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four.
-
-    Raises ValueError for a negative depth.
-    """
+    """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four."""
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
     local = _local(volume)
@@ -170,10 +167,7 @@ def overlapping_boxes(low: Array, high: Array) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _sweep(low: Array, high: Array, out: IntArray) -> int:
-    """Write overlapping pairs into `out` as far as it reaches; return how many there are.
-
-    `low` is sorted by its first column.
-    """
+    """Write overlapping pairs, `low` sorted by its first column, into `out` as far as it reaches; return how many."""
     count = 0
     for i in range(len(low)):
         for j in range(i + 1, len(low)):

@@ -24,10 +24,7 @@ _TINY = 1e-12
 def lay_out(
     mapped: Array, vertices: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig = LAYOUT
 ) -> Layout:
-    """Cut the surface (n, 3) along the paths that the mapped one (n, 3) suggests; lay its patches out on the cube.
-
-    corners: (8,) vertices. Raises PathError where the mapped surface is too far from a cube.
-    """
+    """Cut the surface (n, 3) along the paths that the mapped one (n, 3) suggests; lay its patches out on the cube."""
     surface = cut_surface(mapped, faces, corners, layout)
     vertices, places = surface.cut.carry(vertices), surface.cut.carry(mapped)
     path, target, _ = edge_targets(places, surface.paths)

@@ -165,10 +165,7 @@ def insert_knots(knots: Array, degree: int, new: ArrayLike) -> tuple[Array, csr_
 
 
 def insertion_into(knots: Array, degree: int, finer: Array) -> csr_array:
-    """Return the matrix (n_finer, n) that inserts the knots which a finer knot vector has in addition.
-
-    Raises ValueError where that lacks one of the knots, or its ends differ.
-    """
+    """Return the matrix (n_finer, n) that inserts the knots which a finer knot vector has in addition."""
     own, wanted = Counter(knots.tolist()), Counter(finer.tolist())
     if own - wanted:
         raise ValueError("the finer knot vector must hold every knot of the coarser one")
@@ -214,7 +211,6 @@ def evaluate_at(
     """Evaluate a trivariate spline, or one of its partial derivatives, at points (m, 3).
 
     coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
-    Raises ValueError for points of another shape, or outside the unit cube by more than rounding.
     """
     from scipy.interpolate import NdBSpline
 

@@ -20,10 +20,7 @@ SHOWN = 5  # pairs of faces that cross
 
 
 def choose_component(vertices: Array, faces: IntArray, component: int | None) -> tuple[IntArray, list[str]]:
-    """Return the faces of the only component, or of the one asked for (0 the largest), and notices.
-
-    Raises MeshError listing the components, and saying which lies inside the largest.
-    """
+    """Return the faces of the only component, or of the one asked for (0 the largest), and notices."""
     groups = _components(faces)
     if component is None and len(groups) == 1:
         return faces, []

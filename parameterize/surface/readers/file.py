@@ -47,10 +47,7 @@ class RawMesh:
 
 
 def read_mesh(path: Path, max_faces: int) -> RawMesh:
-    """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (tetrahedra: their boundary), each also as .gz.
-
-    Raises MeshError, without the file's name.
-    """
+    """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (tetrahedra: their boundary), each also as .gz."""
     if path.is_dir():
         raise MeshError("is a directory: name the surface file in it")
     suffixes = [suffix.lower() for suffix in path.suffixes]

@@ -14,10 +14,7 @@ from .file import RawMesh, triangles_of
 
 
 def class_of(mesh: object) -> str | None:
-    """Return the class of a mesh that `read_object` takes, such as "trimesh.Trimesh"; None for any other object.
-
-    The class of an object that exists was loaded before, so looking it up loads nothing.
-    """
+    """Return the class of a mesh that `read_object` takes, such as "trimesh.Trimesh"; None for any other object."""
     for name in READERS:
         library, _, kind = name.partition(".")
         known = getattr(sys.modules.get(library), kind, None)
