@@ -13,10 +13,9 @@ from .checkpoint import Checkpoints
 from .coarse import coarse_knots, optimize_coarse_first
 from .config import Config, SplineConfig
 from .cube.cutting import subdivide_finely
-from .cube.edge_paths import PathError, choose_corners
+from .cube.edge_paths import PathError, choose_corners, lay_out
 from .cube.flips import Layout, flipped, untangle
 from .cube.sphere import lay_on_sphere
-from .cube.tutte import lay_out
 from .extension import extended, extending
 from .growth import first_cube, growing, surface_on_cube
 from .optimization.least_squares import fit_pairs

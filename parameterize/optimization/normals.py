@@ -40,7 +40,8 @@ class FacingPenalty:
 
     def curvature(self, control: Tensor, dtype: torch.dtype) -> PiecewiseOperator:
         """Return the Gauss-Newton part of the second derivative at `control`."""
-        single = self._to(dtype)
+        along_a, along_b = (rows.to(dtype) for rows in self.tangents)
+        single = FacingPenalty((along_a, along_b), self.normals.to(dtype), self.weights.to(dtype), self.floor)
         by_a, by_b, size = single._slopes(control.to(dtype))
         scale = 2.0 * single.weights * (size < self.floor)
 
@@ -59,10 +60,6 @@ class FacingPenalty:
     def _pull(self, factor: Tensor, by_a: Tensor, by_b: Tensor, like: Tensor) -> Tensor:
         along_a, along_b = self.tangents
         return along_a.adjoint((factor * by_a).T, like) + along_b.adjoint((factor * by_b).T, like)
-
-    def _to(self, dtype: torch.dtype) -> "FacingPenalty":
-        along_a, along_b = (rows.to(dtype) for rows in self.tangents)
-        return FacingPenalty((along_a, along_b), self.normals.to(dtype), self.weights.to(dtype), self.floor)
 
 
 def facing_penalty(fit: SurfaceFit, control: Tensor, floor: float, margin: float) -> FacingPenalty:

@@ -12,15 +12,8 @@ from ..arrays import Array
 from ..surface.geometry import doubled_areas
 
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
-OFFSETS = (
-    np.array(
-        sorted(
-            (o for o in np.ndindex(3, 3, 3) if np.count_nonzero(np.array(o) != 1) <= 2),
-            key=lambda o: np.count_nonzero(np.array(o) != 1),
-        )
-    )
-    - 1
-)
+_STEPS = np.array(list(np.ndindex(3, 3, 3))) - 1
+OFFSETS = np.concatenate([_STEPS[np.count_nonzero(_STEPS, axis=1) == moved] for moved in range(3)])
 
 
 @dataclass(frozen=True, eq=False)
