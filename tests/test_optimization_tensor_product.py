@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 import torch
-from scipy.sparse import csr_array
 
 from parameterize.optimization.operators import ControlRows, conjugate_gradients
 from parameterize.optimization.tensor_product import (
@@ -42,13 +41,15 @@ def test_along_is_a_matrix_product_on_one_axis(axis):
 
 def test_rows_and_their_transpose_are_those_of_the_matrix():
     rng = np.random.default_rng(0)
-    dense = rng.normal(size=(9000, 6)) * (rng.random((9000, 6)) < 0.4)  # more than one piece of work
-    rows, control = ControlRows.of(csr_array(dense)), random_field(8, (3, 1, 2, 3))
+    columns, values = rng.permuted(np.tile(np.arange(6), (9000, 1)), axis=1)[:, :3], rng.normal(size=(9000, 3))
+    dense = np.zeros((9000, 6))  # more than one piece of work
+    np.put_along_axis(dense, columns, values, axis=1)
+    rows, control = ControlRows(columns, values), random_field(8, (3, 1, 2, 3))
     assert rows(control).numpy() == pytest.approx(dense @ control.reshape(3, -1).T.numpy())
     dual = random_field(9, (9000, 3))
     assert rows.adjoint(dual, control).reshape(3, -1).numpy() == pytest.approx(dual.T.numpy() @ dense)
     assert rows.to(torch.float32)(control.float()).dtype == torch.float32
-    nothing = ControlRows.of(csr_array((0, 6)))
+    nothing = ControlRows(np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)))
     assert nothing(control).shape == (0, 3) and not nothing.adjoint(random_field(9, (0, 3)), control).any()
 
 

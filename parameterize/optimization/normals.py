@@ -12,7 +12,6 @@ import torch
 from torch import Tensor
 
 from ..cube.cube import axis_and_side
-from ..spline.bspline import sparse_rows
 from .operators import ControlRows, PiecewiseOperator
 from .polar import cross
 from .surface_distance import SurfaceFit
@@ -72,12 +71,9 @@ def facing_penalty(fit: SurfaceFit, control: Tensor, floor: float, margin: float
     outward = axis_and_side(fit.places.cube_faces)[1] == 1
     normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
     low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < margin * floor
-    along_a, along_b = (
-        ControlRows.of(sparse_rows(weights[low], window.indices[low], control[0].numel()))
-        for weights in (window.weights(1, 0), window.weights(0, 1))
-    )
+    along_a, along_b = window.weights(1, 0), window.weights(0, 1)
     return FacingPenalty(
-        (along_a, along_b),
+        (ControlRows(window.indices[low], along_a[low]), ControlRows(window.indices[low], along_b[low])),
         torch.as_tensor(np.ascontiguousarray(normals[low].T)),
         torch.as_tensor(fit.weights[low]),
         floor,

@@ -11,14 +11,13 @@ from functools import cached_property
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, IntArray, Knots, Mask
 from ..config import LAYOUT, LayoutConfig
 from ..cube.cube import axis_and_side, damped_fit, face_number, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
-from ..spline.bspline import breakpoints, fill_basis, sparse_rows
+from ..spline.bspline import breakpoints, fill_basis
 from ..threads import in_parallel
 from .determinant_penalty import with_neighbours
 from .operators import ControlRows
@@ -69,7 +68,7 @@ class SlidingParameters:
         found = [np.searchsorted(b[1:-1], x, "right") for b, x in zip(breaks, self.parameters.T, strict=True)]
         return np.stack(found, axis=1)
 
-    def near_spans(self, spans: IntArray) -> NDArray[np.bool_]:
+    def near_spans(self, spans: IntArray) -> Mask:
         """Return which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
         shape = tuple(len(breakpoints(k)) - 1 for k in self.knots)
         return with_neighbours(spans, shape)[tuple(self.spans().T)]
@@ -138,7 +137,7 @@ class SlidingParameters:
         moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
         self._keep(places, nearest_faces(places), moved)
 
-    def _keep(self, parameters: Array, cube_faces: IntArray, chosen: NDArray[np.bool_]) -> None:
+    def _keep(self, parameters: Array, cube_faces: IntArray, chosen: Mask) -> None:
         """Take these parameters for the chosen points; the basis functions of the others need not be found again."""
         known = self.window
         self.place(
@@ -161,8 +160,7 @@ class SlidingParameters:
     @cached_property
     def rows(self) -> ControlRows:
         """The rows that yield F at the points."""
-        count = int(np.prod([len(k) - self.degree - 1 for k in self.knots]))
-        return ControlRows.of(sparse_rows(self.window.weights(0, 0), self.window.indices, count))
+        return ControlRows(self.window.indices, self.window.weights(0, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +182,7 @@ class FaceWindow:
         value, along_a, along_b = np.concatenate(found, axis=1)
         return value, along_a, along_b
 
-    def with_points(self, chosen: NDArray[np.bool_], other: "FaceWindow") -> "FaceWindow":
+    def with_points(self, chosen: Mask, other: "FaceWindow") -> "FaceWindow":
         """Return this window with the chosen points (N,) replaced by those of another one."""
         replaced = FaceWindow(self.indices.copy(), self.in_a.copy(), self.in_b.copy())
         replaced.indices[chosen], replaced.in_a[chosen], replaced.in_b[chosen] = other.indices, other.in_a, other.in_b

@@ -133,13 +133,6 @@ def sparse_rows(values: Array, columns: IntArray, count: int) -> csr_array:
     return csr_array((values.ravel(), columns.ravel(), starts), shape=(len(values), count))
 
 
-def window_numbers(windows: Sequence[IntArray], sizes: Sequence[int]) -> IntArray:
-    """Return the flat numbers (m, k^3) of the coefficients in three windows (m, k), one a direction, of a grid."""
-    u, v, w = windows
-    flat = (u[:, :, None, None] * sizes[1] + v[:, None, :, None]) * sizes[2] + w[:, None, None, :]
-    return flat.reshape(len(u), -1)
-
-
 def gauss_points(knots: Array, n_points: int) -> tuple[Array, Array]:
     """Return Gauss-Legendre points and weights on every span, each of shape (n_spans, n_points)."""
     nodes, weights = np.polynomial.legendre.leggauss(n_points)
