@@ -1,8 +1,7 @@
-"""Another map that does not need the network: the surface's layout on the cube is extended into the solid.
+"""Another map that does not need the network: the layout on the cube is extended into the solid (method.md, section 4).
 
-The extension is harmonic, that is each place is the mean of those around it. Sheets that are close in space stay apart,
-because no line through the gap between them is followed. Differences at the surface are as in Shortley and Weller,
-J. Appl. Phys. 9, 1938, with weights that keep the system symmetric.
+Differences at the surface are as in Shortley and Weller, J. Appl. Phys. 9, 1938, with weights that keep the system
+symmetric.
 """
 
 from dataclasses import dataclass, replace

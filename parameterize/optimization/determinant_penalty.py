@@ -43,11 +43,6 @@ class _Spans:
         """Return the chosen ones of these spans (k,)."""
         return _Spans(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
-    def bezier_points(self, control: Tensor) -> Array:
-        """Return the Bezier points (k, 3, p + 1, p + 1, p + 1)."""
-        points: Array = _bezier_points(np.ascontiguousarray(control.numpy()), self.first, self.weights)
-        return points.reshape(len(points), 3, *(self.weights.shape[2],) * 3)
-
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
@@ -140,7 +135,9 @@ class SpanBarrier:
 
     def _short_rows(self, control: Tensor, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
         """Return the coefficients that fall short on some spans."""
-        bezier = np.ascontiguousarray(np.moveaxis(spans.bezier_points(control), 0, -1))  # (3, p + 1, ..., k)
+        points = _bezier_points(np.ascontiguousarray(control.numpy()), spans.first, spans.weights)
+        points = points.reshape(len(points), 3, *spans.weights.shape[2:], spans.weights.shape[2])
+        bezier = np.ascontiguousarray(np.moveaxis(points, 0, -1))  # (3, p + 1, p + 1, p + 1, k)
         nets = [np.diff(bezier, axis=1 + d) * scale[..., None] for d, scale in enumerate(self._scales)]
         crosses = [cross_products(nets[(d + 1) % 3], nets[(d + 2) % 3]) for d in range(3)]
         determinant = np.zeros((*self._unscale.shape, len(spans.first)))

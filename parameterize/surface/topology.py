@@ -97,10 +97,7 @@ def check_genus(faces: IntArray) -> None:
 
 def slivers(vertices: Array, faces: IntArray, where: Where) -> list[str]:
     """Return a notice of the triangles with a tiny angle, if any: they are accepted, but may spoil the result."""
-    corners = vertices[faces]  # (m, 3, 3)
-    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    doubled = np.linalg.norm(np.cross(ahead[:, 0], behind[:, 0]), axis=1)  # (m,) twice the area
-    angles = np.degrees(np.arctan2(doubled[:, None], np.sum(ahead * behind, axis=2)))  # (m, 3)
+    angles = np.degrees(np.nan_to_num(igl.internal_angles(vertices, faces)))  # (m, 3); nan: an edge has no length
     thin = np.flatnonzero(angles.min(axis=1) < SLIVER_DEGREES)
     if not len(thin):
         return []

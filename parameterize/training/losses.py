@@ -1,7 +1,7 @@
 """The training loss L = L_inner + L_bound (paper, eq. (2) and (3)): its weighted sum, and one function a term.
 
-Each term has the name of its weight in `StageWeights`.
-The paper gives the terms' own formulas without numbers: those of L_bound in section 4.4.1, those of L_inner in 4.4.2.
+Each term has the name of its weight in `StageWeights`. The paper gives the terms' own formulas without numbers: those
+of L_bound in section 4.4.1, those of L_inner in 4.4.2.
 """
 
 from dataclasses import dataclass
