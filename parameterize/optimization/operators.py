@@ -33,6 +33,11 @@ class PiecewiseOperator:
         return self.add(in_parallel(lambda piece: piece(x), self.pieces), x)
 
 
+def pieces(count: int) -> list[slice]:
+    """Return which of `count` rows belong to each piece of work; there is at least one."""
+    return [slice(begin, begin + _ROWS) for begin in range(0, max(count, 1), _ROWS)]
+
+
 def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOperator:
     """Return the sum of operators times their weights: one call runs all their pieces."""
 
@@ -84,16 +89,17 @@ class ControlRows:
     def __call__(self, control: Tensor) -> Tensor:
         """Return the values (N, 3) at control points (3, n_u, n_v, n_w)."""
         field = control.reshape(3, -1).numpy()
-        found = in_parallel(lambda rows: _times(self.columns[rows], self.values[rows], field), self._pieces())
+        found = in_parallel(lambda rows: _times(self.columns[rows], self.values[rows], field), pieces(len(self.values)))
         return torch.from_numpy(np.concatenate(found))
 
     def adjoint(self, dual: Tensor, like: Tensor) -> Tensor:
         """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
         flat, count = np.ascontiguousarray(dual.numpy()), like.numel() // 3
-        found = in_parallel(
-            lambda rows: _spread(self.columns[rows], self.values[rows], flat[rows], count), self._pieces()
-        )
-        return _summed(found, like)
+
+        def part(rows: slice) -> Array:
+            return _spread(self.columns[rows], self.values[rows], flat[rows], count)
+
+        return _summed(in_parallel(part, pieces(len(self.values))), like)
 
     def squared(self, metric: Array) -> PiecewiseOperator:
         """Return the rows, then matrices (N, 3, 3) on what they yield, then the transpose of the rows."""
@@ -101,10 +107,7 @@ class ControlRows:
         def product(rows: slice, field: Tensor) -> Array:
             return _squared(self.columns[rows], self.values[rows], metric[rows], field.reshape(3, -1).numpy())
 
-        return PiecewiseOperator([partial(product, rows) for rows in self._pieces()], _summed)
-
-    def _pieces(self) -> list[slice]:
-        return [slice(begin, begin + _ROWS) for begin in range(0, max(len(self.values), 1), _ROWS)]
+        return PiecewiseOperator([partial(product, rows) for rows in pieces(len(self.values))], _summed)
 
 
 def _summed(parts: list[Array], like: Tensor) -> Tensor:

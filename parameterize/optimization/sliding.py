@@ -20,11 +20,10 @@ from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints, fill_basis
 from ..threads import in_parallel
 from .determinant_penalty import with_neighbours
-from .operators import ControlRows
+from .operators import ControlRows, pieces
 
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3
-_POINTS = 4096  # in a piece of work
 _NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
@@ -153,7 +152,7 @@ class SlidingParameters:
     def _window(self, parameters: Array, faces: IntArray) -> "FaceWindow":
         knots = tuple(self.knots)
         found = in_parallel(
-            lambda piece: _face_windows(knots, self.degree, parameters[piece], faces[piece]), _pieces(len(faces))
+            lambda piece: _face_windows(knots, self.degree, parameters[piece], faces[piece]), pieces(len(faces))
         )
         return FaceWindow(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
@@ -178,7 +177,7 @@ class FaceWindow:
     def derivatives(self, control: Tensor) -> tuple[Array, Array, Array]:
         """Return F and its tangents t_a and t_b at the points: (N, 3) each."""
         flat, windows = control.reshape(3, -1).numpy(), (self.indices, self.in_a, self.in_b)
-        found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), _pieces(len(self.indices)))
+        found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), pieces(len(self.indices)))
         value, along_a, along_b = np.concatenate(found, axis=1)
         return value, along_a, along_b
 
@@ -187,10 +186,6 @@ class FaceWindow:
         replaced = FaceWindow(self.indices.copy(), self.in_a.copy(), self.in_b.copy())
         replaced.indices[chosen], replaced.in_a[chosen], replaced.in_b[chosen] = other.indices, other.in_a, other.in_b
         return replaced
-
-
-def _pieces(points: int) -> list[slice]:
-    return [slice(begin, begin + _POINTS) for begin in range(0, max(points, 1), _POINTS)]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -202,26 +197,22 @@ def _face_windows(knots: Knots, degree: int, parameters: Array, cube_faces: IntA
         sizes[d] = len(knots[d]) - degree - 1
     stride[1], stride[0] = sizes[2], sizes[1] * sizes[2]
     indices = np.empty((count, width * width), np.int64)
-    in_a, in_b = np.empty((count, 2, width)), np.empty((count, 2, width))
-    table, first, span = np.empty((2, 1, width)), np.empty(2, np.int64), np.empty(1, np.int64)
+    in_a, in_b = np.empty((count, 2, 1, width)), np.empty((count, 2, 1, width))
+    first, span = np.empty(2, np.int64), np.empty(1, np.int64)
     for n in range(count):
         axis, side = cube_faces[n] // 2, cube_faces[n] % 2
         for d in range(2):
             along = (axis + 1 + d) % 3
             row, x = knots[along], parameters[n, along : along + 1]
             span[0] = min(max(np.searchsorted(row, x[0], side="right") - 1, degree), len(row) - degree - 2)
-            fill_basis(row, degree, x, span, table)
+            fill_basis(row, degree, x, span, in_b[n] if d else in_a[n])
             first[d] = span[0] - degree
-            basis = in_b if d else in_a
-            for k in range(2):
-                for i in range(width):
-                    basis[n, k, i] = table[k, 0, i]
         base = side * (sizes[axis] - 1) * stride[axis]
         step_a, step_b = stride[(axis + 1) % 3], stride[(axis + 2) % 3]
         for i in range(width):
             for j in range(width):
                 indices[n, i * width + j] = base + (first[0] + i) * step_a + (first[1] + j) * step_b
-    return indices, in_a, in_b
+    return indices, in_a[:, :, 0], in_b[:, :, 0]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
