@@ -41,7 +41,7 @@ def main(files: tuple[str, ...] = (), out: str | Path = "out/compare", refine: i
     axes = figure.subplots()
     print(f"{'':24s} certificate  ARAP mean      max  iterations  relative L2      L2  relative H1      H1")
     for name, volume in volumes.items():
-        _, values, weights = arap_grid(volume)
+        _, (values,), weights = arap_grid(volume)
         report = iga_nn.solve(volume, PROBLEM, refine=refine).report
         mean = float(np.sum(weights * values) / np.sum(weights))
         errors = f"{report.l2_relative:13.2e}{report.l2:10.2e}{report.h1_relative:11.2e}{report.h1_seminorm:10.2e}"

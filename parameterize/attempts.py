@@ -13,10 +13,9 @@ from .checkpoint import Checkpoints
 from .coarse import coarse_knots, optimize_coarse_first
 from .config import Config, SplineConfig
 from .cube.cutting import subdivide_finely
-from .cube.edge_paths import PathError, choose_corners
-from .cube.flips import flipped, untangle
-from .cube.sphere import SphereLayout, lay_on_sphere
-from .cube.tutte import Layout, lay_out
+from .cube.edge_paths import PathError, choose_corners, lay_out
+from .cube.flips import Layout, flipped, untangle
+from .cube.sphere import lay_on_sphere
 from .extension import extended, extending
 from .growth import first_cube, growing, surface_on_cube
 from .optimization.least_squares import fit_pairs
@@ -59,7 +58,7 @@ class Task:
         return subdivide_finely(self.surface.unit_vertices, self.surface.faces, self.own, self.config.spline)
 
     @cached_property
-    def sphere(self) -> SphereLayout:
+    def sphere(self) -> Layout:
         """The surface at volume 1, laid on the sphere."""
         return lay_on_sphere(self.surface.unit_vertices, self.surface.faces, self.config.layout)
 

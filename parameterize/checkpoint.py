@@ -58,10 +58,7 @@ class Checkpoints:
         save_bytes(self._folder / f"{name}{self._suffix}.safetensors", content)
 
     def load(self, name: str) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
-        """Return the tensors and the state of checkpoint `name`, or None where there is none or the run starts afresh.
-
-        Raises CheckpointError naming what differs, or for an unreadable file.
-        """
+        """Return tensors and state of checkpoint `name`; None where there is none or the run starts afresh."""
         if self._folder is None or not self._resume:
             return None
         path = self._folder / f"{name}{self._suffix}.safetensors"

@@ -1,8 +1,4 @@
-"""The spline stage on two sets of knots: its first rounds on few control points, the others on all.
-
-The first rounds move the map far, and need no fine spline for that; on fewer spans they take a fraction of the time.
-The map so found is then interpolated on the fine knots.
-"""
+"""The spline stage on two sets of knots: the first rounds on few control points, which is faster, the rest on all."""
 
 import math
 from dataclasses import replace
@@ -18,7 +14,7 @@ from .config import SplineConfig
 from .optimization.newton import Optimized, optimize
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback
-from .spline.bspline import evaluate_grid, greville, interpolate_along, open_uniform_knots
+from .spline.bspline import evaluate_grid, greville, interpolate_grid, open_uniform_knots
 
 
 def coarse_knots(config: SplineConfig) -> Knots:
@@ -57,9 +53,6 @@ def optimize_coarse_first(
 
 def interpolated(control: Tensor, knots: Knots, finer: Knots, degree: int) -> Tensor:
     """Return the control points (3, n_u, n_v, n_w) on other knots of the map that agrees at their Greville points."""
-    degrees = (degree,) * 3
     places = [greville(row, degree) for row in finer]
-    values = evaluate_grid(degrees, knots, np.moveaxis(control.numpy(), 0, -1), places)
-    for axis in range(3):
-        values = interpolate_along(finer[axis], degree, values, axis)
-    return torch.as_tensor(np.ascontiguousarray(np.moveaxis(values, -1, 0)))
+    values = evaluate_grid((degree,) * 3, knots, np.moveaxis(control.numpy(), 0, -1), places)
+    return torch.as_tensor(np.ascontiguousarray(np.moveaxis(interpolate_grid(finer, degree, values), -1, 0)))

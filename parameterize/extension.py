@@ -1,8 +1,7 @@
-"""Another map that does not need the network: the surface's layout on the cube is extended into the solid.
+"""Another map that does not need the network: the layout on the cube is extended into the solid (method.md, section 4).
 
-The extension is harmonic, that is each place is the mean of those around it. Sheets that are close in space stay apart,
-because no line through the gap between them is followed. Differences at the surface are as in Shortley and Weller,
-J. Appl. Phys. 9, 1938, with weights that keep the system symmetric.
+Differences at the surface are as in Shortley and Weller, J. Appl. Phys. 9, 1938, with weights that keep the system
+symmetric.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +13,8 @@ from scipy.sparse.linalg import cg
 
 from .arrays import Array, IntArray, Mask
 from .config import ExtensionConfig, SplineConfig
-from .cube.tutte import Layout
+from .cube.cube import VARYING_AXES
+from .cube.flips import Layout
 
 _OFFSET = np.array([0.512345, 0.498765, 0.543211])  # in cells: no line of the lattice runs along faces of a model
 _NEAREST = 1e-3  # in cells: the surface counts as no nearer to a lattice point
@@ -22,12 +22,7 @@ _NEAREST = 1e-3  # in cells: the surface counts as no nearer to a lattice point
 
 def extending(spline: SplineConfig, extension: ExtensionConfig) -> SplineConfig:
     """Return the options of the spline stage of such a map: it starts near its end, so folds cost much at once."""
-    return replace(
-        spline,
-        penalties=(extension.penalty,),
-        rounds=extension.rounds,
-        usual_steps=extension.usual_steps,
-    )
+    return replace(spline, penalties=(extension.penalty,), rounds=extension.rounds, usual_steps=extension.usual_steps)
 
 
 def extended(layout: Layout, options: ExtensionConfig) -> tuple[Array, Array]:
@@ -89,22 +84,21 @@ class _Crossings:
         """Return how far the next crossing is from lattice points (k, 3), in cells, and its value (k, 3)."""
         stride = float(self.shape[self.axis] + 1)  # longer than a line: gaps to crossings of others are above 1
         keys = stride * self.lines + self.positions
-        own = stride * _line_numbers(index, self.axis, self.shape) + index[:, self.axis]
+        own = stride * _line_numbers(index[:, VARYING_AXES[self.axis]], self.axis, self.shape) + index[:, self.axis]
         found = np.searchsorted(keys, own) - (side < 0)
         found = np.clip(found, 0, len(keys) - 1)
         return np.abs(keys[found] - own), self.values[found]
 
 
-def _line_numbers(index: IntArray, axis: int, shape: IntArray) -> IntArray:
-    first, second = (d for d in range(3) if d != axis)
-    return np.asarray(index[:, first] * shape[second] + index[:, second])
+def _line_numbers(across: IntArray, axis: int, shape: IntArray) -> IntArray:
+    """Return the numbers (k,) of lattice lines along an axis that cross the two others at these places (k, 2)."""
+    return np.asarray(across[:, 0] * shape[VARYING_AXES[axis][1]] + across[:, 1])
 
 
 def _crossings(layout: Layout, axis: int, low: Array, cell: float, shape: IntArray) -> _Crossings:
     """Return where the lattice's lines along an axis cross the surface."""
-    across = [d for d in range(3) if d != axis]
     corners = (layout.vertices[layout.faces] - low) / cell  # (m, 3, 3)
-    flat = corners[:, :, across]
+    flat = corners[:, :, VARYING_AXES[axis]]
     first = np.ceil(flat.min(axis=1)).astype(np.int64)
     counts = np.maximum(np.floor(flat.max(axis=1)).astype(np.int64) - first + 1, 0)  # lines over each triangle's box
     many = counts.prod(axis=1)
@@ -121,7 +115,7 @@ def _crossings(layout: Layout, axis: int, low: Array, cell: float, shape: IntArr
     values = (shares * layout.places[layout.faces[owner]]).sum(axis=1)
     turn = -1.0 if axis != 1 else 1.0  # an outward triangle that a line enters through is seen clockwise
     signs = (turn * np.sign(doubled[hit])).astype(np.int64)
-    lines = line[:, 0] * shape[across[1]] + line[:, 1]
+    lines = _line_numbers(line, axis, shape)
     order = np.lexsort((positions, lines))
     return _Crossings(axis, lines[order], positions[order], signs[order], values[order], shape)
 

@@ -32,10 +32,7 @@ def save_bytes(path: str | Path, content: bytes) -> None:
 
 
 def save_text(path: str | Path, text: str) -> None:
-    """Write a text file (UTF-8) under a temporary name, then rename it. Raises OSError naming the file.
-
-    Names of files in the text need not be Unicode: what is not is written as an escape sequence.
-    """
+    """Write a text file as `save_bytes` does, in UTF-8; what is not Unicode, say in a file's name, is escaped."""
     save_bytes(path, text.encode(errors="backslashreplace"))
 
 

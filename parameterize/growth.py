@@ -1,9 +1,6 @@
-"""A map that does not need the network: the cube grows into the solid (for shapes that are hard to train).
+"""A map that does not need the network: the cube grows into the solid (docs/method.md, section 4).
 
-The surface is laid on the cube one-to-one before anything else, so that the boundary never has to be untangled. The
-first map is a cube in the solid's middle. Round after round the surface's data draw it more strongly, while the
-penalties on det J act from the start: what is never folded need not be unfolded (compare Schueller, Kavan, Panozzo,
-Sorkine-Hornung, SGP 2013).
+What is never folded need not be unfolded (compare Schueller, Kavan, Panozzo, Sorkine-Hornung, SGP 2013).
 """
 
 from dataclasses import replace
@@ -17,9 +14,8 @@ from .arrays import Knots
 from .config import GrowthConfig, LayoutConfig, SplineConfig
 from .cube.cube import project_radially, snap
 from .cube.cutting import cut_along_rays, subdivide_finely
-from .cube.sphere import SphereLayout
+from .cube.flips import Layout
 from .cube.turning import turned
-from .cube.tutte import Layout
 from .spline.bspline import greville
 from .surface.geometry import vertex_weights
 
@@ -41,7 +37,7 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
 
 
 def surface_on_cube(
-    sphere: SphereLayout, own: int, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
+    sphere: Layout, own: int, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
 ) -> Layout:
     """Lay a closed surface, laid on the sphere, on the cube without a flipped triangle, its long edges cut.
 
@@ -49,7 +45,7 @@ def surface_on_cube(
     best of these ways, 1 the next, ...
     """
     sphere = turned(sphere, options, np.random.default_rng(seed), turn)
-    columns = np.hstack([sphere.vertices, sphere.directions])
+    columns = np.hstack([sphere.vertices, sphere.places])
     columns, faces = subdivide_finely(columns, sphere.faces, own, spline)
     points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])
     cut = cut_along_rays(places, faces, options.path_snap)

@@ -1,8 +1,4 @@
-"""Inserts knots where a map needs them and optimises further, until its boundary is close enough to the surface.
-
-Knots that are inserted leave a map as it is, so each further spline stage starts from what the one before has found.
-What it finds is kept where no less is proved of it; else the map before is the result, and that is said.
-"""
+"""Inserts knots where a map needs them and optimises further, while that is better (docs/method.md, section 5)."""
 
 import logging
 from dataclasses import dataclass, replace
@@ -21,7 +17,7 @@ from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback
 from .quality.distances import Distances
 from .quality.quality import arap_grid
-from .spline.knot_choice import halved_where_most, totals_along
+from .spline.bspline import breakpoints, midpoints
 from .spline.volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
@@ -88,7 +84,7 @@ def refine(
             break
         kept = checkpoints.of_part(f"refined{number}")
         finer = _chosen_knots(spots, config, refinement, kept)
-        if _counts(finer, config) == levels[-1].control_points:
+        if tuple(len(row) - config.degree - 1 for row in finer) == levels[-1].control_points:
             stopped = "limit reached"
             break
         other = _optimized_on(finer, spots.volume, fit, config, refinement, kept, report)
@@ -128,7 +124,7 @@ class _Spots:
         level = Level(volume.shape, Distances.of(distances).rms / diagonal, len(unproved))
         return cls(volume, places.parameters[:own], distances**2, unproved, level, config.arap_limit)
 
-    def amounts(self, distortion_share: float) -> tuple[Array, Array, Array]:
+    def amounts(self, distortion_share: float) -> list[Array]:
         """Return for each direction what is found on each of its spans.
 
         Unproved spans, where there are any; else squared distances, and distortion above the limit with a share.
@@ -136,16 +132,19 @@ class _Spots:
         knots = self.volume.knots
         if len(self.unproved):
             n_spans = [len(np.unique(row)) - 1 for row in knots]
-            u, v, w = (np.bincount(self.unproved[:, d], minlength=n).astype(float) for d, n in enumerate(n_spans))
-            return u, v, w
+            return [np.bincount(self.unproved[:, d], minlength=n).astype(float) for d, n in enumerate(n_spans)]
         boundary = totals_along(self.places, self.squares / self.squares.sum(), knots)
-        points, density, weights = arap_grid(self.volume, n_gauss=2)
+        points, (density,), weights = arap_grid(self.volume, n_gauss=2)
         limit = self.arap_limit * (1.0 + float(np.sum(weights * density)))
         excess = weights * np.maximum(density - limit, 0.0) ** 2
         grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
         stretched = totals_along(grid, distortion_share * excess.ravel() / max(float(excess.sum()), 1e-300), knots)
-        u, v, w = (a + b for a, b in zip(boundary, stretched, strict=True))
-        return u, v, w
+        return [a + b for a, b in zip(boundary, stretched, strict=True)]
+
+
+def totals_along(places: Array, amounts: Array, knots: Knots) -> list[Array]:
+    """Return for each direction the amounts (m,) at places (m, 3) of the cube, summed over each of its spans."""
+    return [np.histogram(places[:, axis], breakpoints(row), weights=amounts)[0] for axis, row in enumerate(knots)]
 
 
 def _chosen_knots(spots: _Spots, config: SplineConfig, refinement: RefinementConfig, checkpoints: Checkpoints) -> Knots:
@@ -153,21 +152,37 @@ def _chosen_knots(spots: _Spots, config: SplineConfig, refinement: RefinementCon
     if (saved := checkpoints.load(_CHECKPOINT)) is not None:
         u, v, w = (saved[0][axis].numpy() for axis in "uvw")
         return u, v, w
-    finer = halved_where_most(
-        spots.volume.knots,
-        spots.amounts(refinement.distortion),
-        np.array(spots.volume.shape),
-        most=refinement.max_control_points,
-        share=refinement.share,
-        growth=refinement.growth,
-        narrowest=refinement.narrowest / (config.control_points - config.degree),
-    )
+    narrowest = refinement.narrowest / (config.control_points - config.degree)
+    amounts = spots.amounts(refinement.distortion)
+    finer = halved_where_most(spots.volume.knots, amounts, np.array(spots.volume.shape), refinement, narrowest)
     checkpoints.save(_CHECKPOINT, {axis: torch.as_tensor(row) for axis, row in zip("uvw", finer, strict=True)}, {})
     return finer
 
 
-def _counts(knots: Knots, config: SplineConfig) -> tuple[int, int, int]:
-    u, v, w = (len(row) - config.degree - 1 for row in knots)
+def halved_where_most(
+    knots: Knots, amounts: list[Array], counts: IntArray, refinement: RefinementConfig, narrowest: float
+) -> Knots:
+    """Return the knots with those spans halved on which most is found, the largest amounts of all directions first.
+
+    amounts: of each span, a direction. counts (3,): control points a direction. No span is halved any more once
+    `share` of all amounts is on those that are, or the control points are `growth` times as many; none into halves
+    below `narrowest`.
+    """
+    counts, total = counts.copy(), np.prod(counts)
+    halves = np.concatenate([np.diff(breakpoints(row)) / 2.0 for row in knots])
+    ranked = np.concatenate([np.stack([np.full(len(a), d), np.arange(len(a))], axis=1) for d, a in enumerate(amounts)])
+    values = np.concatenate(amounts)
+    chosen: tuple[list[int], ...] = ([], [], [])
+    reached, wanted = 0.0, refinement.share * values.sum()
+    for place in np.argsort(-values, kind="stable"):
+        axis, span = ranked[place]
+        if reached >= wanted or np.prod(counts + (np.arange(3) == axis)) > refinement.growth * total:
+            break
+        if counts[axis] < refinement.max_control_points and halves[place] >= narrowest:
+            chosen[axis].append(span)
+            counts[axis] += 1
+        reached += values[place]
+    u, v, w = (np.sort(np.concatenate([row, midpoints(row)[spans]])) for row, spans in zip(knots, chosen, strict=True))
     return u, v, w
 
 

@@ -26,17 +26,17 @@ def thorn(count=1200):
 def test_no_triangle_is_turned_over_and_the_mesh_stays(shape):
     vertices, faces = shape(1200)
     layout = lay_on_sphere(vertices, faces, LAYOUT)
-    assert not turned_over(layout.directions, layout.faces).any()
-    assert np.linalg.norm(layout.directions, axis=1) == pytest.approx(1.0)
+    assert not turned_over(layout.places, layout.faces).any()
+    assert np.linalg.norm(layout.places, axis=1) == pytest.approx(1.0)
     assert np.array_equal(layout.vertices[: len(vertices)], vertices)
     again = lay_on_sphere(vertices, faces, LAYOUT)
-    assert np.array_equal(again.directions, layout.directions)
+    assert np.array_equal(again.places, layout.places)
 
 
 def test_the_sphere_keeps_its_areas():
     vertices, faces = ball(800)
     layout = lay_on_sphere(vertices, faces, LAYOUT)
-    before, after = (np.linalg.det(x[layout.faces]) for x in (layout.vertices, layout.directions))
+    before, after = (np.linalg.det(x[layout.faces]) for x in (layout.vertices, layout.places))
     assert np.median(after / before) == pytest.approx(1.0, abs=0.02)
     assert np.percentile(after / before, [1, 99]) == pytest.approx([1.0, 1.0], abs=0.1)
 
@@ -46,7 +46,7 @@ def test_a_thorn_gets_the_room_that_its_area_asks_for():
     layout = lay_on_sphere(vertices, faces, LAYOUT)
     points = layout.vertices[layout.faces]
     cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    area, room = np.linalg.norm(cross, axis=1), np.linalg.det(layout.directions[layout.faces])
+    area, room = np.linalg.norm(cross, axis=1), np.linalg.det(layout.places[layout.faces])
     tip = points[:, :, 0].mean(axis=1) > 3.0
     share, given = area[tip].sum() / area.sum(), room[tip].sum() / room.sum()
     assert share > 0.02 and 0.3 < given / share < 3.0
@@ -55,7 +55,7 @@ def test_a_thorn_gets_the_room_that_its_area_asks_for():
 def test_first_and_second_derivatives():
     vertices, faces = horseshoe(60)
     layout = lay_on_sphere(vertices, faces, LAYOUT)
-    triangles, places = _Triangles(layout.vertices, layout.faces), layout.directions
+    triangles, places = _Triangles(layout.vertices, layout.faces), layout.places
     rng, h = np.random.default_rng(0), 1e-4
     step = rng.normal(size=(len(places), 2))
     tangents = _tangents(places)

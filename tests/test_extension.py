@@ -10,7 +10,7 @@ from small_run import tiny_config
 
 from parameterize import parameterize
 from parameterize.config import ExtensionConfig, preset
-from parameterize.cube.tutte import Layout
+from parameterize.cube.flips import Layout
 from parameterize.extension import extended, extending
 from parameterize.surface.surface import surface_from_arrays
 

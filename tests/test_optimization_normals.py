@@ -6,7 +6,7 @@ from parameterize.optimization.normals import FacingPenalty, facing_penalty
 from parameterize.optimization.operators import ControlRows
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
-from parameterize.spline.bspline import greville, open_uniform_knots, sparse_rows
+from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.surface.geometry import vertex_normals
 
 FLOOR = 0.3
@@ -19,7 +19,7 @@ def random_penalty(points=40, controls=50):
     slopes = rng.normal(size=(2, points, 16))
     normals = rng.normal(size=(points, 3))
     weights = rng.uniform(0.5, 1.5, points)
-    along_a, along_b = (ControlRows.of(sparse_rows(slope, indices, controls)) for slope in slopes)
+    along_a, along_b = (ControlRows(indices, slope) for slope in slopes)
     penalty = FacingPenalty((along_a, along_b), torch.as_tensor(normals.T), torch.as_tensor(weights), FLOOR)
     control = torch.as_tensor(rng.normal(size=(3, 5, 10, 1)))
 

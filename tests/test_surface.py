@@ -26,8 +26,7 @@ from mesh_files import (
 )
 from surface_files import ACCEPTED, REFUSED
 
-from parameterize.surface.geometry import signed_volume
-from parameterize.surface.inside import deepest_point
+from parameterize.surface.geometry import deepest_point, signed_volume
 from parameterize.surface.readers.common import BYTES_AT_LEAST
 from parameterize.surface.surface import MeshError, load_surface, surface_from_arrays
 from parameterize.surface.triangulation import triangulate

@@ -19,8 +19,8 @@ from scipy.spatial.transform import Rotation
 
 from iga_nn.batch.task import Ended, Task
 from iga_nn.samples import GOLDEN_ANGLE, ball, outward_hull, write_obj
-from parameterize.surface.self_intersection import crossing_faces
 from parameterize.surface.surface import MeshError, Surface, surface_from_arrays
+from parameterize.surface.topology import crossing_faces
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -1,8 +1,8 @@
 """Is a volume's boundary injective: do its six faces meet nowhere but where they are joined?
 
 With det J > 0 on the whole cube, an injective boundary makes the whole map one-to-one. The faces are cut into Bezier
-patches (bezier_patches.py), and every pair of patches is settled by a proof (patch_proofs.py), or cut in four and
-looked at again. Where nothing is proved, two parameters of one point are searched for.
+patches, and every pair of patches is settled by a proof (patch_proofs.py), or cut in four and looked at again. Where
+nothing is proved, two parameters of one point are searched for.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,7 @@ from ..arrays import Array, IntArray, in_brackets
 from ..cube.cube import VARYING_AXES
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
-from .bezier_patches import Pieces, as_rows, boundary_pieces, contact, halved
-from .patch_proofs import settled
+from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, settled
 
 Point = tuple[float, float, float]
 
@@ -57,10 +56,7 @@ class BoundaryCheck:
 
 
 def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryCheck:
-    """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four.
-
-    Raises ValueError for a negative depth.
-    """
+    """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four."""
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
     local = _local(volume)
@@ -171,10 +167,7 @@ def overlapping_boxes(low: Array, high: Array) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _sweep(low: Array, high: Array, out: IntArray) -> int:
-    """Write overlapping pairs into `out` as far as it reaches; return how many there are.
-
-    `low` is sorted by its first column.
-    """
+    """Write overlapping pairs, `low` sorted by its first column, into `out` as far as it reaches; return how many."""
     count = 0
     for i in range(len(low)):
         for j in range(i + 1, len(low)):

@@ -78,7 +78,8 @@ class DeterminantForm:
 
         A halving is one product with weights that sum to 1 a direction: as many roundings as it has terms.
         """
-        return _gamma(self.roundings + depth * sum(3 * p for p in self.degrees)) * permanents + _UNDERFLOW
+        relative = (self.roundings + depth * sum(3 * p for p in self.degrees)) * _UNIT_ROUNDOFF
+        return 1.01 * relative / (1.0 - relative) * permanents + _UNDERFLOW  # one percent: the bound itself is rounded
 
     def _derivative(self, b: int, spans: IntArray) -> tuple[Array, Array]:
         """Return the b-th derivative on spans (k, 3): scaled Bernstein form (3, n_0, n_1, n_2, k), sizes (3, k)."""
@@ -193,8 +194,3 @@ def _roundings(degrees: tuple[int, int, int]) -> int:
     u, v, w = degrees
     net = 4 + sum(6 * p + 2 for p in degrees)
     return 3 * net + (2 * (u + 1) * v * w + 1) + (3 * u * (v + 1) * (w + 1) + 1) + 6
-
-
-def _gamma(n: int) -> float:
-    """Return Higham's gamma_n, with one percent for the rounding errors of the bound itself."""
-    return 1.01 * n * _UNIT_ROUNDOFF / (1.0 - n * _UNIT_ROUNDOFF)

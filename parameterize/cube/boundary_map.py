@@ -139,9 +139,7 @@ def boundary_map(
         if not len(turned):
             break
         placed = _nudged(placed, cut, turned, number, layout.nudge)
-    closer = (
-        plain  # then each cut vertex moves along its mesh edge, its parameter along the cube's, until F(p) is close
-    )
+    closer = plain  # then each cut vertex slides along its mesh edge, its parameter along the cube's, to meet F
     for _ in range(layout.settle_steps):
         share, moved = _settled_once(volume, cut, closer, len(vertices), layout)
         cut, closer = _without_flips(vertices, cut, closer, share, moved, layout.undo_rounds)

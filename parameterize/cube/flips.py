@@ -1,4 +1,6 @@
-"""Layout of a closed surface on the boundary of the cube: places (n, 3) of its points, orientation of its triangles."""
+"""Layout of a closed surface on the boundary of the cube: places of its points, orientation of its triangles."""
+
+from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -9,6 +11,18 @@ from .cube import snap
 
 _ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Surface points (n, 3), those of the mesh first, triangles (m, 3) between them, and where the points go (n, 3).
+
+    places: on the boundary of the cube; on the unit sphere around the origin as long as sphere.py and turning.py work.
+    """
+
+    vertices: Array
+    faces: IntArray
+    places: Array
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -1,13 +1,11 @@
-"""A one-to-one layout of a closed surface without handles on the unit sphere, with little distortion.
+"""A one-to-one layout of a closed surface without handles on the unit sphere (docs/method.md, section 4).
 
-The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
-sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
-one-to-one but badly squeezed. From there Newton's method lowers the symmetric Dirichlet energy (Smith, Schaefer, ACM
-Trans. Graphics 34, 2015), which is infinite where a triangle has no area left: no step turns a triangle over.
+The lowest vibration of the net of edges (Fiedler, Czechoslovak Math. J. 25, 1975) cuts the surface in two discs, which
+go to the hemispheres (Tutte 1963), squeezed. The symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34,
+2015), infinite where a triangle has no area left, is then lowered.
 """
 
 import math
-from dataclasses import dataclass
 
 import igl
 import numpy as np
@@ -18,29 +16,21 @@ from ..arrays import Array, IntArray, Mask
 from ..config import LayoutConfig
 from ..surface.geometry import doubled_areas, edge_table
 from .cutting import split_edges
+from .flips import Layout
 
 _SHIFT = -1e-6  # below all eigenvalues of the Laplacian, so that it can be factorised
 _THIN = 1e-6  # area of a triangle, and length of an edge, that counts at least, as a share of the mean
 _SHORTEST_STEP = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class SphereLayout:
-    """Surface points (n, 3), those of the mesh first, triangles (m, 3), and directions (n, 3), unit vectors."""
-
-    vertices: Array
-    faces: IntArray
-    directions: Array
-
-
-def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> SphereLayout:
+def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> Layout:
     """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
 
     Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh.
     """
     vertices, faces, upper = _halves(vertices, faces, layout.least_share)
     directions = _hemispheres(vertices, faces, upper)
-    return SphereLayout(vertices, faces, _relaxed(directions, vertices, faces, layout))
+    return Layout(vertices, faces, _relaxed(directions, vertices, faces, layout))
 
 
 def turned_over(directions: Array, faces: IntArray) -> Mask:

@@ -1,8 +1,4 @@
-"""How the cube is turned within a layout on the sphere, so that its edges keep out of hollows.
-
-det J > 0 needs the faces of the solid to meet at less than 180 degrees along the cube's edges, seen from inside. An
-edge in a hollow cannot lie on the surface; one along a ridge suits it best.
-"""
+"""How the cube is turned in a layout on the sphere, so that its edges keep out of hollows (method.md, section 4)."""
 
 import numba
 import numpy as np
@@ -13,10 +9,10 @@ from ..arrays import Array
 from ..config import LayoutConfig
 from ..surface.geometry import doubled_areas, edge_triangles
 from ..threads import in_parallel
-from .sphere import SphereLayout
+from .flips import Layout
 
 
-def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Generator, number: int) -> SphereLayout:
+def turned(layout: Layout, options: LayoutConfig, generator: np.random.Generator, number: int) -> Layout:
     """Return the layout, turned so that the cube's edges lie least in hollows: 0 is the best turn, 1 the next, ...
 
     The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
@@ -51,7 +47,7 @@ def turned(layout: SphereLayout, options: LayoutConfig, generator: np.random.Gen
             if _is_other(rotation, turns, options):
                 turns.append(rotation)
     best = turns[min(number, len(turns) - 1)].as_matrix()
-    return SphereLayout(layout.vertices, layout.faces, layout.directions @ best.T)
+    return Layout(layout.vertices, layout.faces, layout.places @ best.T)
 
 
 def _is_other(rotation: Rotation, turns: list[Rotation], options: LayoutConfig) -> bool:
@@ -63,12 +59,12 @@ def _angle_between(first: Rotation, second: Rotation) -> float:
     return float((first * second.inv()).reduce(left=Rotation.create_group("O")).magnitude())
 
 
-def _bends(layout: SphereLayout) -> tuple[Array, Array, Array]:
+def _bends(layout: Layout) -> tuple[Array, Array, Array]:
     """Return of each mesh edge middle and direction on the sphere (e, 3), and how much the surface bends there (e,).
 
     That is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """
-    vertices, faces, places = layout.vertices, layout.faces, layout.directions
+    vertices, faces, places = layout.vertices, layout.faces, layout.places
     edges, owners = edge_triangles(faces)
     here, there = owners.T
     normals = doubled_areas(vertices, faces)

@@ -25,7 +25,6 @@ _SAMPLES = 110  # a direction and cube face
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
 _REACH = 0.05  # from a contact, in a domain of volume 1: what the steps of a round look at
 _ACCURACY = 2.0  # of the fast winding number
-_NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +81,15 @@ def contact_penalty(
     )
     normals = vertex_normals(boundary.points, boundary.triangles)
     asked = np.arange(len(boundary.points)) if near is None else near
-    touching = asked[_in_another_sheet(boundary.points[asked] + gap * normals[asked], boundary)]
+    touching = asked
+    if len(asked):
+        winding = igl.FastWindingNumberBVH()
+        winding.init(boundary.points, boundary.triangles)
+        outside = boundary.points[asked] + gap * normals[asked]  # just outside, yet the boundary may wind around it
+        touching = asked[winding.winding_number(outside, _ACCURACY) > 0.5]
     near = _around(boundary.points, touching) if near is None else near
     touching, facing = _facing_samples(boundary.points, normals, touching)
-    first, second = (
-        SlidingParameters(knots, degree, boundary.parameters[chosen], _NO_TRIANGLES) for chosen in (touching, facing)
-    )
+    first, second = (SlidingParameters(knots, degree, boundary.parameters[chosen]) for chosen in (touching, facing))
     return ContactPenalty(
         first.rows,
         second.rows,
@@ -104,15 +106,6 @@ def _around(points: Array, touching: IntArray) -> IntArray:
     if not touching.size:
         return touching
     return np.flatnonzero(np.isfinite(cKDTree(points[touching]).query(points, distance_upper_bound=_REACH)[0]))
-
-
-def _in_another_sheet(outside: Array, boundary: SampledBoundary) -> IntArray:
-    """Return which points (m, 3) just outside of the boundary it winds around all the same: (k,)."""
-    if not len(outside):
-        return np.zeros(0, dtype=np.int64)
-    winding = igl.FastWindingNumberBVH()
-    winding.init(boundary.points, boundary.triangles)
-    return np.flatnonzero(winding.winding_number(outside, _ACCURACY) > 0.5)
 
 
 def _facing_samples(points: Array, normals: Array, touching: IntArray) -> tuple[IntArray, IntArray]:

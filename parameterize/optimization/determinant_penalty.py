@@ -14,11 +14,10 @@ from dataclasses import dataclass, fields
 import numba
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from torch import Tensor
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, IntArray, Knots, Mask
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
 from ..threads import in_parallel
@@ -40,14 +39,9 @@ class _Spans:
     weights: Array
     back: Array
 
-    def some(self, chosen: NDArray[np.bool_]) -> "_Spans":
+    def some(self, chosen: Mask) -> "_Spans":
         """Return the chosen ones of these spans (k,)."""
         return _Spans(*(getattr(self, field.name)[chosen] for field in fields(self)))
-
-    def bezier_points(self, control: Tensor) -> Array:
-        """Return the Bezier points (k, 3, p + 1, p + 1, p + 1)."""
-        points: Array = _bezier_points(np.ascontiguousarray(control.numpy()), self.first, self.weights)
-        return points.reshape(len(points), 3, *(self.weights.shape[2],) * 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +78,13 @@ class SpanBarrier:
         self._share = 1.0 / (self._unscale.size * np.prod([len(w) for w in self._widths]))
         self.weigh(np.zeros([len(w) for w in self._widths]))
 
-    def activate(self, spans: NDArray[np.int64]) -> None:
+    def activate(self, spans: IntArray) -> None:
         """Give spans (k, 3) at least the weight 1."""
         weights = self.weights.copy()
         weights[tuple(spans.T)] = np.maximum(weights[tuple(spans.T)], 1.0)
         self.weigh(weights)
 
-    def stiffen(self, spans: NDArray[np.int64], factor: float, most: float) -> None:
+    def stiffen(self, spans: IntArray, factor: float, most: float) -> None:
         """Multiply the weights of spans (k, 3) and of their neighbours by a factor, up to `most`, from 1 on.
 
         With the neighbours: a fold would only move into the next span.
@@ -141,7 +135,9 @@ class SpanBarrier:
 
     def _short_rows(self, control: Tensor, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
         """Return the coefficients that fall short on some spans."""
-        bezier = np.ascontiguousarray(np.moveaxis(spans.bezier_points(control), 0, -1))  # (3, p + 1, ..., k)
+        points = _bezier_points(np.ascontiguousarray(control.numpy()), spans.first, spans.weights)
+        points = points.reshape(len(points), 3, *spans.weights.shape[2:], spans.weights.shape[2])
+        bezier = np.ascontiguousarray(np.moveaxis(points, 0, -1))  # (3, p + 1, p + 1, p + 1, k)
         nets = [np.diff(bezier, axis=1 + d) * scale[..., None] for d, scale in enumerate(self._scales)]
         crosses = [cross_products(nets[(d + 1) % 3], nets[(d + 2) % 3]) for d in range(3)]
         determinant = np.zeros((*self._unscale.shape, len(spans.first)))
@@ -269,21 +265,20 @@ def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
                         total[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k] += windows[s, c, i, j, k]
 
 
-def with_neighbours(spans: NDArray[np.int64], n_spans: tuple[int, ...]) -> NDArray[np.bool_]:
+def with_neighbours(spans: IntArray, n_spans: tuple[int, ...]) -> Mask:
     """Mark spans (k, 3) and all that touch them: (n_u, n_v, n_w)."""
     marked = np.zeros(n_spans, dtype=bool)
     marked[tuple(spans.T)] = True
-    found: NDArray[np.bool_] = binary_dilation(marked, np.ones((3, 3, 3), dtype=bool))
-    return found
+    return np.asarray(binary_dilation(marked, np.ones((3, 3, 3), dtype=bool)))
 
 
-def acting_on(spans: NDArray[np.bool_], degree: int) -> NDArray[np.bool_]:
+def acting_on(spans: Mask, degree: int) -> Mask:
     """Mark the control points that act on marked spans: (n_u, n_v, n_w), `degree` fewer spans a direction."""
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(spans, degree), (degree + 1,) * 3)
     return np.asarray(windows.any(axis=(3, 4, 5)))
 
 
-def edge_spans(n_spans: tuple[int, int, int]) -> NDArray[np.int64]:
+def edge_spans(n_spans: tuple[int, int, int]) -> IntArray:
     """Return the spans (k, 3) that touch one of the cube's 12 edges."""
     index = np.indices(n_spans).reshape(3, -1).T
     at_side = (index == 0) | (index == np.array(n_spans) - 1)

@@ -78,7 +78,9 @@ class DistortionEnergy:
             excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
             pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
             scale = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess)
-            held = 2.0 * damping * weights * _relative(cofactors, det)
+            # |J^-1|^2 / 3: 1 for the identity, and bounded where det J vanishes
+            inverse = cofactors.square().sum(dim=(0, 1)) / (3.0 * det.clamp_min(_LEAST_DET).square())
+            held = 2.0 * damping * weights * inverse.clamp(1.0, 1.0 / _LEAST_DET**2)
             parts = rotation, _turning(rotation, jacobian), pull.flatten(0, 1), push.flatten(0, 1), scale, held
             return self._grid.squared(_matrices(*(p.contiguous().numpy() for p in parts)), planes)
 
@@ -86,12 +88,6 @@ class DistortionEnergy:
 
     def _weights(self, planes: slice) -> Tensor:
         return torch.from_numpy(self._grid.weights[planes].ravel())
-
-
-def _relative(cofactors: Tensor, det: Tensor) -> Tensor:
-    """Return |J^-1|^2 / 3, 1 for the identity and bounded where det J vanishes: (m,)."""
-    inverse = cofactors.square().sum(dim=(0, 1)) / (3.0 * det.clamp_min(_LEAST_DET).square())
-    return inverse.clamp(1.0, 1.0 / _LEAST_DET**2)
 
 
 def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:

@@ -37,8 +37,8 @@ class EdgeAnchors:
     def __init__(self, surface: SurfaceFit, config: SplineConfig) -> None:
         self._surface, self._config = surface, config
         knots, degree = surface.places.knots, surface.places.degree
-        points, no_triangles = edge_points(knots), np.zeros((0, 3), dtype=np.int64)
-        places = SlidingParameters(knots, degree, points, no_triangles)
+        points = edge_points(knots)
+        places = SlidingParameters(knots, degree, points)
         self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
     def near(self, control: Tensor) -> bool:

@@ -35,12 +35,11 @@ class SplineEnergy:
         self.penalty, self.vertex = config.penalties[0], config.vertex
         self._grows: GrowthConfig | None = None
         self._distortion = DistortionEnergy(knots, config)
-        mass, slope, curve = grams(knots, config.degree)
+        self._grams = grams(knots, (config.degree,) * 3)
         self._bending, self._rough_bending = (
-            bending_operator(mass, slope, curve, 2.0 * config.fairness, dtype) for dtype in (torch.float64, _ROUGH)
+            bending_operator(self._grams, 2.0 * config.fairness, dtype) for dtype in (torch.float64, _ROUGH)
         )
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient)
-        self._grams = mass, slope, curve
         self._precondition = self._preconditioner()
 
     def _preconditioner(self) -> FastDiagonalization:

@@ -2,46 +2,34 @@
 
 import numpy as np
 import torch
-from scipy.sparse import csr_array
 from torch import Tensor
 
 from ..arrays import Array, Knots
-from ..spline.bspline import basis_derivatives, sparse_rows, window_numbers
+from ..spline.bspline import basis_derivatives
 from .operators import ControlRows, conjugate_gradients, weighted_sum
 from .tensor_product import FastDiagonalization, bending_operator, grams
 
 
 def fit_pairs(
-    parameters: Array,
-    points: Array,
-    weights: Array,
-    knots: Knots,
-    degree: int,
-    *,
-    fairness: float,
+    parameters: Array, points: Array, weights: Array, knots: Knots, degree: int, *, fairness: float
 ) -> Tensor:
     """Control points (3, n_u, n_v, n_w) that minimise sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
 
     parameters (m, 3) in the unit cube, points (m, 3), weights (m,) that sum to 1: the discrete form of the paper's
     least squares on G(F(x)) = x. Where no sample lies, the smoothing term alone decides.
     """
-    rows = ControlRows.of(_collocation_3d(parameters, knots, degree))
-    mass, slope, curve = grams(knots, degree)
-    smooth = bending_operator(mass, slope, curve, fairness)
+    sizes, span = [len(k) - degree - 1 for k in knots], (degree + 1) ** 3
+    tables = [basis_derivatives(k, degree, parameters[:, d]) for d, k in enumerate(knots)]
+    i, j, k = (first[:, None] + np.arange(degree + 1) for first, _ in tables)
+    u, v, w = (values[0] for _, values in tables)
+    columns = (i[:, :, None, None] * sizes[1] + j[:, None, :, None]) * sizes[2] + k[:, None, None, :]
+    basis = u[:, :, None, None] * v[:, None, :, None] * w[:, None, None, :]
+    rows = ControlRows(columns.reshape(-1, span), basis.reshape(-1, span))
+    matrices = grams(knots, (degree,) * 3)
+    mass, _, curve = matrices
+    smooth = bending_operator(matrices, fairness)
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
-    shape = (3, *(len(k) - degree - 1 for k in knots))
-
     operator = weighted_sum([(1.0, rows.squared(weights[:, None, None] * np.eye(3))), (1.0, smooth)])
-    right = rows.adjoint(torch.as_tensor(weights[:, None] * points), torch.zeros(shape))
+    right = rows.adjoint(torch.as_tensor(weights[:, None] * points), torch.zeros((3, *sizes)))
     control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
     return control
-
-
-def _collocation_3d(parameters: Array, knots: Knots, degree: int) -> csr_array:
-    """Return rows of tensor-product basis values: (m, n_u n_v n_w)."""
-    tables = [basis_derivatives(k, degree, parameters[:, d]) for d, k in enumerate(knots)]
-    sizes = [len(k) - degree - 1 for k in knots]
-    columns = window_numbers([first[:, None] + np.arange(degree + 1) for first, _ in tables], sizes)
-    u, v, w = (values[0] for _, values in tables)
-    values = u[:, :, None, None] * v[:, None, :, None] * w[:, None, None, :]
-    return sparse_rows(values.reshape(columns.shape), columns, int(np.prod(sizes)))

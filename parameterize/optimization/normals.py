@@ -12,7 +12,6 @@ import torch
 from torch import Tensor
 
 from ..cube.cube import axis_and_side
-from ..spline.bspline import sparse_rows
 from .operators import ControlRows, PiecewiseOperator
 from .polar import cross
 from .surface_distance import SurfaceFit
@@ -40,7 +39,8 @@ class FacingPenalty:
 
     def curvature(self, control: Tensor, dtype: torch.dtype) -> PiecewiseOperator:
         """Return the Gauss-Newton part of the second derivative at `control`."""
-        single = self._to(dtype)
+        along_a, along_b = (rows.to(dtype) for rows in self.tangents)
+        single = FacingPenalty((along_a, along_b), self.normals.to(dtype), self.weights.to(dtype), self.floor)
         by_a, by_b, size = single._slopes(control.to(dtype))
         scale = 2.0 * single.weights * (size < self.floor)
 
@@ -60,10 +60,6 @@ class FacingPenalty:
         along_a, along_b = self.tangents
         return along_a.adjoint((factor * by_a).T, like) + along_b.adjoint((factor * by_b).T, like)
 
-    def _to(self, dtype: torch.dtype) -> "FacingPenalty":
-        along_a, along_b = (rows.to(dtype) for rows in self.tangents)
-        return FacingPenalty((along_a, along_b), self.normals.to(dtype), self.weights.to(dtype), self.floor)
-
 
 def facing_penalty(fit: SurfaceFit, control: Tensor, floor: float, margin: float) -> FacingPenalty:
     """Return the penalty at the points of the surface where (t_a x t_b) . n < margin * floor at these control points.
@@ -75,12 +71,9 @@ def facing_penalty(fit: SurfaceFit, control: Tensor, floor: float, margin: float
     outward = axis_and_side(fit.places.cube_faces)[1] == 1
     normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
     low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < margin * floor
-    along_a, along_b = (
-        ControlRows.of(sparse_rows(weights[low], window.indices[low], control[0].numel()))
-        for weights in (window.weights(1, 0), window.weights(0, 1))
-    )
+    along_a, along_b = window.weights(1, 0), window.weights(0, 1)
     return FacingPenalty(
-        (along_a, along_b),
+        (ControlRows(window.indices[low], along_a[low]), ControlRows(window.indices[low], along_b[low])),
         torch.as_tensor(np.ascontiguousarray(normals[low].T)),
         torch.as_tensor(fit.weights[low]),
         floor,

@@ -12,14 +12,13 @@ from typing import Any
 import numba
 import numpy as np
 import torch
-from scipy.sparse import csr_array
 from torch import Tensor
 
 from ..arrays import Array, IntArray
 from ..threads import in_parallel
 
 Operator = Callable[[Tensor], Tensor]
-_ROWS = 4096  # of a sparse matrix in a piece of work
+_ROWS = 4096  # in a piece of work
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +31,11 @@ class PiecewiseOperator:
     def __call__(self, x: Tensor) -> Tensor:
         """Apply the operator to control points: (3, n_u, n_v, n_w) -> the same shape."""
         return self.add(in_parallel(lambda piece: piece(x), self.pieces), x)
+
+
+def pieces(count: int) -> list[slice]:
+    """Return which of `count` rows belong to each piece of work; there is at least one."""
+    return [slice(begin, begin + _ROWS) for begin in range(0, max(count, 1), _ROWS)]
 
 
 def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOperator:
@@ -73,48 +77,37 @@ def conjugate_gradients(
 
 @dataclass(frozen=True, eq=False)
 class ControlRows:
-    """A sparse matrix (N, n_u n_v n_w) that applies to control points (3, n_u, n_v, n_w), and its transpose.
+    """Rows that apply to control points, and their transpose: N of k entries each, their columns and values (N, k)."""
 
-    Row i has the entries values[starts[i] : starts[i + 1]] in these columns.
-    """
-
-    starts: IntArray
     columns: IntArray
     values: Array
 
-    @classmethod
-    def of(cls, rows: csr_array) -> "ControlRows":
-        """Take the rows of a scipy matrix."""
-        return cls(rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data)
-
     def to(self, dtype: torch.dtype) -> "ControlRows":
         """Return the same rows in another precision."""
-        return ControlRows(self.starts, self.columns, torch.from_numpy(self.values).to(dtype).numpy())
+        return ControlRows(self.columns, torch.from_numpy(self.values).to(dtype).numpy())
 
     def __call__(self, control: Tensor) -> Tensor:
-        """Return the values (N, 3) at control points."""
+        """Return the values (N, 3) at control points (3, n_u, n_v, n_w)."""
         field = control.reshape(3, -1).numpy()
-        found = in_parallel(lambda piece: _times(piece, self.columns, self.values, field), self._pieces())
+        found = in_parallel(lambda rows: _times(self.columns[rows], self.values[rows], field), pieces(len(self.values)))
         return torch.from_numpy(np.concatenate(found))
 
     def adjoint(self, dual: Tensor, like: Tensor) -> Tensor:
         """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
         flat, count = np.ascontiguousarray(dual.numpy()), like.numel() // 3
-        found = in_parallel(lambda piece: _spread(piece, self.columns, self.values, flat, count), self._pieces())
-        return _summed(found, like)
+
+        def part(rows: slice) -> Array:
+            return _spread(self.columns[rows], self.values[rows], flat[rows], count)
+
+        return _summed(in_parallel(part, pieces(len(self.values))), like)
 
     def squared(self, metric: Array) -> PiecewiseOperator:
         """Return the rows, then matrices (N, 3, 3) on what they yield, then the transpose of the rows."""
 
-        def product(piece: tuple[int, IntArray], field: Tensor) -> Array:
-            return _squared(piece, self.columns, self.values, metric, field.reshape(3, -1).numpy())
+        def product(rows: slice, field: Tensor) -> Array:
+            return _squared(self.columns[rows], self.values[rows], metric[rows], field.reshape(3, -1).numpy())
 
-        return PiecewiseOperator([partial(product, piece) for piece in self._pieces()], _summed)
-
-    def _pieces(self) -> list[tuple[int, IntArray]]:
-        """Return where the rows of each piece lie: the number of the first, and its entries' places (m + 1,)."""
-        count = max(len(self.starts) - 1, 1)
-        return [(begin, self.starts[begin : begin + _ROWS + 1]) for begin in range(0, count, _ROWS)]
+        return PiecewiseOperator([partial(product, rows) for rows in pieces(len(self.values))], _summed)
 
 
 def _summed(parts: list[Array], like: Tensor) -> Tensor:
@@ -123,51 +116,48 @@ def _summed(parts: list[Array], like: Tensor) -> Tensor:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _times(piece: tuple[int, IntArray], columns: IntArray, values: Array, field: Array) -> Array:
-    """Multiply rows of a sparse matrix by a field (3, n): (m, 3)."""
-    _, starts = piece
-    out = np.zeros((len(starts) - 1, 3), field.dtype)
-    for row in range(len(out)):
-        for entry in range(starts[row], starts[row + 1]):
-            column, value = columns[entry], values[entry]
+def _times(columns: IntArray, values: Array, field: Array) -> Array:
+    """Multiply rows (m, k) by a field (3, n): (m, 3)."""
+    out = np.zeros((len(columns), 3), field.dtype)
+    for row in range(len(columns)):
+        for entry in range(columns.shape[1]):
+            column, value = columns[row, entry], values[row, entry]
             for c in range(3):
                 out[row, c] += value * field[c, column]
     return out
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _spread(piece: tuple[int, IntArray], columns: IntArray, values: Array, dual: Array, count: int) -> Array:
-    """Multiply the transpose of some rows by what all rows have (N, 3): (3, count)."""
-    begin, starts = piece
+def _spread(columns: IntArray, values: Array, dual: Array, count: int) -> Array:
+    """Multiply the transpose of rows (m, k) by (m, 3): (3, count)."""
     out = np.zeros((3, count), dual.dtype)
-    for row in range(len(starts) - 1):
-        for entry in range(starts[row], starts[row + 1]):
-            column, value = columns[entry], values[entry]
+    for row in range(len(columns)):
+        for entry in range(columns.shape[1]):
+            column, value = columns[row, entry], values[row, entry]
             for c in range(3):
-                out[c, column] += value * dual[begin + row, c]
+                out[c, column] += value * dual[row, c]
     return out
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _squared(piece: tuple[int, IntArray], columns: IntArray, values: Array, metric: Array, field: Array) -> Array:
-    """Multiply the transpose of some rows by metrics (N, 3, 3) times the rows times a field (3, n): (3, n)."""
-    begin, starts = piece
+def _squared(columns: IntArray, values: Array, metric: Array, field: Array) -> Array:
+    """Multiply the transpose of rows (m, k) by metrics (m, 3, 3) times the rows times a field (3, n): (3, n)."""
     out, zero = np.zeros_like(field), field.dtype.type(0.0)
-    for row in range(len(starts) - 1):
+    for row in range(len(columns)):
         x, y, z = zero, zero, zero
-        for entry in range(starts[row], starts[row + 1]):
-            column, value = columns[entry], values[entry]
+        for entry in range(columns.shape[1]):
+            column, value = columns[row, entry], values[row, entry]
             x += value * field[0, column]
             y += value * field[1, column]
             z += value * field[2, column]
-        m = metric[begin + row]
+        m = metric[row]
         x, y, z = (
             m[0, 0] * x + m[0, 1] * y + m[0, 2] * z,
             m[1, 0] * x + m[1, 1] * y + m[1, 2] * z,
             m[2, 0] * x + m[2, 1] * y + m[2, 2] * z,
         )
-        for entry in range(starts[row], starts[row + 1]):
-            column, value = columns[entry], values[entry]
+        for entry in range(columns.shape[1]):
+            column, value = columns[row, entry], values[row, entry]
             out[0, column] += value * x
             out[1, column] += value * y
             out[2, column] += value * z

@@ -11,21 +11,20 @@ from functools import cached_property
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, IntArray, Knots, Mask
 from ..config import LAYOUT, LayoutConfig
 from ..cube.cube import axis_and_side, damped_fit, face_number, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
-from ..spline.bspline import breakpoints, fill_basis, sparse_rows
+from ..spline.bspline import breakpoints, fill_basis
 from ..threads import in_parallel
 from .determinant_penalty import with_neighbours
-from .operators import ControlRows
+from .operators import ControlRows, pieces
 
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3
-_POINTS = 4096  # in a piece of work
+_NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
 class SlidingParameters:
@@ -39,7 +38,7 @@ class SlidingParameters:
         knots: Knots,
         degree: int,
         parameters: Array,
-        triangles: IntArray,
+        triangles: IntArray = _NO_TRIANGLES,
         layout: LayoutConfig = LAYOUT,
     ) -> None:
         self.knots, self.degree = knots, degree
@@ -68,7 +67,7 @@ class SlidingParameters:
         found = [np.searchsorted(b[1:-1], x, "right") for b, x in zip(breaks, self.parameters.T, strict=True)]
         return np.stack(found, axis=1)
 
-    def near_spans(self, spans: IntArray) -> NDArray[np.bool_]:
+    def near_spans(self, spans: IntArray) -> Mask:
         """Return which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
         shape = tuple(len(breakpoints(k)) - 1 for k in self.knots)
         return with_neighbours(spans, shape)[tuple(self.spans().T)]
@@ -137,7 +136,7 @@ class SlidingParameters:
         moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
         self._keep(places, nearest_faces(places), moved)
 
-    def _keep(self, parameters: Array, cube_faces: IntArray, chosen: NDArray[np.bool_]) -> None:
+    def _keep(self, parameters: Array, cube_faces: IntArray, chosen: Mask) -> None:
         """Take these parameters for the chosen points; the basis functions of the others need not be found again."""
         known = self.window
         self.place(
@@ -153,15 +152,14 @@ class SlidingParameters:
     def _window(self, parameters: Array, faces: IntArray) -> "FaceWindow":
         knots = tuple(self.knots)
         found = in_parallel(
-            lambda piece: _face_windows(knots, self.degree, parameters[piece], faces[piece]), _pieces(len(faces))
+            lambda piece: _face_windows(knots, self.degree, parameters[piece], faces[piece]), pieces(len(faces))
         )
         return FaceWindow(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
     @cached_property
     def rows(self) -> ControlRows:
         """The rows that yield F at the points."""
-        count = int(np.prod([len(k) - self.degree - 1 for k in self.knots]))
-        return ControlRows.of(sparse_rows(self.window.weights(0, 0), self.window.indices, count))
+        return ControlRows(self.window.indices, self.window.weights(0, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,19 +177,15 @@ class FaceWindow:
     def derivatives(self, control: Tensor) -> tuple[Array, Array, Array]:
         """Return F and its tangents t_a and t_b at the points: (N, 3) each."""
         flat, windows = control.reshape(3, -1).numpy(), (self.indices, self.in_a, self.in_b)
-        found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), _pieces(len(self.indices)))
+        found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), pieces(len(self.indices)))
         value, along_a, along_b = np.concatenate(found, axis=1)
         return value, along_a, along_b
 
-    def with_points(self, chosen: NDArray[np.bool_], other: "FaceWindow") -> "FaceWindow":
+    def with_points(self, chosen: Mask, other: "FaceWindow") -> "FaceWindow":
         """Return this window with the chosen points (N,) replaced by those of another one."""
         replaced = FaceWindow(self.indices.copy(), self.in_a.copy(), self.in_b.copy())
         replaced.indices[chosen], replaced.in_a[chosen], replaced.in_b[chosen] = other.indices, other.in_a, other.in_b
         return replaced
-
-
-def _pieces(points: int) -> list[slice]:
-    return [slice(begin, begin + _POINTS) for begin in range(0, max(points, 1), _POINTS)]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -203,26 +197,22 @@ def _face_windows(knots: Knots, degree: int, parameters: Array, cube_faces: IntA
         sizes[d] = len(knots[d]) - degree - 1
     stride[1], stride[0] = sizes[2], sizes[1] * sizes[2]
     indices = np.empty((count, width * width), np.int64)
-    in_a, in_b = np.empty((count, 2, width)), np.empty((count, 2, width))
-    table, first, span = np.empty((2, 1, width)), np.empty(2, np.int64), np.empty(1, np.int64)
+    in_a, in_b = np.empty((count, 2, 1, width)), np.empty((count, 2, 1, width))
+    first, span = np.empty(2, np.int64), np.empty(1, np.int64)
     for n in range(count):
         axis, side = cube_faces[n] // 2, cube_faces[n] % 2
         for d in range(2):
             along = (axis + 1 + d) % 3
             row, x = knots[along], parameters[n, along : along + 1]
             span[0] = min(max(np.searchsorted(row, x[0], side="right") - 1, degree), len(row) - degree - 2)
-            fill_basis(row, degree, x, span, table)
+            fill_basis(row, degree, x, span, in_b[n] if d else in_a[n])
             first[d] = span[0] - degree
-            basis = in_b if d else in_a
-            for k in range(2):
-                for i in range(width):
-                    basis[n, k, i] = table[k, 0, i]
         base = side * (sizes[axis] - 1) * stride[axis]
         step_a, step_b = stride[(axis + 1) % 3], stride[(axis + 2) % 3]
         for i in range(width):
             for j in range(width):
                 indices[n, i * width + j] = base + (first[0] + i) * step_a + (first[1] + j) * step_b
-    return indices, in_a, in_b
+    return indices, in_a[:, :, 0], in_b[:, :, 0]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

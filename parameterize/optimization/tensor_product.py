@@ -122,15 +122,6 @@ def _apply(first: IntArray, entries: Array, field: Array, out: Array) -> None:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _transposed(field: Array) -> Array:
-    out = np.empty((field.shape[1], field.shape[0]), field.dtype)
-    for i in range(field.shape[0]):
-        for j in range(field.shape[1]):
-            out[j, i] = field[i, j]
-    return out
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
     """Return derivatives (3, 3, points) of control points (3, n_u, n_v, n_w) at all points of the bands, in planes."""
     (first_u, values_u, slopes_u), (first_v, values_v, slopes_v), (first_w, values_w, slopes_w) = bands
@@ -150,7 +141,7 @@ def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
             _apply(first_v, values_v, flat, part[2])
             for direction in range(3):
                 entries = slopes_w if direction == 2 else values_w
-                _apply(first_w, entries, _transposed(part[direction]), out[c, direction, m])
+                _apply(first_w, entries, np.ascontiguousarray(part[direction].T), out[c, direction, m])
     return out.reshape(3, 3, planes * m_w * m_v)
 
 
@@ -170,9 +161,9 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
                 entries = slopes_w if direction == 2 else values_w
                 _apply(first_w, entries, field[c, direction, m], part[direction])
             plain, steep = np.zeros((n_v, n_w), dual.dtype), np.zeros((n_v, n_w), dual.dtype)
-            _apply(first_v, values_v, _transposed(part[0]), steep)
-            _apply(first_v, slopes_v, _transposed(part[1]), plain)
-            _apply(first_v, values_v, _transposed(part[2]), plain)
+            _apply(first_v, values_v, np.ascontiguousarray(part[0].T), steep)
+            _apply(first_v, slopes_v, np.ascontiguousarray(part[1].T), plain)
+            _apply(first_v, values_v, np.ascontiguousarray(part[2].T), plain)
             for k in range(width):
                 for i in range(n_v):
                     for j in range(n_w):
@@ -217,29 +208,26 @@ def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
     return points, weights
 
 
-def gram(knots: Array, degree: int, derivative: int) -> Tensor:
-    """Return the matrix of integrals of products of `derivative`-th derivatives (n, n): mass, stiffness, bending."""
-    points, weights = gauss_points(knots, degree + 1)
-    table = collocation(knots, degree, points.ravel(), derivative).toarray()
-    return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
+Grams = list[tuple[Tensor, ...]]  # mass, stiffness and bending matrices (n, n), each for the three directions
 
 
-def grams(knots: tuple[Array, ...], degree: int) -> list[tuple[Tensor, ...]]:
-    """Mass, stiffness and bending matrices, each for the three directions."""
-    return [tuple(gram(k, degree, d) for k in knots) for d in range(3)]
+def grams(knots: tuple[Array, ...], degrees: tuple[int, ...]) -> Grams:
+    """Return the matrices of integrals of products of basis functions, of their first and of their second derivatives.
+
+    Gauss quadrature, exact.
+    """
+
+    def of(row: Array, degree: int, derivative: int) -> Tensor:
+        points, weights = gauss_points(row, degree + 1)
+        table = collocation(row, degree, points.ravel(), derivative).toarray()
+        return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
+
+    return [tuple(of(row, p, d) for row, p in zip(knots, degrees, strict=True)) for d in range(3)]
 
 
-def bending_operator(
-    mass: tuple[Tensor, ...],
-    slope: tuple[Tensor, ...],
-    curve: tuple[Tensor, ...],
-    weight: float,
-    dtype: torch.dtype = torch.float64,
-) -> PiecewiseOperator:
+def bending_operator(matrices: Grams, weight: float, dtype: torch.dtype = torch.float64) -> PiecewiseOperator:
     """Return x -> weight * H x with x^T H x = int |Hessian F|^2 (exact); a piece of work is one component of F."""
-    m0, m1, m2 = (m.to(dtype) for m in mass)
-    k0, k1, k2 = (k.to(dtype) for k in slope)
-    h0, h1, h2 = (h.to(dtype) for h in curve)
+    (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = ([m.to(dtype) for m in row] for row in matrices)
 
     def bend(component: int, control: Tensor) -> Tensor:
         x = control[component : component + 1]

@@ -15,7 +15,7 @@ from ..display import Shown
 from ..spline.bspline import gauss_points
 from ..spline.volume import BSplineVolume
 from .distances import SAMPLES, Distances, SampledBoundary, to_boundary, to_mesh
-from .singular_values import signed_singular_values
+from .rotations import closest_rotations
 
 _SLAB_POINTS = 100_000
 
@@ -158,7 +158,6 @@ def measure(
     with the surface's vertices, in their order.
     scale: the factor that brings the model to volume 1 (Surface.scale).
     certificate, boundary_check: from `certify` and `check_boundary`.
-    Raises ValueError for a scale that is not positive or a boundary map of fewer vertices.
     """
     if not (isfinite(scale) and scale > 0.0):
         raise ValueError(f"scale must be positive, got {scale}; Surface.scale is the one meant")
@@ -168,12 +167,12 @@ def measure(
     if len(boundary.vertices) < n:
         raise ValueError(f"boundary must start with the surface's {n} vertices, it has {len(boundary.vertices)}")
     sampled = SampledBoundary.of(volume)
-    _, sigma, weights = _singular_grid(volume, n_gauss=3)
+    _, (unit_volume, as_given), weights = arap_grid(volume, scales=(scale, 1.0))
     return QualityReport(
         control_points=volume.shape,
         degrees=volume.degrees,
         certificate=certificate,
-        arap=BothScales(_distortion(scale * sigma, weights), _distortion(sigma, weights)),
+        arap=BothScales(_distortion(unit_volume, weights), _distortion(as_given, weights)),
         arap_points=weights.size,
         boundary=_both(np.linalg.norm(volume(boundary.parameters[:n]) - boundary.vertices[:n], axis=1), scale),
         mesh_to_spline=_both(to_boundary(vertices, volume, sampled), scale),
@@ -188,45 +187,49 @@ def _both(distances: Array, scale: float) -> BothScales[Distances]:
     return BothScales(as_given.scaled(scale), as_given)
 
 
-def _distortion(sigma: Array, weights: Array) -> Distortion:
-    values = _arap_of(sigma)
+def _distortion(values: Array, weights: Array) -> Distortion:
     return Distortion(float(np.sum(weights * values)), float(values.max()))
 
 
 def arap_grid(
-    volume: BSplineVolume, n_gauss: int = 3, scale: float = 1.0
-) -> tuple[tuple[Array, Array, Array], Array, Array]:
-    """Return the ARAP distortion of scale * F at `n_gauss` Gauss points per direction and span.
+    volume: BSplineVolume, n_gauss: int = 3, scales: tuple[float, ...] = (1.0,)
+) -> tuple[tuple[Array, Array, Array], list[Array], Array]:
+    """Return the ARAP distortion of scale * F, for each of the scales, at `n_gauss` Gauss points a direction and span.
 
-    That is the points of each axis, the values (m_u, m_v, m_w), and the weights of the integral over the cube.
+    That is the points of each axis, the values (m_u, m_v, m_w) a scale, and the weights of the integral over the cube.
     """
-    points, sigma, weights = _singular_grid(volume, n_gauss)
-    return points, _arap_of(scale * sigma), weights
-
-
-def _singular_grid(volume: BSplineVolume, n_gauss: int) -> tuple[tuple[Array, Array, Array], Array, Array]:
-    """Return Gauss points per axis, signed singular values (m_u, m_v, m_w, 3), weights (m_u, m_v, m_w)."""
     rules = [gauss_points(k, n_gauss) for k in volume.knots]
     u, v, w = (points.ravel() for points, _ in rules)
-    sigma = np.empty((len(u), len(v), len(w), 3))
+    values = [np.empty((len(u), len(v), len(w))) for _ in scales]
     step = max(1, _SLAB_POINTS // (len(v) * len(w)))
     for start in range(0, len(u), step):  # slabs bound the memory
         slab = slice(start, start + step)
-        sigma[slab] = signed_singular_values(volume.grid_jacobian(u[slab], v, w))
+        for row, found in zip(values, _arap(volume.grid_jacobian(u[slab], v, w), scales), strict=True):
+            row[slab] = found
     weights = np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
-    return (u, v, w), sigma, weights
+    return (u, v, w), values, weights
 
 
 def arap(jacobians: ArrayLike) -> Array:
     """Return the as-rigid-as-possible distortion sum (sigma_i - 1)^2, sigma_3 signed like det: (..., 3, 3) -> (...).
 
     (Paper, section 3.2, which leaves the sign open: with it the mirror image of a rigid map costs 4, not 0.)
+    Raises ValueError for another shape or entries that are not finite.
     """
-    return _arap_of(signed_singular_values(jacobians))
+    matrices = np.asarray(jacobians, dtype=np.float64)
+    if matrices.shape[-2:] != (3, 3):
+        raise ValueError(f"jacobians must have shape (..., 3, 3), got {matrices.shape}")
+    if not np.all(np.isfinite(matrices)):
+        raise ValueError("jacobians must be finite")
+    return _arap(matrices, (1.0,))[0]
 
 
-def _arap_of(sigma: Array) -> Array:
-    return np.sum((sigma - 1.0) ** 2, axis=-1)
+def _arap(jacobians: Array, scales: tuple[float, ...]) -> list[Array]:
+    """Return the distortion of scale * J for each scale: the squared distance to the rotation closest to J."""
+    columns = np.ascontiguousarray(np.moveaxis(jacobians.reshape(-1, 3, 3), 0, -1))
+    rotations = closest_rotations(columns)
+    values = [((scale * columns - rotations) ** 2).sum(axis=(0, 1)) for scale in scales]
+    return [value.reshape(jacobians.shape[:-2]) for value in values]
 
 
 def scaled_jacobian(jacobians: ArrayLike) -> Array:

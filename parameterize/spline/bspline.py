@@ -133,13 +133,6 @@ def sparse_rows(values: Array, columns: IntArray, count: int) -> csr_array:
     return csr_array((values.ravel(), columns.ravel(), starts), shape=(len(values), count))
 
 
-def window_numbers(windows: Sequence[IntArray], sizes: Sequence[int]) -> IntArray:
-    """Return the flat numbers (m, k^3) of the coefficients in three windows (m, k), one a direction, of a grid."""
-    u, v, w = windows
-    flat = (u[:, :, None, None] * sizes[1] + v[:, None, :, None]) * sizes[2] + w[:, None, None, :]
-    return flat.reshape(len(u), -1)
-
-
 def gauss_points(knots: Array, n_points: int) -> tuple[Array, Array]:
     """Return Gauss-Legendre points and weights on every span, each of shape (n_spans, n_points)."""
     nodes, weights = np.polynomial.legendre.leggauss(n_points)
@@ -165,10 +158,7 @@ def insert_knots(knots: Array, degree: int, new: ArrayLike) -> tuple[Array, csr_
 
 
 def insertion_into(knots: Array, degree: int, finer: Array) -> csr_array:
-    """Return the matrix (n_finer, n) that inserts the knots which a finer knot vector has in addition.
-
-    Raises ValueError where that lacks one of the knots, or its ends differ.
-    """
+    """Return the matrix (n_finer, n) that inserts the knots which a finer knot vector has in addition."""
     own, wanted = Counter(knots.tolist()), Counter(finer.tolist())
     if own - wanted:
         raise ValueError("the finer knot vector must hold every knot of the coarser one")
@@ -194,12 +184,14 @@ def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
     return np.moveaxis(flat.reshape(-1, *moved.shape[1:]), 0, axis)
 
 
-def interpolate_along(knots: Array, degree: int, values: Array, axis: int) -> Array:
-    """Return the coefficients along one axis of the spline that has `values` (..., n, ...) at the Greville points."""
+def interpolate_grid(knots: Sequence[Array], degree: int, values: Array) -> Array:
+    """Return the coefficients of the spline that has `values` (n_u, n_v, n_w, c) at the Greville points."""
     from scipy.interpolate import make_interp_spline
 
-    moved = np.moveaxis(values, axis, 0)
-    return np.moveaxis(make_interp_spline(greville(knots, degree), moved, degree, knots).c, 0, axis)
+    for axis, row in enumerate(knots):
+        moved = np.moveaxis(values, axis, 0)
+        values = np.moveaxis(make_interp_spline(greville(row, degree), moved, degree, row).c, 0, axis)
+    return values
 
 
 def evaluate_at(
@@ -212,7 +204,6 @@ def evaluate_at(
     """Evaluate a trivariate spline, or one of its partial derivatives, at points (m, 3).
 
     coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
-    Raises ValueError for points of another shape, or outside the unit cube by more than rounding.
     """
     from scipy.interpolate import NdBSpline
 

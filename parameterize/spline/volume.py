@@ -18,7 +18,7 @@ from .bspline import (
     evaluate_grid,
     greville,
     insertion_into,
-    interpolate_along,
+    interpolate_grid,
     midpoints,
     open_uniform_knots,
     real_array,
@@ -149,9 +149,7 @@ class BSplineVolume(Shown):
         net = np.stack([np.broadcast_to(part, counts) for part in parts], axis=-1)
         if not np.all(np.isfinite(net)):
             raise ValueError("function must return finite numbers for all u, v, w from 0 to 1")
-        for axis in range(3):
-            net = interpolate_along(knots[axis], degree, net, axis)
-        return cls((degree, degree, degree), knots, net)  # type: ignore[arg-type]
+        return cls((degree, degree, degree), knots, interpolate_grid(knots, degree, net))  # type: ignore[arg-type]
 
     @classmethod
     def from_splinepy(cls, spline: Any) -> "BSplineVolume":

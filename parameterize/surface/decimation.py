@@ -14,7 +14,6 @@ def decimate(surface: Surface, max_faces: int) -> Surface:
 
     Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), none that makes triangles intersect. A
     notice says the counts and the largest distance moved; `sha256` is that of the new arrays.
-    Raises MeshError where so few triangles cannot be reached.
     """
     before = len(surface.faces)
     if before <= max_faces:

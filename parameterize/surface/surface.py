@@ -11,13 +11,11 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, in_brackets
 from ..display import Shown
+from . import topology
 from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
-from .geometry import signed_volume
-from .inside import deepest_point
+from .geometry import deepest_point, signed_volume
 from .readers.file import RawMesh, read_mesh
 from .readers.objects import READERS, class_of, read_object
-from .self_intersection import SHOWN, crossing_faces, crossing_places, describe_crossings
-from .topology import check_genus, check_manifold, choose_component, slivers
 from .welding import weld_and_drop, wind_outward
 
 if TYPE_CHECKING:
@@ -102,8 +100,8 @@ class Surface(Shown):
 
     def summary(self) -> dict[str, Any]:
         """Return the section `input` of report.json."""
-        first = self.crossings[:SHOWN]
-        places = crossing_places(self.vertices, self.faces, first)
+        first = self.crossings[: topology.SHOWN]
+        places = topology.crossing_places(self.vertices, self.faces, first)
         return {
             "file": self.source or self.name,
             "sha256": self.sha256,
@@ -123,7 +121,7 @@ class Surface(Shown):
     def refuse_crossings(self) -> None:
         """Raise MeshError where faces intersect."""
         if len(self.crossings):
-            found = describe_crossings(self.vertices, self.faces, self.crossings)
+            found = topology.describe_crossings(self.vertices, self.faces, self.crossings)
             name = self.source or self.name
             raise MeshError(f"{name}: {found}: pull the sheets apart there, or check without --strict")
 
@@ -251,20 +249,20 @@ def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces
     triangles, mended = weld_and_drop(unit, faces)
     if len(triangles) < 4:
         raise MeshError(f"{len(triangles)} faces that are not degenerate, at least 4 are needed: export it again")
-    triangles, chosen = choose_component(unit, triangles, component)
+    triangles, chosen = topology.choose_component(unit, triangles, component)
     kept, compact = np.unique(triangles, return_inverse=True)
     points, triangles = unit[kept], compact.reshape(-1, 3).astype(np.int64)
 
     def where(vertex: int) -> str:
         return in_brackets(vertices[kept[vertex]])
 
-    check_manifold(triangles, where)
+    topology.check_manifold(triangles, where)
     triangles, turned = wind_outward(points, triangles)
-    check_genus(triangles)
-    doubts = slivers(points, triangles, where)
-    crossings = crossing_faces(points, triangles)
+    topology.check_genus(triangles)
+    doubts = topology.slivers(points, triangles, where)
+    crossings = topology.crossing_faces(points, triangles)
     if len(crossings):
-        doubts.append(describe_crossings(vertices[kept], triangles, crossings))
+        doubts.append(topology.describe_crossings(vertices[kept], triangles, crossings))
     deepest, _ = deepest_point(points, triangles)
     unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
     placed = unit_scale * (points - deepest) + 0.5

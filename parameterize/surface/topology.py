@@ -1,4 +1,4 @@
-"""Checks the topology: open, non-manifold, in several components, of higher genus or without volume is refused.
+"""Checks the topology: open, non-manifold, in several components or of higher genus is refused; finds what crosses.
 
 Positions in messages are the user's: the caller passes `where`, which turns a vertex number into text.
 """
@@ -7,21 +7,20 @@ from collections.abc import Callable
 
 import igl
 import numpy as np
+from igl.predicates import find_self_intersections
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, in_brackets
 from .errors import MeshError
 from .geometry import connected, directed_edges, edge_table
 
 Where = Callable[[int], str]
 SLIVER_DEGREES = 0.5
-LISTED = 8
+LISTED = 8  # components
+SHOWN = 5  # pairs of faces that cross
 
 
 def choose_component(vertices: Array, faces: IntArray, component: int | None) -> tuple[IntArray, list[str]]:
-    """Return the faces of the only component, or of the one asked for (0 the largest), and notices.
-
-    Raises MeshError listing the components, and saying which lies inside the largest.
-    """
+    """Return the faces of the only component, or of the one asked for (0 the largest), and notices."""
     groups = _components(faces)
     if component is None and len(groups) == 1:
         return faces, []
@@ -98,13 +97,35 @@ def check_genus(faces: IntArray) -> None:
 
 def slivers(vertices: Array, faces: IntArray, where: Where) -> list[str]:
     """Return a notice of the triangles with a tiny angle, if any: they are accepted, but may spoil the result."""
-    corners = vertices[faces]  # (m, 3, 3)
-    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    doubled = np.linalg.norm(np.cross(ahead[:, 0], behind[:, 0]), axis=1)  # (m,) twice the area
-    angles = np.degrees(np.arctan2(doubled[:, None], np.sum(ahead * behind, axis=2)))  # (m, 3)
+    angles = np.degrees(np.nan_to_num(igl.internal_angles(vertices, faces)))  # (m, 3); nan: an edge has no length
     thin = np.flatnonzero(angles.min(axis=1) < SLIVER_DEGREES)
     if not len(thin):
         return []
     return [
         f"{len(thin)} slivers (an angle below {SLIVER_DEGREES} degrees), the first at {where(int(faces[thin[0], 0]))}"
     ]
+
+
+def crossing_faces(vertices: Array, faces: IntArray) -> IntArray:
+    """Return the pairs (k, 2) of faces that meet outside of their common vertices and edges, by exact predicates.
+
+    Two faces with a common edge are not compared: folded flat upon each other, they are not found.
+    """
+    _, pairs, _ = find_self_intersections(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
+    ordered = np.sort(np.asarray(pairs, dtype=np.int64).reshape(-1, 2), axis=1)
+    return np.unique(ordered, axis=0)
+
+
+def crossing_places(vertices: Array, faces: IntArray, pairs: IntArray) -> Array:
+    """Return a place (k, 3) for each pair: the middle of what the boxes of the two faces have in common."""
+    corners = vertices[faces[pairs]]  # (k, 2, 3, 3)
+    low, high = corners.min(axis=2).max(axis=1), corners.max(axis=2).min(axis=1)
+    return np.asarray((low + high) / 2.0)
+
+
+def describe_crossings(vertices: Array, faces: IntArray, pairs: IntArray) -> str:
+    """Return one line: the number of pairs, and the first with its place."""
+    first, second = pairs[0].tolist()
+    place = in_brackets(crossing_places(vertices, faces, pairs[:1])[0])
+    count = "1 pair" if len(pairs) == 1 else f"{len(pairs)} pairs"
+    return f"self-intersection: {count} of faces, the first are faces {first} and {second} near {place}"

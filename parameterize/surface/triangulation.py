@@ -23,7 +23,6 @@ def triangulate(vertices: Array, polygons: list[list[int]]) -> IntArray:
     """Return triangles (m, 3) in the polygons' order, wound like them; a polygon of n corners gives n - 2.
 
     Vertex numbers must be in range and coordinates finite; a triangle may repeat a corner only where its polygon does.
-    Raises MeshError for a polygon of more than 256 corners.
     """
     sizes = np.array([len(polygon) for polygon in polygons])
     if sizes.max() > MAX_CORNERS:

@@ -48,10 +48,7 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]
 
 
 def wind_outward(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
-    """Return the faces (m, 3) of a closed component, wound outward, and notices; its box has side 1.
-
-    Raises MeshError for a surface that has one side only or encloses nothing.
-    """
+    """Return the faces (m, 3) of a closed component, wound outward, and notices; its box has side 1."""
     wound, notices = faces, []
     if not _is_oriented(faces):
         wound, _ = igl.bfs_orient(faces)

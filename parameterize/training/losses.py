@@ -1,57 +1,123 @@
-"""The terms of the training loss L = L_inner + L_bound (paper, eq. (2) and (3)), one function a term.
+"""The training loss L = L_inner + L_bound (paper, eq. (2) and (3)): its weighted sum, and one function a term.
 
-Each term has the name of its weight in `StageWeights`.
-The paper gives the terms' own formulas without numbers: those of L_bound in section 4.4.1, those of L_inner in 4.4.2.
+Each term has the name of its weight in `StageWeights`. The paper gives the terms' own formulas without numbers: those
+of L_bound in section 4.4.1, those of L_inner in 4.4.2.
 """
 
+from dataclasses import dataclass
+
+import numpy as np
 import torch
 from torch import Tensor
 
-from ..config import TrainConfig
+from ..arrays import IntArray
+from ..config import StageConfig, TrainConfig
+from ..cube.cube import CORNERS
 from ..optimization.polar import closest_rotation, cofactor, determinant
-from .samples import OFFSETS, gather
+from .network import InverseMap, map_in_pieces
+from .samples import OFFSETS, Stencils, TriangleSampler, gather
+from .target_shapes import nearest, nearest_on_cube_face
 
-_POSITION = {tuple(int(v) for v in offset): i for i, offset in enumerate(OFFSETS)}
-_UNITS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-
-
-def _neighbour(mapped: Tensor, *steps: tuple[int, int, int]) -> Tensor:
-    """Return the mapped stencil point at the sum of the given lattice steps: (r, 3)."""
-    x, y, z = (sum(s) for s in zip(*steps, strict=True))
-    return mapped[:, _POSITION[(x, y, z)]]
+_POSITION = {tuple(offset): i for i, offset in enumerate(OFFSETS.tolist())}
+_UNITS = np.eye(3, dtype=np.int64)
 
 
-def _minus(step: tuple[int, int, int]) -> tuple[int, int, int]:
-    return (-step[0], -step[1], -step[2])
+@dataclass(frozen=True, eq=False)
+class EdgePaths:
+    """The paths that go to the cube's edges: vertices (k,), targets (k, 3), pairs of neighbours (s, 2)."""
+
+    vertices: Tensor
+    targets: Tensor
+    following: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class BoundarySamples:
+    """What a stage knows of the surface: vertices (n, 3) at volume 1, triangles (m, 3), and what draws these.
+
+    From the later stages on also: corners (8,), vertices that go to the cube's corners; labels (m,), the cube face of
+    each triangle; and the paths to the cube's edges.
+    """
+
+    vertices: Tensor
+    faces: Tensor
+    sampler: TriangleSampler
+    corners: Tensor | None = None
+    labels: Tensor | None = None
+    paths: EdgePaths | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """What the stages share when they compute the loss: the network, the stencils inside the domain, the options."""
+
+    network: InverseMap
+    stencils: Stencils
+    config: TrainConfig
+
+    def __call__(
+        self, stage: StageConfig, boundary: BoundarySamples, generator: torch.Generator
+    ) -> tuple[Tensor, int, dict[str, float]]:
+        """Return the weighted sum of the terms (eq. (2) and (3)), the folded stencils, and the unweighted terms."""
+        picks = boundary.sampler.draw(generator)
+        used, place = torch.unique(boundary.faces[picks].flatten(), return_inverse=True)
+        held = [] if boundary.corners is None else [boundary.corners]
+        held += [] if boundary.paths is None else [boundary.paths.vertices]
+        points = [self.stencils.shifted(generator), *(boundary.vertices[index] for index in (used, *held))]
+        mapped = map_in_pieces(self.network, torch.cat(points))
+        nodes, surface, *held = torch.split(mapped, [len(p) for p in points])
+        surface = gather(surface, place)
+        goal = self._goal(stage, boundary, surface, picks)
+        nodes, cell, config = gather(nodes, self.stencils.index), self.stencils.cell, self.config
+        jacobian = stencil_jacobian(nodes, cell)
+        det = determinant(jacobian)
+        corners = surface.view(-1, 3, 3)
+        normals = triangle_normals(corners)
+        wrong_side = config.wrong_side if stage.target == "cube" else 0.0
+        terms = {
+            "bij": bijectivity(det, config.min_det),
+            "arap": distortion(jacobian, det, config.det_floor * config.min_det),
+            "fair": fairness(nodes, cell),
+            "dist": distance(surface, goal),
+            "norm": normal_difference(normals, triangle_normals(goal.view(-1, 3, 3)), wrong_side),
+            "star": star_shape(corners, normals),
+        } | self._held_terms(boundary, held)
+        weights = {name: getattr(stage.weights, name) for name in terms}
+        if "cor" in terms:
+            weights["cor"] = stage.weights.cor or stage.given_corner_weight
+        total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
+        return total, int((det <= 0.0).sum()), {name: float(term.detach()) for name, term in terms.items()}
+
+    def _goal(self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor) -> Tensor:
+        """Return what the corners (3 t, 3) of the mapped triangles `picks` (t,) are to reach.
+
+        Once the surface is cut, each triangle goes to its own face of the cube.
+        """
+        with torch.no_grad():
+            if boundary.labels is None:
+                return nearest(stage.target, surface)
+            return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
+
+    def _held_terms(self, boundary: BoundarySamples, held: list[Tensor]) -> dict[str, Tensor]:
+        """Return the terms of L_bound for what is held: the mapped corners (8, 3), then the path points (k, 3)."""
+        terms = {}
+        if boundary.corners is not None:
+            terms["cor"] = distance(held[0], torch.as_tensor(CORNERS).to(held[0]))
+        if boundary.paths is not None:
+            paths, weight = boundary.paths, self.config.edge_direction
+            terms["edge"] = edge_path(held[1], paths.targets, paths.following, weight)
+        return terms
+
+
+def _neighbour(mapped: Tensor, step: IntArray) -> Tensor:
+    """Return the mapped stencil point at a lattice step from the centre: (r, 3)."""
+    return mapped[:, _POSITION[tuple(step.tolist())]]
 
 
 def stencil_jacobian(mapped: Tensor, cell: float) -> Tensor:
     """Return J by central differences of G: stencils (r, 19, 3) -> (3, 3, r), the second index is the direction."""
-    columns = [(_neighbour(mapped, e) - _neighbour(mapped, _minus(e))).T for e in _UNITS]
+    columns = [(_neighbour(mapped, e) - _neighbour(mapped, -e)).T for e in _UNITS]
     return torch.stack(columns, dim=1) / (2.0 * cell)
-
-
-def inner_terms(nodes: Tensor, cell: float, config: TrainConfig) -> tuple[dict[str, Tensor], int]:
-    """Return the terms of L_inner (section 4.4.2) on mapped stencils (r, 19, 3), and the number folded."""
-    jacobian = stencil_jacobian(nodes, cell)
-    det = determinant(jacobian)
-    terms = {
-        "bij": bijectivity(det, config.min_det),
-        "arap": distortion(jacobian, det, config.det_floor * config.min_det),
-        "fair": fairness(nodes, cell),
-    }
-    return terms, int((det <= 0.0).sum())
-
-
-def surface_terms(surface: Tensor, goal: Tensor, wrong_side: float) -> dict[str, Tensor]:
-    """Return the terms of L_bound (section 4.4.1) on corners (3 t, 3) of mapped triangles, drawn to `goal`."""
-    corners = surface.view(-1, 3, 3)
-    normals = triangle_normals(corners)
-    return {
-        "dist": distance(surface, goal),
-        "norm": normal_difference(normals, triangle_normals(goal.view(-1, 3, 3)), wrong_side),
-        "star": star_shape(corners, normals),
-    }
 
 
 def bijectivity(det: Tensor, alpha: float) -> Tensor:
@@ -79,15 +145,15 @@ def fairness(mapped: Tensor, cell: float) -> Tensor:
     centre = mapped[:, 0]
     for a in range(3):
         ea = _UNITS[a]
-        second = (_neighbour(mapped, ea) - 2.0 * centre + _neighbour(mapped, _minus(ea))) / cell**2
+        second = (_neighbour(mapped, ea) - 2.0 * centre + _neighbour(mapped, -ea)) / cell**2
         total = total + second.square().sum(dim=1).mean()
         for b in range(a + 1, 3):
             eb = _UNITS[b]
             mixed = (
-                _neighbour(mapped, ea, eb)
-                - _neighbour(mapped, ea, _minus(eb))
-                - _neighbour(mapped, _minus(ea), eb)
-                + _neighbour(mapped, _minus(ea), _minus(eb))
+                _neighbour(mapped, ea + eb)
+                - _neighbour(mapped, ea - eb)
+                - _neighbour(mapped, eb - ea)
+                + _neighbour(mapped, -ea - eb)
             ) / (4.0 * cell**2)
             total = total + 2.0 * mixed.square().sum(dim=1).mean()
     return total

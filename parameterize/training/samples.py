@@ -5,22 +5,14 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..surface.geometry import doubled_areas
 
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
-OFFSETS = (
-    np.array(
-        sorted(
-            (o for o in np.ndindex(3, 3, 3) if np.count_nonzero(np.array(o) != 1) <= 2),
-            key=lambda o: np.count_nonzero(np.array(o) != 1),
-        )
-    )
-    - 1
-)
+_STEPS = np.array(list(np.ndindex(3, 3, 3))) - 1
+OFFSETS = np.concatenate([_STEPS[np.count_nonzero(_STEPS, axis=1) == moved] for moved in range(3)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +40,13 @@ def gather(rows: Tensor, index: Tensor) -> Tensor:
     return rows.index_select(0, index.flatten()).view(*index.shape, rows.shape[1])
 
 
-def signed_distance(points: Array, vertices: Array, faces: NDArray[np.int64]) -> Array:
+def signed_distance(points: Array, vertices: Array, faces: IntArray) -> Array:
     """Return the distance to the surface, negative inside: (m, 3) -> (m,)."""
     kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     return np.asarray(igl.signed_distance(points, vertices, faces, sign_type=kind)[0])
 
 
-def lattice(vertices: Array, cell: float, margin: float) -> tuple[Array, NDArray[np.int64]]:
+def lattice(vertices: Array, cell: float, margin: float) -> tuple[Array, IntArray]:
     """Return lattice points (k, 3) that fill the bounding box grown by `margin`, and their integer coordinates."""
     low = np.floor((vertices.min(0) - margin) / cell).astype(int)
     high = np.ceil((vertices.max(0) + margin) / cell).astype(int)
@@ -63,9 +55,7 @@ def lattice(vertices: Array, cell: float, margin: float) -> tuple[Array, NDArray
     return index * cell, index
 
 
-def stencils(
-    vertices: Array, faces: NDArray[np.int64], cell: float, *, device: torch.device, dtype: torch.dtype
-) -> Stencils:
+def stencils(vertices: Array, faces: IntArray, cell: float, *, device: torch.device, dtype: torch.dtype) -> Stencils:
     """Return stencils around every lattice point inside the surface or within h/2 of it, to cover it at any shift."""
     points, index = lattice(vertices, cell, cell / 2.0)
     centres = index[signed_distance(points, vertices, faces) < cell / 2.0]
@@ -77,7 +67,7 @@ def stencils(
     )
 
 
-def interior_points(vertices: Array, faces: NDArray[np.int64], cell: float) -> Array:
+def interior_points(vertices: Array, faces: IntArray, cell: float) -> Array:
     """Return the lattice points inside the surface: (k, 3)."""
     points, _ = lattice(vertices, cell, 0.0)
     return points[signed_distance(points, vertices, faces) < 0.0]
@@ -86,7 +76,7 @@ def interior_points(vertices: Array, faces: NDArray[np.int64], cell: float) -> A
 class TriangleSampler:
     """Draws triangles with probability proportional to area; all of them where `count` covers the mesh."""
 
-    def __init__(self, vertices: Array, faces: NDArray[np.int64], count: int, device: torch.device) -> None:
+    def __init__(self, vertices: Array, faces: IntArray, count: int, device: torch.device) -> None:
         area = np.linalg.norm(doubled_areas(vertices, faces), axis=1)
         self._cumulative = torch.as_tensor(np.cumsum(area / area.sum()))
         self._count = min(count, len(faces))

@@ -36,17 +36,12 @@ def nearest_on_cuboid(points: Tensor, d: float) -> Tensor:
     outward = local - core
     inside = (outward == 0.0).all(dim=1, keepdim=True)
     on_face = nearest_on_cube(local)
-    outward = torch.where(inside, _face_normal(on_face), outward)
+    axis = (on_face - 0.5).abs().argmax(dim=1, keepdim=True)
+    normal = torch.zeros_like(local).scatter(1, axis, (on_face - 0.5).gather(1, axis).sign())  # of one face on an edge
+    outward = torch.where(inside, normal, outward)
     base = torch.where(inside, on_face, core)
     nearest = base + d * outward / outward.norm(dim=1, keepdim=True)
     return (nearest - 0.5) * scale + 0.5
-
-
-def _face_normal(on_face: Tensor) -> Tensor:
-    """Return the outward unit normal of the cube at points of its boundary; on an edge that of one of its faces."""
-    centred = on_face - 0.5
-    axis = centred.abs().argmax(dim=1, keepdim=True)
-    return torch.zeros_like(centred).scatter(1, axis, centred.gather(1, axis).sign())
 
 
 def nearest(target: str, points: Tensor) -> Tensor:

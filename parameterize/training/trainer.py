@@ -18,8 +18,8 @@ from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
 from ..progress import History, Progress, ProgressCallback
+from .losses import BoundarySamples, EdgePaths, Objective
 from .network import InverseMap
-from .objective import BoundarySamples, EdgePaths, Objective
 from .optimizer import TrainingOptimizer
 from .samples import TriangleSampler, interior_points, stencils
 

@@ -32,10 +32,7 @@ def arrays_of(mesh: Any) -> tuple[Array, list[tuple[str, IntArray]]]:
 
 
 def from_cells(vertices: Array, cells: list[tuple[str, IntArray]]) -> Content:
-    """Return vertices and polygons of cells given by their kind, as meshio calls it, and corners (k, corners).
-
-    Raises MeshError for other cells than polygons and linear tetrahedra, and for a file without any.
-    """
+    """Return vertices and polygons of cells given by their kind, as meshio calls it, and corners (k, corners)."""
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise MeshError(f"points must have shape (n, 3), got {vertices.shape}: export three coordinates each")
     check_finite(vertices)

@@ -23,6 +23,7 @@ from .ply import read_ply
 from .stl import read_stl
 from .vtu import read_vtu
 
+# Each takes the bytes of a file, and how many faces it may have; MeshError, without the file's name, for a bad one.
 READERS: dict[str, Callable[[bytes, int], Content]] = {
     ".obj": read_obj,
     ".stl": read_stl,
@@ -46,10 +47,7 @@ class RawMesh:
 
 
 def read_mesh(path: Path, max_faces: int) -> RawMesh:
-    """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (tetrahedra: their boundary), each also as .gz.
-
-    Raises MeshError, without the file's name.
-    """
+    """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (tetrahedra: their boundary), each also as .gz."""
     if path.is_dir():
         raise MeshError("is a directory: name the surface file in it")
     suffixes = [suffix.lower() for suffix in path.suffixes]

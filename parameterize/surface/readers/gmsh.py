@@ -17,10 +17,7 @@ NUMBERS_AT_LEAST = 10_000_000
 
 
 def read_gmsh(data: bytes, _: int) -> Content:
-    """Read the sections $MeshFormat, $Nodes and $Elements of a .msh file of version 2.2 or 4.1, text or binary.
-
-    Raises MeshError, without the file's name, for other versions, missing sections and damaged node rows.
-    """
+    """Read the sections $MeshFormat, $Nodes and $Elements of a .msh file of version 2.2 or 4.1, text or binary."""
     import meshio.gmsh
 
     form = re.match(rb"\s*\$MeshFormat\s+(\S+)\s+([01])\s+8", data)

@@ -17,10 +17,7 @@ CELLS |= {"Pyramids": ("pyramid", 5), "Prisms": ("prism", 6), "Hexahedra": ("hex
 
 
 def read_medit(data: bytes, _: int) -> Content:
-    """Read vertices and cells of a .mesh text of dimension 3.
-
-    Raises MeshError, without the file's name, for a file that is no such text or promises more than it holds.
-    """
+    """Read vertices and cells of a .mesh text of dimension 3."""
     before, *parts = KEYWORD.split(ASIDE.sub(" ", "\n".join(text_lines(data))))
     if before.strip() or parts[:1] != ["MeshVersionFormatted"]:
         raise MeshError("not a .mesh: expected the text format that starts with MeshVersionFormatted")

@@ -15,10 +15,7 @@ FACES = ("f", "fo")
 
 
 def read_obj(data: bytes, _: int) -> Content:
-    """Read the records `v x y z` and `f a b c ...`; negative vertex numbers count back from the last vertex so far.
-
-    Raises MeshError, without the file's name, naming the line.
-    """
+    """Read the records `v x y z` and `f a b c ...`; negative vertex numbers count back from the last vertex so far."""
     if b"\0" in data:
         raise MeshError("not an OBJ: it holds binary data; export as OBJ text")
     places = array("d")

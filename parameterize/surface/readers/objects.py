@@ -14,10 +14,7 @@ from .file import RawMesh, triangles_of
 
 
 def class_of(mesh: object) -> str | None:
-    """Return the class of a mesh that `read_object` takes, such as "trimesh.Trimesh"; None for any other object.
-
-    The class of an object that exists was loaded before, so looking it up loads nothing.
-    """
+    """Return the class of a mesh that `read_object` takes, such as "trimesh.Trimesh"; None for any other object."""
     for name in READERS:
         library, _, kind = name.partition(".")
         known = getattr(sys.modules.get(library), kind, None)
@@ -39,10 +36,6 @@ def read_object(mesh: Any, kind: str, max_faces: int) -> RawMesh:
     return RawMesh(content.vertices, faces, digest, notices)
 
 
-def _read_trimesh(mesh: Any) -> Content:
-    return Content(np.array(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces).tolist())
-
-
 def _read_pyvista(mesh: Any) -> Content:
     """Return the polygons; vertices and lines, which a PolyData may hold besides, are left out."""
     if mesh.n_strips:
@@ -50,12 +43,8 @@ def _read_pyvista(mesh: Any) -> Content:
     return Content(np.array(mesh.points, dtype=np.float64), [row.tolist() for row in mesh.irregular_faces])
 
 
-def _read_meshio(mesh: Any) -> Content:
-    return from_cells(*arrays_of(mesh))
-
-
 READERS: dict[str, Callable[[Any], Content]] = {
-    "trimesh.Trimesh": _read_trimesh,
+    "trimesh.Trimesh": lambda mesh: Content(np.array(mesh.vertices, np.float64), np.asarray(mesh.faces).tolist()),
     "pyvista.PolyData": _read_pyvista,
-    "meshio.Mesh": _read_meshio,
+    "meshio.Mesh": lambda mesh: from_cells(*arrays_of(mesh)),
 }

@@ -11,11 +11,7 @@ HEADER = re.compile(r"(?:ST)?C?N?OFF", re.IGNORECASE)
 
 
 def read_off(data: bytes, max_faces: int) -> Content:
-    """Read an OFF, COFF, NOFF or STOFF text, or a mixture of these; comments are skipped.
-
-    Raises MeshError, without the file's name, for a file that is no such text, promises more rows than it holds, or
-    has a face without its corners.
-    """
+    """Read an OFF, COFF, NOFF or STOFF text, or a mixture of these; comments are skipped."""
     lines = [line.split("#", 1)[0].strip() for line in text_lines(data)]
     rows = [(number, line) for number, line in enumerate(lines, 1) if line]
     header = HEADER.match(rows[0][1]) if rows else None

@@ -32,7 +32,7 @@ class Element:
 
 
 def read_ply(data: bytes, max_faces: int) -> Content:
-    """Read a PLY. Raises MeshError, without the file's name, for a file that is none or promises more than it holds."""
+    """Read a PLY; one that promises more than it holds is refused before a library reads it."""
     data = data.removeprefix(b"\xef\xbb\xbf")
     head, mark, body = data.partition(b"end_header")
     if not data.startswith(b"ply") or not mark:

@@ -16,10 +16,7 @@ BEFORE = 4096  # bytes in which the first solid begins
 
 
 def read_stl(data: bytes, max_faces: int) -> Content:
-    """Read the triangles of an STL; each has vertices of its own.
-
-    Raises MeshError, without the file's name, for a file whose size or number of corners does not fit its facets.
-    """
+    """Read the triangles of an STL whose size or number of corners fits its facets; each has vertices of its own."""
     import trimesh
 
     promised = int.from_bytes(data[80:84], "little")

@@ -24,7 +24,7 @@ UNPACKERS: dict[str, Callable[[], Any]] = {
 
 
 def read_vtu(data: bytes, max_faces: int) -> Content:
-    """Read a .vtu of one piece; raise MeshError, without the file's name, where it is not whole or too large."""
+    """Read a .vtu of one piece."""
     import meshio.vtu
 
     if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:

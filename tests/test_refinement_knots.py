@@ -1,15 +1,17 @@
 import numpy as np
 import pytest
 
+from parameterize.config import RefinementConfig
+from parameterize.refinement import halved_where_most, totals_along
 from parameterize.spline.bspline import breakpoints, open_uniform_knots
-from parameterize.spline.knot_choice import halved_where_most, totals_along
 
 KNOTS = tuple(open_uniform_knots(n, 3) for n in (7, 6, 5))  # 4, 3 and 2 spans
 COUNTS = np.array([7, 6, 5])
 
 
 def halved(amounts, most=60, share=1.0, growth=100.0, narrowest=0.0):
-    found = halved_where_most(KNOTS, amounts, COUNTS, most=most, share=share, growth=growth, narrowest=narrowest)
+    refinement = RefinementConfig(max_control_points=most, share=share, growth=growth)
+    found = halved_where_most(KNOTS, amounts, COUNTS, refinement, narrowest)
     return [np.setdiff1d(finer, row).tolist() for finer, row in zip(found, KNOTS, strict=True)]
 
 

@@ -3,9 +3,8 @@ import pytest
 from shapes import rounded_cube, turned
 
 from parameterize.cube.cube import CORNERS, snap
-from parameterize.cube.edge_paths import PathError, choose_corners
+from parameterize.cube.edge_paths import PathError, choose_corners, lay_out
 from parameterize.cube.flips import flipped
-from parameterize.cube.tutte import lay_out
 
 
 def crumpled(noise, seed=0):

@@ -8,8 +8,8 @@ import trimesh
 
 from iga_nn.cli.commands import BAD_INPUT, DONE, main
 from iga_nn.samples import sample, write_obj
-from parameterize.surface.self_intersection import crossing_faces, crossing_places
 from parameterize.surface.surface import MeshError, surface_from_arrays
+from parameterize.surface.topology import crossing_faces, crossing_places
 
 
 def dented(depth):
