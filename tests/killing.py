@@ -21,6 +21,8 @@ import torch._dynamo  # Adam would load it in every process
 from mesh_files import obj
 from small_run import small_surface, tiny_config
 
+import iga_nn.figures.picture  # the figures are not drawn, but matplotlib is loaded
+import iga_nn.report.html  # noqa: F401 the children would load it one by one
 from iga_nn.cli.commands import main as command
 from iga_nn.options import MapOptions
 from iga_nn.workflow.output_folder import RunFolder, has_checkpoint
