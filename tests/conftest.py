@@ -82,7 +82,17 @@ def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 
 @pytest.fixture
-def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_distances(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure distances at few points of the boundary: they are half of what so short a run takes."""
+    from small_run import FEW
+
+    from parameterize.quality.distances import SampledBoundary
+
+    monkeypatch.setattr(SampledBoundary.of.__func__, "__defaults__", FEW)
+
+
+@pytest.fixture
+def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None) -> None:
     """Train and optimise for about a second wherever a training is asked for, with at most 8 control points."""
     from small_run import shortened
 
