@@ -21,7 +21,7 @@ from iga_nn.options import read_corners
 from parameterize.display import Shown
 from solve.study import benchmark_volume
 
-pytestmark = pytest.mark.usefixtures("small_views")
+pytestmark = pytest.mark.usefixtures("small_views", "few_distances")
 
 
 @pytest.fixture

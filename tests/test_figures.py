@@ -132,6 +132,7 @@ def test_a_study_draws_relative_errors_beside_absolute_ones():
     assert plotting.draw_study(None, {3: nothing}).axes[0].get_ylabel() == "absolute"
 
 
+@pytest.mark.pictures
 def test_plots_of_curves_are_also_written_as_pdf(in_folder, formula_training, monkeypatch):
     formula_training()
     monkeypatch.setattr(plotting, "can_draw", lambda: False)  # this is about curves
