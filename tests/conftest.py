@@ -59,9 +59,33 @@ def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
     )
 
 
+@functools.cache
+def found_once() -> dict[str, Any]:
+    """What runs find again and again, kept: how fast this machine is, and the samples as the gate lets them in."""
+    from iga_nn import models
+    from iga_nn.workflow import cost_estimate
+
+    gate, known = models.surface_from_arrays, {}
+
+    def admitted(vertices: Any, faces: Any, name: str, **options: Any) -> Any:
+        key = (name, *sorted(options.items()))
+        if key not in known:
+            known[key] = gate(vertices, faces, name, **options)
+        return known[key]
+
+    return {
+        "iga_nn.models.surface_from_arrays": admitted,
+        "iga_nn.workflow.cost_estimate._pass_seconds": functools.cache(cost_estimate._pass_seconds),
+        "iga_nn.workflow.cost_estimate._product_seconds": functools.cache(cost_estimate._product_seconds),
+    }
+
+
 @pytest.fixture
 def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Replace the training by the benchmark map: `formula_training()`, or with an amplitude, or an error to raise."""
+
+    for name, kept in found_once().items():
+        monkeypatch.setattr(name, kept)
 
     def install(amplitude: float = 0.08, error: BaseException | None = None) -> None:
         from parameterize.progress import Progress
@@ -82,7 +106,17 @@ def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 
 @pytest.fixture
-def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_distances(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure distances at few points of the boundary: they are half of what so short a run takes."""
+    from small_run import FEW
+
+    from parameterize.quality.distances import SampledBoundary
+
+    monkeypatch.setattr(SampledBoundary.of.__func__, "__defaults__", FEW)
+
+
+@pytest.fixture
+def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None) -> None:
     """Train and optimise for about a second wherever a training is asked for, with at most 8 control points."""
     from small_run import shortened
 
@@ -121,18 +155,26 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let VTK draw a tenth of the pixels: without a graphics card they are what a figure costs."""
+    """Let VTK draw a tenth of the pixels, of coarser patches: without a graphics card they are what a figure costs."""
     for module in ("map", "style"):
         monkeypatch.setattr(f"iga_nn.figures.{module}.PANEL", (300, 233))
+    for module in ("map", "solution"):
+        monkeypatch.setattr(f"iga_nn.figures.{module}.SAMPLES", 31)
+    monkeypatch.setattr("iga_nn.figures.map.EVERY", 3)  # lines a tenth apart, as they are
 
 
 @pytest.fixture
 def in_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, small_views: None
 ) -> Path:
-    """Make an empty current folder; what VTK draws, at seconds a figure, is drawn for tests marked `pictures` only."""
+    """Make an empty current folder; figures are drawn for tests marked `pictures` only.
+
+    What VTK draws, at seconds a figure, is left out for the others, and curves, half of a run without a training, are
+    empty files.
+    """
     if request.node.get_closest_marker("pictures") is None:
         monkeypatch.setattr("iga_nn.figures.can_draw", lambda: False)
+        monkeypatch.setattr("iga_nn.figures.picture.Picture.savefig", lambda _, path: Path(path).touch())
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

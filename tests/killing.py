@@ -19,12 +19,15 @@ import numpy as np
 import torch
 import torch._dynamo  # Adam would load it in every process
 from mesh_files import obj
-from small_run import small_surface, tiny_config
+from small_run import FEW, small_surface, tiny_config
 
+import iga_nn.figures.picture  # the figures are not drawn, but matplotlib is loaded
+import iga_nn.report.html  # noqa: F401 the children would load it one by one
 from iga_nn.cli.commands import main as command
 from iga_nn.options import MapOptions
 from iga_nn.workflow.output_folder import RunFolder, has_checkpoint
 from iga_nn.workflow.verdict import check_volume
+from parameterize.quality.distances import SampledBoundary
 
 FORK = multiprocessing.get_context("fork")
 
@@ -78,6 +81,7 @@ def main() -> int:
     torch.set_num_threads(1)
     RunFolder.draw = lambda *_, **__: None  # the figures come after the volume and cost most of so short a run
     MapOptions.config = lambda _: tiny_config()
+    SampledBoundary.of.__func__.__defaults__ = FEW
     surface = small_surface()
     rng, differing = np.random.default_rng(options.seed), 0
     with tempfile.TemporaryDirectory() as place:

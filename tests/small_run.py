@@ -8,6 +8,7 @@ from parameterize.config import GrowthConfig, NetworkConfig, preset
 from parameterize.surface.surface import surface_from_arrays
 
 STEPS = (6, 4, 8, 4, 8)
+FEW = (40,)  # samples a direction of a face of the spline's boundary; 160 otherwise
 
 
 def shortened(config):

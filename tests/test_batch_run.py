@@ -1,4 +1,4 @@
-"""Batches with worker processes: interrupted, killed, out of memory, and run again."""
+"""Batches with worker processes, interrupted, killed and out of memory, and a batch that is run again."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from mesh_files import CUBE, TRIANGLES, obj
 from small_run import small_surface
+
+from iga_nn.cli.commands import main
 
 HERE = Path(__file__).resolve().parent
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
@@ -85,7 +87,7 @@ FINISHED = ("certified", "not certified")  # so short a training need not be cer
 
 
 def test_a_batch_survives_what_happens_to_it(tmp_path):
-    """Interrupted, a worker killed, out of memory, a refused surface; then the failures alone are run again."""
+    """Interrupted, then a worker killed, out of memory, a refused surface."""
     parts = tmp_path / "parts"
     parts.mkdir()
     surface = small_surface()
@@ -124,12 +126,27 @@ def test_a_batch_survives_what_happens_to_it(tmp_path):
     assert (tmp_path / "out" / "first" / "volume.npz").stat().st_mtime_ns == written
     assert rows["hungry"]["state"] == "failed" and "out of memory" in rows["hungry"]["line"]
     assert rows["open"]["state"] == "refused" and rows["open"]["line"].startswith("open surface: ")
-
-    (parts / "hungry.obj").rename(parts / "modest.obj")
-    (parts / "open.obj").write_text(obj())
-    again = Command(tmp_path, "parts", "--workers", "1", "--json", "--quiet")
-    assert again.ended() in (0, 3)
-    known = json.loads(again.out.read_text())
-    assert {row["state"] for row in known["surfaces"]} <= set(FINISHED)
-    assert sorted(row["folder"] for row in known["surfaces"]) == ["first", "held", "modest", "open"]
     assert {path.name for path in tmp_path.iterdir()} == {"parts", "out", "scratch", "stdout", "stderr"}
+
+
+def test_what_was_refused_or_failed_is_run_again_alone(formula_training, in_this_process, in_folder, capsys):
+    Path("parts").mkdir()
+    for name in ("done", "failed"):
+        Path("parts", f"{name}.obj").write_text(obj())
+    formula_training()
+    assert main(["batch", "parts/done.obj", "--refine", "0", "--out", "out"]) == 0
+    written = Path("out/done/volume.npz").stat().st_mtime_ns
+    Path("parts/open.obj").write_text(obj(CUBE, TRIANGLES[1:]))
+    formula_training(error=RuntimeError("no idea why"))
+    assert main(["batch", "parts", "--refine", "0", "--out", "out"]) == 2
+    assert states(in_folder) == {"done": "certified", "failed": "failed", "open": "refused"}
+    capsys.readouterr()
+
+    Path("parts/failed.obj").rename("parts/renamed.obj")
+    Path("parts/open.obj").write_text(obj())
+    formula_training()
+    assert main(["batch", "parts", "--refine", "0", "--out", "out", "--json", "--quiet"]) == 0
+    known = json.loads(capsys.readouterr().out)
+    assert [row["folder"] for row in known["surfaces"]] == ["done", "open", "renamed"]
+    assert {row["state"] for row in known["surfaces"]} == {"certified"} == set(states(in_folder).values())
+    assert Path("out/done/volume.npz").stat().st_mtime_ns == written

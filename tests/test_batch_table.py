@@ -4,6 +4,7 @@ import asyncio
 import csv
 import io
 import json
+import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -28,10 +29,23 @@ def row(name, folder=Path("out"), how=None):
     return fresh if how is None else fresh.ended(how)
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The folder of a batch with a finished surface, the cube."""
+    folder = tmp_path_factory.mktemp("finished")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("parameterize.run.parameterize", lambda *_, **__: formula_parameterization())
+        patched.setattr("iga_nn.figures.can_draw", lambda: False)
+        patched.chdir(folder)
+        iga_nn.run("poisson", "cube", "out/cube", poisson=PoissonOptions(refine=(0, 1)))
+    return folder / "out"
+
+
 @pytest.fixture
-def done(formula_training, in_folder):
-    formula_training()
-    return iga_nn.run("poisson", "cube", "out/cube", poisson=PoissonOptions(refine=(0, 1))).report
+def done(finished, in_folder):
+    """The report of the cube, in a copy of its folder."""
+    shutil.copytree(finished, "out")
+    return json.loads(Path("out/cube/report.json").read_text())
 
 
 @pytest.fixture

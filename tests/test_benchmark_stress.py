@@ -32,6 +32,13 @@ ROW = stress.Row(
 )
 
 
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    """Shapes are made from fewer points than those that are measured: making them is what these tests take."""
+    monkeypatch.setitem(shapes, "CELL", 0.04)
+    monkeypatch.setitem(shapes, "FINE", 5_000)
+
+
 def options(folder, **given):
     values = {"numbers": (1, 7, 8), "mapping": MapOptions(device="cpu"), "jobs": 1, "out": Path(folder)}
     return stress.Options(**(values | given))

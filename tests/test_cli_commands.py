@@ -17,6 +17,7 @@ import pytest
 
 import iga_nn
 import solve
+from iga_nn.__main__ import run_and_exit
 from iga_nn.cli.commands import main
 from iga_nn.figures.render import can_draw
 from iga_nn.report import document as reports
@@ -564,15 +565,30 @@ def test_a_refused_checkpoint_costs_no_file(formula_training, in_folder, capsys,
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interruption_in_the_middle_of_a_training_leaves_a_checkpoint(in_folder, number):
-    command = [sys.executable, "-m", "iga_nn", "parameterize", "bean"]
-    environment = os.environ | {"PYTHONPATH": str(Path(iga_nn.__file__).resolve().parents[1])}
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as running:
-        for line in running.stderr:
-            if "step" in line:
-                break
-        running.send_signal(number)
-        rest = running.stderr.read()
-    assert running.returncode == 130
-    assert "--resume" in one_line(rest)
+def test_an_interruption_in_the_middle_of_a_training_leaves_a_checkpoint(
+    number, in_folder, short_training, capsys, monkeypatch
+):
+    train, steps = iga_nn.parameterize, []
+
+    def parameterize(surface, config=None, *, progress, **options):
+        def interrupted(now):
+            progress(now)
+            steps.append(now)
+            if len(steps) == 8:
+                signal.raise_signal(number)
+
+        return train(surface, config, progress=interrupted, **options)
+
+    monkeypatch.setattr("parameterize.run.parameterize", parameterize)
+    monkeypatch.setattr(sys, "argv", ["iga-nn", "parameterize", "bean"])
+    before = [(each, signal.getsignal(each)) for each in (signal.SIGINT, signal.SIGTERM)]
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # where pytest itself was started to ignore it
+    try:
+        with pytest.raises(SystemExit) as ended:
+            run_and_exit()
+    finally:
+        for each, handler in before:
+            signal.signal(each, handler)
+    assert ended.value.code == 130 and len(steps) == 8
+    assert "--resume" in one_line(capsys.readouterr().err)
     assert any(Path("bean/checkpoint").iterdir())

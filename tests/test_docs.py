@@ -42,7 +42,7 @@ class Page(HTMLParser):
 def site(tmp_path_factory):
     """The pages of the site, built in a copy: the gallery writes beside its sources.
 
-    Of the scripts heat.py alone is run here: test_examples.py runs them all.
+    Of the scripts heat.py alone is run here, and draws nothing: test_examples.py runs them all.
     """
     copy = tmp_path_factory.mktemp("site")
     for folder in ("docs", "examples"):
@@ -51,7 +51,7 @@ def site(tmp_path_factory):
         shutil.copy(file, copy)
     build = [sys.executable, "-P", "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
     build += ["-D", r"sphinx_gallery_conf.filename_pattern=/heat\.py$"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "VTK_DEFAULT_OPENGL_WINDOW": "none"}
     done = subprocess.run(
         [*build, copy / "docs", copy / "html"], cwd=copy, env=environment, capture_output=True, text=True
     )

@@ -21,6 +21,8 @@ from iga_nn.options import read_corners
 from parameterize.display import Shown
 from solve.study import benchmark_volume
 
+pytestmark = pytest.mark.usefixtures("small_views", "few_distances")
+
 
 @pytest.fixture
 def formula_map(formula_training, monkeypatch):

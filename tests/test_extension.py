@@ -75,16 +75,16 @@ def sheet_folded_once(count=900):
     return surface_from_arrays(bent, faces, "sheet")
 
 
-def test_where_growth_fails_the_layout_is_extended(caplog):
+def test_where_growth_fails_the_layout_is_extended(caplog, few_distances):
     """The growth gets no round that counts, so its map has faults; that of the third try is the result."""
     config = tiny_config()
     config = replace(
         config,
         starts=3,
         train=replace(config.train, easy_loss=0.0),
-        spline=replace(preset("fast").spline, control_points=12),
+        spline=replace(preset("fast").spline, control_points=8),
         growth=replace(preset("fast").growth, shares=(1.0,), steps=1, rounds=0),
-        extension=replace(preset("fast").extension, cell=0.05),
+        extension=replace(preset("fast").extension, cell=0.07),
     )
     with caplog.at_level("INFO"):
         result = parameterize(sheet_folded_once(), config, device="cpu")

@@ -38,7 +38,7 @@ def test_history_marks_the_stages(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
 
 
-def test_map_figures_show_the_map(tmp_path, drawing):
+def test_map_figures_show_the_map(tmp_path, drawing, small_views):
     volume = benchmark_volume(4)
     plotting.draw_faces(tmp_path / "faces.png", volume)
     plotting.draw_distortion(tmp_path / "distortion.png", volume)
@@ -88,7 +88,7 @@ def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
     assert sum(len(offset) for offset in offsets) == 3 * 9**2 + 9 * 5**2 + 3 * 5**2
 
 
-def test_error_figure_also_where_the_error_is_rounding(tmp_path, drawing):
+def test_error_figure_also_where_the_error_is_rounding(tmp_path, drawing, small_views):
     volume = benchmark_volume(4)
     problem = solve.Poisson(exact="x")
     plotting.draw_error(tmp_path / "error.png", volume, solve.solve_problem(volume, problem), problem)
@@ -132,6 +132,7 @@ def test_a_study_draws_relative_errors_beside_absolute_ones():
     assert plotting.draw_study(None, {3: nothing}).axes[0].get_ylabel() == "absolute"
 
 
+@pytest.mark.pictures
 def test_plots_of_curves_are_also_written_as_pdf(in_folder, formula_training, monkeypatch):
     formula_training()
     monkeypatch.setattr(plotting, "can_draw", lambda: False)  # this is about curves

@@ -17,6 +17,8 @@ from parameterize.progress import Progress
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.surface.surface import surface_from_arrays
 
+pytestmark = pytest.mark.usefixtures("few_distances")
+
 
 def bent_rod(count=900):
     """A rod bent to a half circle: no ray from its middle line's centre tells where its points belong."""

@@ -1,5 +1,7 @@
 """Sheets of a boundary that run into one another, on springs whose turns overlap by a known depth."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import torch
@@ -13,6 +15,7 @@ GAP = 1e-3
 TURNS = 1.5
 
 
+@cache
 def spring(gap):
     """The bar is 0.6 high; one turn lies `gap` above the one before."""
     return bent(TURNS, TURNS * (0.6 + gap))
@@ -22,6 +25,7 @@ def control_of(volume):
     return torch.as_tensor(np.moveaxis(volume.control_points, -1, 0).copy())
 
 
+@cache
 def contact(volume, gap=GAP):
     return contact_penalty(volume.knots, 3, control_of(volume), gap)
 
@@ -57,8 +61,7 @@ def test_gradient_and_curvature_are_those_of_the_energy():
 
 
 def test_looking_near_the_last_contact_finds_what_looking_everywhere_does():
-    before, control = contact(spring(-1e-2)), control_of(spring(-8e-3))
-    everywhere = contact(spring(-8e-3))
+    before, control, everywhere = contact(spring(-1e-2)), control_of(spring(-8e-3)), contact(spring(-8e-3))
     near = contact_penalty(spring(-8e-3).knots, 3, control, GAP, before.near)
     assert 0 < len(before.near) < 0.9 * 6 * 110**2
     assert np.array_equal(near.spans, everywhere.spans)

@@ -19,6 +19,8 @@ from parameterize.cube.cutting import subdivide_finely
 from parameterize.run import choose_device, corner_vertices, parameterize
 from parameterize.training.trainer import start_map
 
+pytestmark = pytest.mark.usefixtures("few_distances")
+
 
 @pytest.fixture(scope="module")
 def surface():

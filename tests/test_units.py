@@ -13,6 +13,7 @@ FAR = 1e4  # of the size: coordinates that large keep 12 of their 16 digits
 POINTS, FACES = ball(400)
 POINTS = POINTS * (1.0, 1.3, 0.7) + (0.2, -0.1, 0.4)
 SIZE = np.ptp(POINTS, axis=0).max()
+pytestmark = pytest.mark.usefixtures("few_distances")
 
 
 def surface(factor, shift):
