@@ -132,7 +132,7 @@ def in_folder(
 ) -> Path:
     """Make an empty current folder; what VTK draws, at seconds a figure, is drawn for tests marked `pictures` only."""
     if request.node.get_closest_marker("pictures") is None:
-        monkeypatch.setattr("iga_nn.figures.can_draw", lambda: False)
+        monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: False)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

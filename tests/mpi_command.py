@@ -8,11 +8,11 @@ import signal
 
 import solve.system as system
 from iga_nn.__main__ import run_and_exit
-from iga_nn.report import figures, viewer
+from iga_nn.report import artifacts, viewer
 from iga_nn.workflow import processes
 from solve.linear.krylov import conjugate_gradients
 
-figures.draw_figures = lambda *_: {}
+artifacts.draw_figures = lambda *_: {}
 viewer.scene_of = lambda *_: None
 processes.GRACE = 1.0
 

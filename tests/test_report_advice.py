@@ -13,7 +13,7 @@ from iga_nn.cli.commands import main
 from iga_nn.options import MapOptions
 from iga_nn.report import advice
 from iga_nn.report import document as report
-from iga_nn.report.figures import draw_figures
+from iga_nn.report.artifacts import draw_figures
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.jacobian import certify
 from solve.study import benchmark_volume

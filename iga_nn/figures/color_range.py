@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.colors import LogNorm, Normalize
 
 from parameterize.arrays import Array
 
@@ -27,10 +27,8 @@ class ColorRange:
     logarithmic: bool = False
     remark: str = ""
 
-    def norm(self) -> Any:
+    def norm(self) -> Normalize:
         """Return the range as a new object of matplotlib, which maps values to 0..1; colour bars change theirs."""
-        from matplotlib.colors import LogNorm, Normalize
-
         kind = LogNorm if self.logarithmic else Normalize
         return kind(self.low, self.high, clip=True)
 

@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from .evaluate import FACE_COLORS
 from .style import blank, positive, save
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from solve import ConvergenceRow
 
 Study = Mapping[int, Sequence["ConvergenceRow"]]  # degree -> its levels, coarsest first

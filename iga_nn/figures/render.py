@@ -6,12 +6,13 @@ import logging
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
@@ -75,6 +76,14 @@ def can_draw() -> bool:
     return done
 
 
+def check_drawable(what: str, known: Collection[str]) -> None:
+    """Raise ValueError where there is no such figure, RuntimeError where this machine cannot draw it."""
+    if what not in known:
+        raise ValueError(f"no figure {what!r}: choose one of {', '.join(known)}")
+    if not can_draw():
+        raise RuntimeError(CANNOT_DRAW)
+
+
 def _without_display() -> None:
     """Let VTK use EGL at once where there is no X server, instead of trying X first and warning."""
     if sys.platform == "linux" and not os.environ.get("DISPLAY"):
@@ -100,8 +109,6 @@ def widest_view(points: Array, tilt: float = 0.0) -> View:
 
 def plain_patch(points: Array, color: str, **look: Any) -> Patch:
     """Return a patch in one of matplotlib's colours. points: (m, n, 3)."""
-    from matplotlib.colors import to_rgb
-
     return Patch(points, np.broadcast_to(to_rgb(color), points.shape), **look)
 
 

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch as Swatch
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
@@ -15,17 +21,22 @@ from .color_range import ColorRange
 from .evaluate import FACE_COLORS, MAP, face_labels
 from .render import Patch, draw, view_of, widest_view
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 SAMPLES = 141  # per direction of a patch
 PANEL = (900, 700)  # pixels of one view
+NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
+
+
+class Picture(Figure):
+    """A figure outside pyplot, which need not be closed; a notebook shows it as the last value of a cell."""
+
+    def _repr_png_(self) -> bytes:
+        stream = io.BytesIO()
+        self.savefig(stream, format="png", dpi=NOTEBOOK_DPI)
+        return stream.getvalue()
 
 
 def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
-    """Return a figure and its axes outside pyplot: it need not be closed and asks for no window system."""
-    from .picture import Picture
-
+    """Return an empty figure and its axes."""
     figure = Picture(figsize=inches, dpi=110, layout="constrained")
     return figure, figure.subplots(rows, columns, **grid)
 
@@ -55,8 +66,6 @@ def show_section(panel: Any, title: str, points: Array, colors: Array) -> None:
 
 def name_faces(figure: Figure) -> None:
     """Write below the panels what the six colours stand for."""
-    from matplotlib.patches import Patch as Swatch
-
     swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
     figure.legend(
         handles=swatches,
@@ -71,17 +80,11 @@ def name_faces(figure: Figure) -> None:
 
 def colors(values: Array, limits: ColorRange) -> Array:
     """Return red, green, blue (m, n, 3) of values (m, n)."""
-    from matplotlib import colormaps
-
     return np.asarray(colormaps[MAP](limits.shares(values)))[..., :3]
 
 
 def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:
     """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import ListedColormap
-
     shades = ListedColormap([colormaps[MAP](0.5)]) if limits.remark else MAP
     bar = figure.colorbar(ScalarMappable(limits.norm(), shades), ax=panels, shrink=0.85, aspect=28)
     if limits.remark:
@@ -95,9 +98,9 @@ def positive(values: NDArray[Any]) -> Array:
     return np.where(numbers > 0.0, numbers, np.nan)
 
 
-def save(figure: Figure, path: Path | None) -> Figure:
+def save(figure: Figure, path: str | Path | None) -> Figure:
     """Write the figure as PNG or PDF, by the ending of the path, and return it; atomic. None: only return it."""
     if path is not None:
-        with replacing(path) as temporary:
+        with replacing(Path(path)) as temporary:
             figure.savefig(temporary)
     return figure

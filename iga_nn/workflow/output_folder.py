@@ -17,6 +17,7 @@ from parameterize.files import unfinished
 from parameterize.progress import timed
 
 from ..errors import InputError, one_line
+from ..report import artifacts
 from ..report import document as reports
 from ..report.artifacts import REPORT, Part, files_of
 
@@ -59,9 +60,7 @@ class RunFolder:
         """
         endings = (".png", ".pdf") if self.vector else (".png",)
         with self.drawing("figures"):
-            from ..report.figures import draw_figures
-
-            self._note_failures(draw_figures(self.folder, part, known, endings))
+            self._note_failures(artifacts.draw_figures(self.folder, part, known, endings))
 
     @contextmanager
     def drawing(self, what: str) -> Iterator[None]:
