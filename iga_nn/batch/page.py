@@ -6,7 +6,6 @@ import base64
 import functools
 import io
 import logging
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -28,12 +27,8 @@ WHOLE = ("seconds", "dofs", "iterations")
 
 def page(batch: Batch) -> str:
     """Return the page as text."""
-    here = files(__package__)
-    inserted = {"style": files("iga_nn.report") / "page.css", "own": here / "batch.css", "script": here / "batch.js"}
     return filled(
-        __package__,
-        "batch.html",
-        inserted,
+        "batch/batch.html",
         title=batch.folder.name,
         version=__version__,
         summary=batch.summary,

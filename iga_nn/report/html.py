@@ -7,10 +7,7 @@ from __future__ import annotations
 
 import base64
 import logging
-from collections.abc import Mapping
 from html import escape
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,8 +69,8 @@ def _bare(report: Report, reason: str) -> str:
 def page(report: Report, scene: Scene | None, folder: Path) -> str:
     """Return the page as text."""
     section = reports.solved(report)
-    return _render(
-        "page.html",
+    return filled(
+        "report/page.html",
         title=f"{Path(report['input']['file']).name}: {_heading(report)}",
         report=report,
         verdicts=_verdicts(report),
@@ -90,25 +87,16 @@ def page(report: Report, scene: Scene | None, folder: Path) -> str:
 
 def scene_page(scene: Scene, title: str) -> str:
     """Return a page with the interactive view alone, to stand in a frame of another page."""
-    return _render("scene.html", title=title, scene=scene)
+    return filled("report/scene.html", title=title, scene=scene)
 
 
-def _render(template: str, **content: Any) -> str:
-    """Return a template of this folder with its content, and with the style and the viewer."""
-    here = files(__package__)
-    return filled(__package__, template, {"style": here / "page.css", "script": here / "viewer.js"}, **content)
-
-
-def filled(package: str, template: str, inserted: Mapping[str, Traversable], **content: Any) -> str:
-    """Return a package's template with its content, which is escaped, and with files of ours as they are."""
+def filled(template: str, **content: Any) -> str:
+    """Return a template of this package with its content, which is escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
 
-    environment = Environment(
-        loader=PackageLoader(package, ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    own = {name: Markup(file.read_text(encoding="utf-8")) for name, file in inserted.items()}  # noqa: S704
-    return environment.get_template(template).render(own, **content)
+    loader = PackageLoader("iga_nn", "")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return environment.get_template(template).render(content)
 
 
 def _heading(report: Report) -> str:
