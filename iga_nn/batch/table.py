@@ -44,7 +44,7 @@ class Row:
     def ended(self, how: Ended) -> Row:
         """Return the row of the surface once its task has ended."""
         if how.report is not None:
-            return replace(self, state=_verdict(how.report), line="", report=how.report)
+            return replace(self, state=reports.state(how.report), line="", report=how.report)
         state: State = "refused" if how.state == "refused" else "failed" if how.state == "failed" else "waiting"
         line = how.line.replace(self.entry.mesh, self.entry.name).removeprefix(f"{self.entry.name}: ")
         return replace(self, state=state, line=printable(line))
@@ -69,12 +69,6 @@ class Row:
         if self.report is not None:
             facts += [f"ARAP mean {figures['arap_mean']:.3f}", f"{figures['seconds']:.0f} s"]
         return f"{self.entry.name}: {', '.join(facts)}"
-
-
-def _verdict(report: reports.Report) -> State:
-    if not reports.is_certified(report):
-        return "not certified"
-    return "certified" if reports.is_converged(report) and reports.is_meaningful(report) else "not solved"
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ from ..options import (
     SurfaceOptions,
 )
 from ..version import __version__
-from .exit_codes import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
+from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
 from .progress import shown_batch, shown_progress
 
 if TYPE_CHECKING:
@@ -94,14 +94,8 @@ class OutputOptions:
         return {"out": self.out, "force": self.force, "vector": self.vector}
 
 
-OutputFlags = Annotated[OutputOptions, Parameter(name="*")]  # each field of the options is a flag
-SurfaceFlags = Annotated[SurfaceOptions, Parameter(name="*")]
-MapFlags = Annotated[MapOptions, Parameter(name="*")]
-WorkerFlags = Annotated[WorkerOptions, Parameter(name="*")]
-PoissonFlags = Annotated[PoissonOptions, Parameter(name="*")]
-ElasticityFlags = Annotated[ElasticityOptions, Parameter(name="*")]
-StudyFlags = Annotated[StudyOptions, Parameter(name="*")]
-ElasticityStudyFlags = Annotated[ElasticityStudyOptions, Parameter(name="*")]
+for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions):
+    Parameter(name="*")(kind)  # each field of these options, and of those derived from them, is a flag
 
 OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
 WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
@@ -109,7 +103,7 @@ WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), Poiss
 
 @run_app.command(name="poisson")
 def run_poisson(
-    mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP, poisson: PoissonFlags = POISSON
+    mesh: Mesh, /, *, output: OutputOptions = OUTPUT, mapping: MapOptions = MAP, poisson: PoissonOptions = POISSON
 ) -> int:
     """Parameterize a surface, certify the spline and solve Poisson's equation on it."""
     return _run(mesh, output, mapping, poisson)
@@ -117,7 +111,12 @@ def run_poisson(
 
 @run_app.command(name="elasticity")
 def run_elasticity(
-    mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP, elasticity: ElasticityFlags = ELASTICITY
+    mesh: Mesh,
+    /,
+    *,
+    output: OutputOptions = OUTPUT,
+    mapping: MapOptions = MAP,
+    elasticity: ElasticityOptions = ELASTICITY,
 ) -> int:
     """Parameterize a surface, certify the spline and solve linear elasticity on it.
 
@@ -139,10 +138,10 @@ def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: Problem
 @app.command(name="batch")
 def run_many(
     *surfaces: str,
-    output: OutputFlags = OUTPUT,
-    workers: WorkerFlags = WORKERS,
-    mapping: MapFlags = MAP,
-    poisson: PoissonFlags = POISSON,
+    output: OutputOptions = OUTPUT,
+    workers: WorkerOptions = WORKERS,
+    mapping: MapOptions = MAP,
+    poisson: PoissonOptions = POISSON,
 ) -> int:
     """Run many surfaces in worker processes, each into its own folder in --out, with one table of them all.
 
@@ -167,7 +166,7 @@ def run_many(
 
 
 @app.command(name="parameterize")
-def parameterize_mesh(mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP) -> int:
+def parameterize_mesh(mesh: Mesh, /, *, output: OutputOptions = OUTPUT, mapping: MapOptions = MAP) -> int:
     """Turn a surface into a certified trivariate B-spline."""
     from ..workflow import pipeline
 
@@ -183,8 +182,8 @@ def solve_poisson(
     *,
     device: Literal["cpu", "cuda"] = "cpu",
     mpi: Mpi = False,
-    output: OutputFlags = OUTPUT,
-    poisson: PoissonFlags = POISSON,
+    output: OutputOptions = OUTPUT,
+    poisson: PoissonOptions = POISSON,
 ) -> int:
     """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
 
@@ -199,7 +198,7 @@ def solve_poisson(
 
 @solve_app.command(name="elasticity")
 def solve_elasticity(
-    volume: Volume, /, *, mpi: Mpi = False, output: OutputFlags = OUTPUT, elasticity: ElasticityFlags = ELASTICITY
+    volume: Volume, /, *, mpi: Mpi = False, output: OutputOptions = OUTPUT, elasticity: ElasticityOptions = ELASTICITY
 ) -> int:
     """Solve linear elasticity on a volume.npz.
 
@@ -220,7 +219,7 @@ def _solve(volume: Path, output: OutputOptions, problem: ProblemOptions, mpi: bo
 
 
 @study_app.default
-def study_volume(volume: Volume, /, *, output: OutputFlags = OUTPUT, study: StudyFlags = STUDY) -> int:
+def study_volume(volume: Volume, /, *, output: OutputOptions = OUTPUT, study: StudyOptions = STUDY) -> int:
     """Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors and their rates.
 
     Results go to STEM-study in the current folder, unless --out names another.
@@ -230,7 +229,7 @@ def study_volume(volume: Volume, /, *, output: OutputFlags = OUTPUT, study: Stud
 
 @study_app.command(name="elasticity")
 def study_elasticity(
-    volume: Volume, /, *, output: OutputFlags = OUTPUT, study: ElasticityStudyFlags = ELASTICITY_STUDY
+    volume: Volume, /, *, output: OutputOptions = OUTPUT, study: ElasticityStudyOptions = ELASTICITY_STUDY
 ) -> int:
     """Do the same for linear elasticity with a given displacement."""
     return _study(volume, output, study)
@@ -249,7 +248,7 @@ def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
 
 
 @app.command(name="check")
-def check(path: str, /, *, surface: SurfaceFlags = SURFACE, strict: bool = False, as_json: Json = False) -> int:
+def check(path: str, /, *, surface: SurfaceOptions = SURFACE, strict: bool = False, as_json: Json = False) -> int:
     """Say whether a surface is accepted, or whether a volume is certified; write nothing.
 
     Args:
@@ -327,8 +326,8 @@ def serve_page(
     port: int = 8080,
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
     max_upload: int = 64,
-    mapping: MapFlags = MAP,
-    poisson: PoissonFlags = POISSON,
+    mapping: MapOptions = MAP,
+    poisson: PoissonOptions = POISSON,
 ) -> None:
     """Serve a page to this computer's browser: drop a surface, watch it become a volume, download the files.
 
