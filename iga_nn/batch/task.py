@@ -60,7 +60,9 @@ def compute(task: Task, number: int, batch: str) -> Ended:
     teller = _Teller(task, number, batch)
     with logged(logging.NullHandler()):  # warnings are in the report: a surface has one line on the terminal
         try:
-            return Ended("done", report=_run(task, teller.step))
+            given: dict[str, Any] = {"mapping": task.mapping, "problem": task.options, "vector": task.vector}
+            done = pipeline.parameterize_to(task.mesh, task.folder, progress=teller.step, **given)
+            return Ended("done", report=done.report)
         except KeyboardInterrupt:
             return Ended("stopped")
         except expected_errors() as error:
@@ -70,14 +72,6 @@ def compute(task: Task, number: int, batch: str) -> Ended:
                 return Ended("failed", f"out of memory: {LESS_MEMORY}")
             traceback.print_exc()
             return Ended("failed", f"internal error, please report it: {type(error).__name__}: {one_line(error)}")
-
-
-def _run(task: Task, progress: Any) -> Report:
-    given: dict[str, Any] = {"mapping": task.mapping, "vector": task.vector, "progress": progress}
-    if task.options is None:
-        return pipeline.parameterize_to(task.mesh, task.folder, **given).report
-    given[task.options.section] = task.options
-    return pipeline.run(task.options.section, task.mesh, task.folder, **given).report
 
 
 def stop(batch: str) -> None:

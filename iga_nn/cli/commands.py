@@ -125,13 +125,12 @@ def run_elasticity(
     return _run(mesh, output, mapping, elasticity)
 
 
-def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: ProblemOptions) -> int:
+def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: ProblemOptions | None = None) -> int:
     """Parameterize a surface, solve a problem on the volume, print the verdict and return the exit code."""
     from ..workflow import pipeline
 
     with shown_progress(output.quiet) as progress:
-        known = output.folder | {problem.section: problem}
-        outcome = pipeline.run(problem.section, mesh, mapping=mapping, progress=progress, **known)
+        outcome = pipeline.parameterize_to(mesh, mapping=mapping, problem=problem, progress=progress, **output.folder)
     return _finish(outcome, output)
 
 
@@ -168,11 +167,7 @@ def run_many(
 @app.command(name="parameterize")
 def parameterize_mesh(mesh: Mesh, /, *, output: OutputOptions = OUTPUT, mapping: MapOptions = MAP) -> int:
     """Turn a surface into a certified trivariate B-spline."""
-    from ..workflow import pipeline
-
-    with shown_progress(output.quiet) as progress:
-        outcome = pipeline.parameterize_to(mesh, mapping=mapping, progress=progress, **output.folder)
-    return _finish(outcome, output)
+    return _run(mesh, output, mapping)
 
 
 @solve_app.command(name="poisson")

@@ -99,39 +99,7 @@ def run(
             raise InputError(f"{name} must be {kind.__name__}(...), got {value!r:.80}")
     if others := [name for name, value in given.items() if value is not None]:
         raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
-    equation, unknowns = checked(mapping, options)
-    command = command_line(f"run {problem}", mesh, mapping, options, out=out)
-    with open_folder(mesh, out, force, mapping.resume, vector) as state:
-        if state.finished:
-            return _finished_by(command, state.finished, vector, problem)
-        volume = map_surface(state, mesh, mapping, progress, command, equation, unknowns).volume
-        solution = solve_levels(state, volume, equation, options)
-        return _finish(state, volume, solution, equation)
-
-
-def checked(mapping: MapOptions, options: ProblemOptions) -> tuple[Equation, int]:
-    """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
-    equation, degree = options.problem(), mapping.config().spline.degree
-    blank = BSplineVolume.uniform(np.zeros((mapping.most_control_points,) * 3 + (3,)), degree)
-    return equation, check_size(blank, max(options.refine), options.degree, equation.form.components)
-
-
-def finished_run(
-    mesh: str | Path, out: str | Path, mapping: MapOptions, options: ProblemOptions | None, *, vector: bool = False
-) -> Outcome | None:
-    """Return the finished result of that run in its folder, None where there is none.
-
-    options: those of the problem, None for `parameterize_to`. Raises InputError where another command made the result,
-    or where files of it are gone.
-    """
-    report = reports.read(Path(out))
-    if report is None or not reports.is_finished(report):
-        return None
-    finished = Outcome(Path(out), report)
-    if options is None:
-        return _finished_by(command_line("parameterize", mesh, mapping, out=out), finished, vector)
-    command = command_line(f"run {options.section}", mesh, mapping, options, out=out)
-    return _finished_by(command, finished, vector, options.section)
+    return parameterize_to(mesh, out, mapping=mapping, problem=options, force=force, vector=vector, progress=progress)
 
 
 def parameterize_to(
@@ -139,17 +107,49 @@ def parameterize_to(
     out: str | Path | None = None,
     *,
     mapping: MapOptions | None = None,
+    problem: ProblemOptions | None = None,
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
 ) -> Outcome:
-    """Parameterize a surface as `run` does, without solving a problem."""
+    """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does."""
     mapping = mapping or MapOptions()
-    command = command_line("parameterize", mesh, mapping, out=out)
+    equation, unknowns = (None, 0) if problem is None else checked(mapping, problem)
+    command = _command(mesh, out, mapping, problem)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
-            return _finished_by(command, state.finished, vector)
-        return _finish(state, map_surface(state, mesh, mapping, progress, command).volume)
+            return _finished_by(command, state.finished, vector, problem)
+        volume = map_surface(state, mesh, mapping, progress, command, equation, unknowns).volume
+        if problem is None or equation is None:
+            return _finish(state, volume)
+        return _finish(state, volume, solve_levels(state, volume, equation, problem), equation)
+
+
+def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, problem: ProblemOptions | None) -> str:
+    """Return the command that repeats such a run."""
+    if problem is None:
+        return command_line("parameterize", mesh, mapping, out=out)
+    return command_line(f"run {problem.section}", mesh, mapping, problem, out=out)
+
+
+def checked(mapping: MapOptions, problem: ProblemOptions) -> tuple[Equation, int]:
+    """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
+    equation, degree = problem.problem(), mapping.config().spline.degree
+    blank = BSplineVolume.uniform(np.zeros((mapping.most_control_points,) * 3 + (3,)), degree)
+    return equation, check_size(blank, max(problem.refine), problem.degree, equation.form.components)
+
+
+def finished_run(
+    mesh: str | Path, out: str | Path, mapping: MapOptions, problem: ProblemOptions | None, *, vector: bool = False
+) -> Outcome | None:
+    """Return the finished result of `parameterize_to` in its folder, None where there is none.
+
+    Raises InputError where another command made the result, or where files of it are gone.
+    """
+    report = reports.read(Path(out))
+    if report is None or not reports.is_finished(report):
+        return None
+    return _finished_by(_command(mesh, out, mapping, problem), Outcome(Path(out), report), vector, problem)
 
 
 def solve_to(
@@ -238,15 +238,12 @@ def study_to(
         return _finish(state, loaded), tables.as_table(study)
 
 
-def _finished_by(command: str, finished: Outcome, vector: bool, problem: str | None = None) -> Outcome:
-    """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone.
-
-    problem: the one that the run is to solve, None where it solves none.
-    """
+def _finished_by(command: str, finished: Outcome, vector: bool, problem: ProblemOptions | None) -> Outcome:
+    """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone."""
     folder, made_by = finished.folder, finished.report.get("command", "")
-    if problem is not None and problem not in finished.report:
+    if problem is not None and problem.section not in finished.report:
         path = folder / "volume.npz"
-        raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {problem} {path}` solves on it")
+        raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {problem.section} {path}` solves on it")
     if not gives_the_same(made_by, command):
         raise InputError(f"{folder}: holds the result of `{made_by}`; --force replaces it, --out names another folder")
     wanted = ["volume.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
