@@ -193,7 +193,10 @@ def test_a_failure_is_a_row(formula, formula_training, capsys):
     formula_training(error=RuntimeError("no idea\nwhy"))
     assert g1.main(formula) == 1
     row = table(Path("out"))["duck"]
-    assert row["status"] == "internal error, please report it: RuntimeError: no idea why" and row["verdict"] == ""
+    assert (
+        row["status"] == "internal error, please report it: RuntimeError: no idea why; the terminal shows the traceback"
+        and row["verdict"] == ""
+    )
     assert "Traceback" in capsys.readouterr().err
 
 

@@ -16,11 +16,12 @@ from ..report import document as reports
 from ..workflow import pipeline
 from ..workflow.cost_estimate import available_memory_mb
 from ..workflow.output_folder import forget, locked, writable
+from ..workflow.watched import Ended
 from .options import WorkerOptions
 from .page import page
 from .surfaces import Entry, entries_of
 from .table import Batch, Row
-from .task import Ended, Task, Work, compute
+from .task import Task, Work, compute
 
 log = logging.getLogger(__name__)
 

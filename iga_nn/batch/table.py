@@ -10,8 +10,8 @@ from typing import Any, Literal
 from ..report import document as reports
 from ..report.tables import csv_text
 from ..version import __version__
+from ..workflow.watched import Ended
 from .surfaces import Entry, printable
-from .task import Ended
 
 SCHEMA = 1
 

@@ -16,7 +16,7 @@ from rich.progress import Progress as Bar
 from rich.table import Column
 from rich.text import Text
 
-from ..workflow import logged
+from ..workflow.watched import logged
 
 if TYPE_CHECKING:
     from parameterize.progress import Progress, ProgressCallback

@@ -22,11 +22,13 @@ from parameterize.surface.surface import MeshError, Surface
 from ..errors import one_line
 from ..options import PoissonOptions
 from ..workflow.output_folder import default_folder
-from .worker import End, Message, Step
+from ..workflow.watched import Ended
+from .worker import Message, Step
 
 log = logging.getLogger(__name__)
 
 NAME_LENGTH = 80
+STATES = {"done": "done", "stopped": "stopped", "refused": "failed", "failed": "failed"}  # of a run: of its job
 
 
 @dataclass(eq=False)
@@ -174,8 +176,8 @@ class Jobs:
             for message in self._run(job):
                 if isinstance(message, Step):
                     self._take(job, message)
-                elif isinstance(message, End):
-                    state, text = message.state, message.text
+                elif isinstance(message, Ended):
+                    state, text = STATES[message.state], message.line
                 else:
                     job.log.append(message)
                 self._changed(job)
