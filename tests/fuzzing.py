@@ -41,8 +41,9 @@ from mesh_files import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagge
 from iga_nn.errors import InputError, input_errors, one_line
 from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume
-from iga_nn.options import SurfaceOptions, read_corners
+from iga_nn.options import SurfaceOptions
 from iga_nn.samples import sample
+from iga_nn.workflow.mapping import read_corners
 from iga_nn.workflow.verdict import check_surface, check_volume
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap

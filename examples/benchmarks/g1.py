@@ -21,15 +21,14 @@ from typing import Any, Literal
 
 import processes
 
-from iga_nn.batch.options import WorkerOptions
 from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
 from iga_nn.batch.task import Task
 from iga_nn.errors import InputError
+from iga_nn.levels import csv_text
 from iga_nn.models import DATA_FOLDER
-from iga_nn.options import MapOptions, PoissonOptions
+from iga_nn.options import MapOptions, PoissonOptions, WorkerOptions
 from iga_nn.report import document as reports
-from iga_nn.report.tables import csv_text
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.files import save_text
 from solve.forms.poisson import DEFAULT_EXACT

@@ -17,8 +17,8 @@ from dask.utils import format_bytes, parse_bytes
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, Worker, WorkerPlugin, wait
 
 from ..errors import InputError, one_line
+from ..options import WorkerOptions
 from ..workflow.watched import Ended
-from .options import WorkerOptions
 from .task import LESS_MEMORY, Task, Work, compute, stop
 
 log = logging.getLogger(__name__)

@@ -11,13 +11,12 @@ from pathlib import Path
 from parameterize.files import save_text
 
 from ..errors import InputError, expected_errors, one_line
-from ..options import MapOptions, PoissonOptions
+from ..options import MapOptions, PoissonOptions, WorkerOptions
 from ..report import document as reports
 from ..workflow import pipeline
 from ..workflow.cost_estimate import available_memory_mb
 from ..workflow.output_folder import forget, locked, writable
 from ..workflow.watched import Ended
-from .options import WorkerOptions
 from .page import page
 from .surfaces import Entry, entries_of
 from .table import Batch, Row

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from ..levels import csv_text
 from ..report import document as reports
-from ..report.tables import csv_text
 from ..version import __version__
 from ..workflow.watched import Ended
 from .surfaces import Entry, printable

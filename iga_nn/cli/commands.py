@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from cyclopts import App, CycloptsError, Parameter, Token, convert
 
-from ..batch.options import WorkerOptions
 from ..errors import InputError, expected_errors, input_errors, one_line
 from ..options import (
     PROBLEMS,
@@ -27,6 +26,7 @@ from ..options import (
     ProblemOptions,
     StudyOptions,
     SurfaceOptions,
+    WorkerOptions,
 )
 from ..version import __version__
 from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED

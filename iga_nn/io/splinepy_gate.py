@@ -39,7 +39,7 @@ def checked_text(path: Path, kind: str) -> str:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise ValueError("is not a text file in UTF-8") from None
-    return _CHECKS[kind](text)
+    return CHECKS[kind](text)
 
 
 def _check_gismo(text: str) -> str:
@@ -115,4 +115,4 @@ def _check_one(patches: Sequence[object]) -> None:
         raise ValueError(f"holds {len(patches)} patches; a volume is one: save the one you mean in a file of its own")
 
 
-_CHECKS: dict[str, Callable[[str], str]] = {"gismo": _check_gismo, "mfem": _check_mfem, "json": _check_json}
+CHECKS: dict[str, Callable[[str], str]] = {"gismo": _check_gismo, "mfem": _check_mfem, "json": _check_json}

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 from parameterize.files import save_text
 
 from ..errors import one_line
-from ..levels import TITLES, capitalized
+from ..levels import TITLES, as_rows, capitalized
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, SOLVED, figures_of
 from .document import Report
-from .tables import as_rows
 
 if TYPE_CHECKING:
     from .viewer import Scene

@@ -17,8 +17,8 @@ from parameterize.surface.surface import Surface
 from solve.solution import Solution
 from solve.study import Convergence
 
+from ..levels import as_rows
 from . import document as reports
-from .tables import as_rows
 
 
 @singledispatch

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -11,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.files import save_arrays
 from parameterize.spline.volume import FACE_NAMES
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
 from ..models import resolve
-from ..options import Equation, MapOptions, read_corners
+from ..options import Equation, MapOptions
 from ..report import advice
 from ..report import document as reports
 from .cost_estimate import Forecast, available_memory_mb, forecast
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _TRIED = 50  # points of the surface
+_CORNERS_BYTES = 65_536
+_LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
+_LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +105,39 @@ def _prepare(
         expected = forecast(surface, config, device=device, unknowns=unknowns)
     _announce(expected)
     return _Given(surface, corners, marks, expected)
+
+
+def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray:
+    """Return eight points (8, 3) in the surface's units or eight vertex numbers (8,) from a JSON file.
+
+    frame: that of the surface; where it is known, the file may hold {"XYZ": [...]}, points in scaled coordinates.
+    Raises InputError.
+    """
+    try:
+        with path.open(encoding="utf-8") as stream:
+            given = json.loads(stream.read(_CORNERS_BYTES))
+        scaled = frame if isinstance(given, dict) and list(given) == ["XYZ"] else None
+        rows = np.array(given["XYZ"] if scaled else given, dtype=object)
+        if any(isinstance(number, bool) for number in rows.flat):
+            raise TypeError
+        rows = np.array(rows.tolist(), dtype=np.float64)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, TypeError, OverflowError, RecursionError):
+        expected = 'a JSON list of eight points or of eight vertex numbers, or {"XYZ": eight points}'
+        raise InputError(f"{path}: corners must be {expected}") from None
+    if rows.shape not in ((8, 3), (8,)) or not np.all(np.abs(rows) <= _LARGEST_COORDINATE):  # also refuses NaN
+        raise InputError(
+            f"{path}: corners must be eight points of three finite coordinates or eight vertex numbers, "
+            f"found an array of shape {rows.shape}"
+        )
+    if rows.shape == (8, 3):
+        return scaled.to_units(rows) if scaled else rows
+    if scaled:
+        raise InputError(f"{path}: XYZ must hold eight points of three coordinates; vertex numbers stand in a list")
+    if np.any(rows != np.rint(rows)) or np.abs(rows).max() > _LARGEST_WHOLE:
+        raise InputError(f"{path}: vertex numbers must be whole and at most {_LARGEST_WHOLE}")
+    return rows.astype(np.int64)
 
 
 def _frame(surface: Surface) -> UnitFrame:

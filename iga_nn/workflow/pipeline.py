@@ -20,9 +20,10 @@ from solve.discretization.slab import agreed
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
+from ..levels import as_csv, as_table, rows_of
 from ..options import PROBLEMS, Equation, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
 from ..report import document as reports
-from ..report import html, tables
+from ..report import html
 from .mapping import map_surface
 from .memory import tell_memory
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
@@ -230,12 +231,12 @@ def study_to(
             for degree in degrees:
                 study[degree] = convergence(loaded, equation, levels, degree, certified=verdict_of(state))
                 log.info("degree %d: solved", degree)
-        save_text(state.folder / "study.csv", tables.as_csv(study))
+        save_text(state.folder / "study.csv", as_csv(study))
         notices = notices_of(row.report for row in chain(*study.values()))
         known = described(equation, loaded) | ({"exact": options.exact} if options.exact else {})
-        state.write(study=known | {"levels": tables.rows_of(study), "notices": notices})
+        state.write(study=known | {"levels": rows_of(study), "notices": notices})
         state.draw("study", study=study)
-        return _finish(state, loaded), tables.as_table(study)
+        return _finish(state, loaded), as_table(study)
 
 
 def _finished_by(command: str, finished: Outcome, vector: bool, problem: ProblemOptions | None) -> Outcome:
