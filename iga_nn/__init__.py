@@ -6,8 +6,6 @@ preconditioner, docs/output.md the files.
 The public names are loaded on first use: importing the package loads neither torch nor VTK.
 """
 
-from __future__ import annotations
-
 import os
 from importlib import import_module
 from importlib.util import find_spec

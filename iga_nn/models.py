@@ -1,7 +1,5 @@
 """Finds surfaces by name: a path, a sample, or a published model in the folder IGA_NN_DATA or in its repository."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass

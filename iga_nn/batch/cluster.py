@@ -1,7 +1,5 @@
 """Lets dask compute the surfaces of a batch: worker processes of this machine, or those of a scheduler."""
 
-from __future__ import annotations
-
 import logging
 import os
 import signal

@@ -1,7 +1,5 @@
 """Makes batch.html: a row a surface with its picture, figures that sort and a link to its report; fetches nothing."""
 
-from __future__ import annotations
-
 import base64
 import functools
 import io

@@ -1,7 +1,5 @@
 """Carries a batch from the surfaces to the table: skips what is finished, computes the rest, keeps what is known."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import closing

@@ -1,11 +1,9 @@
 """Keeps the table of a batch, one row a surface, and puts it into words, CSV and JSON."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from ..levels import csv_text
 from ..report import document as reports
@@ -41,7 +39,7 @@ class Row:
     line: str = ""
     report: reports.Report | None = None
 
-    def ended(self, how: Ended) -> Row:
+    def ended(self, how: Ended) -> Self:
         """Return the row of the surface once its task has ended."""
         if how.report is not None:
             return replace(self, state=reports.state(how.report), line="", report=how.report)
@@ -90,7 +88,7 @@ class Batch:
         counts = ", ".join(f"{count} {state}" for state, count in self.counts.items())
         return f"{len(self.rows)} surface{'s' * (len(self.rows) != 1)}: {counts}"
 
-    def with_row(self, number: int, row: Row) -> Batch:
+    def with_row(self, number: int, row: Row) -> Self:
         """Return the batch with another row in that place."""
         return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
 

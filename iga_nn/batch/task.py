@@ -1,7 +1,5 @@
 """Computes one surface of a batch in a worker process, and tells the client how far it is."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass

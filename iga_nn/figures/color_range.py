@@ -1,7 +1,5 @@
 """Chooses the values at the ends of a colour bar, also for fields that are constant, zero or tiny."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Draws curves: the loss over the steps, the errors over the mesh size."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

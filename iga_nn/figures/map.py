@@ -1,7 +1,5 @@
 """Draws a map: faces, parameter lines, cut, distortion, and where it is not proved or meets itself."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

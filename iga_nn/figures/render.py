@@ -1,15 +1,13 @@
 """Draws surface patches by VTK, off screen, where this machine can draw."""
 
-from __future__ import annotations
-
 import logging
 import os
 import subprocess
 import sys
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -57,9 +55,9 @@ class View:
     up: Array
     towards: Array
 
-    def turned(self) -> View:
+    def turned(self) -> Self:
         """Return the view from behind."""
-        return View(-self.right, self.up, -self.towards)
+        return replace(self, right=-self.right, towards=-self.towards)
 
 
 @cache

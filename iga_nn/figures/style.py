@@ -1,7 +1,5 @@
 """Holds what the figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ resolves XML entities, evaluates MFEM's rows as Python literals and assumes one 
 Each function raises ValueError with the reason.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Sequence

@@ -4,8 +4,6 @@ A job's states are checking -> refused | ready -> waiting -> running -> done | f
 started again.
 """
 
-from __future__ import annotations
-
 import logging
 import re
 import shutil

@@ -3,8 +3,6 @@
 It is a process so that a stop works during every step, and so that its memory is freed when it ends.
 """
 
-from __future__ import annotations
-
 import logging
 import multiprocessing
 import os

@@ -4,8 +4,6 @@ The output folder, the report page, the live page and the table of docs/output.m
 needs a function in `iga_nn.figures` and a row here; `make docs` writes the table of docs/output.md anew.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

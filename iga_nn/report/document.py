@@ -1,7 +1,5 @@
 """Writes, reads and judges report.json."""
 
-from __future__ import annotations
-
 import json
 import math
 import platform

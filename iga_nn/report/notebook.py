@@ -1,7 +1,5 @@
 """Lays out what a notebook shows of a result: its facts as a table, without pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from functools import singledispatch

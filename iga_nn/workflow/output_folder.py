@@ -1,7 +1,5 @@
 """Holds one output folder for one run: its report so far, and the clock."""
 
-from __future__ import annotations
-
 import logging
 import os
 import shutil
