@@ -1,18 +1,14 @@
 """Returns what a command prints when it is done, and the exit code that goes with it."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from ..batch.table import Batch
 from ..levels import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..workflow.output_folder import Outcome
 from . import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED
-
-if TYPE_CHECKING:
-    from ..batch.table import Batch
 
 CODES = {"certified": DONE, "not certified": NOT_CERTIFIED, "not solved": NOT_SOLVED}  # of a state
 SHOWN_ERRORS = (*EXACT_ERRORS, *ESTIMATES)

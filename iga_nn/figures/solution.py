@@ -1,23 +1,19 @@
 """Draws a solution: its values on the boundary, its error on the boundary and on the mid-sections."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from matplotlib.figure import Figure
 
 from parameterize.spline.volume import BSplineVolume
+from solve import Solution
+from solve.forms.problem import BoundaryValueProblem
 
 from ..levels import EXACT_ERRORS, TITLES
 from .color_range import error_range, even_range
 from .evaluate import SECTIONS, all_grids, points_on, sampled_error, solution_on
 from .render import Patch, check_drawable
 from .style import SAMPLES, color_bar, colors, panels_of, save, show_around, show_section
-
-if TYPE_CHECKING:
-    from solve import Solution
-    from solve.forms.problem import BoundaryValueProblem
 
 
 def draw_error(

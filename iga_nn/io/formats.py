@@ -7,29 +7,25 @@ point data `u`, the others as a second file beside the volume's. `io.splinepy` e
 splinepy's JSON, which are also read; `io.vtk` those for ParaView. IGES and STEP have no trivariate splines.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from parameterize.files import replacing
 from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.readers.file import FORMATS as SURFACES
+from solve.discretization.space import TrialSpace, longest_edge
+from solve.field import SplineField
 
 from ..errors import InputError, input_errors
 from ..new_file import check_new
-from ..options import PROBLEMS
+from ..options import PROBLEMS, Equation
 from ..report import document as reports
 from . import splinepy, vtk
 from .splinepy_gate import CHECKS, kind_of
-
-if TYPE_CHECKING:
-    from solve.field import SplineField
-
-    from ..options import Equation
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
@@ -62,8 +58,6 @@ def is_volume(path: str | Path) -> bool:
     Files of other programs begin alike (glTF as JSON, 3MF as a ZIP archive), so the ending must be one that is read
     here, for a volume or for a surface; a volume may be in a .zip, too.
     """
-    from parameterize.surface.readers.file import FORMATS as SURFACES
-
     source = Path(path)
     endings = ("", ".zip", *(FORMATS[kind].ending for kind in CHECKS), *SURFACES)
     return source.suffix == ".npz" or (
@@ -171,14 +165,11 @@ def export(
     return target
 
 
-def _load_solution(path: Path, volume: BSplineVolume) -> tuple[SplineField, Equation | None]:
+def _load_solution(path: Path, volume: BSplineVolume) -> "tuple[SplineField, Equation | None]":
     """Return a solution and the problem that the report beside it names, None where its exact solution is not known.
 
     Raises InputError where the solution does not belong to the volume: by its knots, or by the h of its report.
     """
-    from solve.discretization.space import TrialSpace, longest_edge
-    from solve.field import SplineField
-
     with input_errors():
         field = SplineField.load(path)
     if field.coefficients.shape[3:] not in ((), (3,)):

@@ -3,13 +3,11 @@
 The page is laid out by the template page.html, which escapes whatever it is given; this module chooses its content.
 """
 
-from __future__ import annotations
-
 import base64
 import logging
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from parameterize.files import save_text
 
@@ -19,9 +17,6 @@ from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, SOLVED, figures_of
 from .document import Report
-
-if TYPE_CHECKING:
-    from .viewer import Scene
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +38,7 @@ ORIGINS = {
 }
 
 
-def write(folder: Path, report: Report, scene: Scene | None) -> None:
+def write(folder: Path, report: Report, scene: dict[str, Any] | None) -> None:
     """Write report.html from a finished report and the figures in its folder; atomic.
 
     scene: for the interactive view, None where it could not be drawn. Where the page cannot be laid out, a bare one
@@ -65,7 +60,7 @@ def _bare(report: Report, reason: str) -> str:
     )
 
 
-def page(report: Report, scene: Scene | None, folder: Path) -> str:
+def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
     """Return the page as text."""
     section = reports.solved(report)
     return filled(
@@ -84,7 +79,7 @@ def page(report: Report, scene: Scene | None, folder: Path) -> str:
     )
 
 
-def scene_page(scene: Scene, title: str) -> str:
+def scene_page(scene: dict[str, Any], title: str) -> str:
     """Return a page with the interactive view alone, to stand in a frame of another page."""
     return filled("report/scene.html", title=title, scene=scene)
 

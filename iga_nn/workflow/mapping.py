@@ -14,7 +14,12 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 from parameterize.files import save_arrays
+from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import FACE_NAMES
+from parameterize.surface.geometry import vertex_normals
+from parameterize.surface.surface import Surface
+from solve import ExpressionError
+from solve.diagnostics import empty_formulas
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
@@ -27,9 +32,7 @@ from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
 from .verdict import tell
 
 if TYPE_CHECKING:
-    from parameterize.progress import ProgressCallback
     from parameterize.run import Parameterization
-    from parameterize.surface.surface import Surface
 
 log = logging.getLogger(__name__)
 
@@ -149,9 +152,6 @@ def _frame(surface: Surface) -> UnitFrame:
 
 def _check_data(equation: Equation, surface: Surface) -> None:
     """Check the problem's data on the surface: no points inside are known yet. Raises ExpressionError."""
-    from parameterize.surface.geometry import vertex_normals
-    from solve.diagnostics import empty_formulas
-
     equation = equation.placed(_frame(surface))
     points = surface.vertices.T
     for evaluate in (equation.boundary_at, equation.source_at, equation.form.tensor, equation.form.mass):
@@ -169,8 +169,6 @@ def _check_data(equation: Equation, surface: Surface) -> None:
 
 def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:
     """Raise the ExpressionError that `evaluate` raises at all points tried: a face's data need only be valid on it."""
-    from solve import ExpressionError
-
     refused = None
     for row in np.linspace(0, len(points) - 1, _TRIED).astype(int):
         try:

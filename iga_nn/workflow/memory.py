@@ -1,20 +1,20 @@
 """Forecasts the memory of a solve from counts, and says what helps where that much is not free."""
 
-from __future__ import annotations
-
 import logging
 import math
 import platform
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from parameterize.spline.volume import BSplineVolume
+from solve.discretization.errors import POINTS
+from solve.discretization.planes import rule_of
+from solve.discretization.space import trial_space
+
 from ..options import Equation, ProblemOptions
 from .cost_estimate import available_memory_mb
-
-if TYPE_CHECKING:
-    from parameterize.spline.volume import BSplineVolume
 
 log = logging.getLogger(__name__)
 
@@ -39,10 +39,6 @@ class SolveMemory:
 
 def solve_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptions) -> SolveMemory:
     """Return the forecast for the finest level."""
-    from solve.discretization.errors import POINTS
-    from solve.discretization.planes import rule_of
-    from solve.discretization.space import trial_space
-
     form, space = equation.form, trial_space(volume, max(options.refine), options.degree)
     rule = rule_of(volume, space, equation.on(volume).form.tensor, options.quadrature)
     points = float(np.prod(rule.shape, dtype=float))
@@ -57,8 +53,6 @@ def solve_memory(volume: BSplineVolume, equation: Equation, options: ProblemOpti
 
 def tell_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptions, comm: Any = None) -> None:
     """Log what the finest level will take, warn where that is not free, and say how many processes could solve it."""
-    from solve.discretization.space import trial_space
-
     processes, here = 1, 1
     if comm is not None:
         processes, here = comm.size, comm.allgather(platform.node()).count(platform.node())

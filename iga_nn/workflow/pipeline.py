@@ -3,19 +3,19 @@
 Every file is written as soon as its content is known, so that a late failure loses nothing that was computed before.
 """
 
-from __future__ import annotations
-
 import logging
 from collections import deque
 from contextlib import ExitStack, nullcontext
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from parameterize.files import save_text
+from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import BSplineVolume
+from solve import ConvergenceRow, Solution, check_device, check_problem, convergence
 from solve.discretization.slab import agreed
 
 from ..errors import InputError, input_errors
@@ -30,10 +30,6 @@ from .output_folder import Outcome, RunFolder, default_folder, open_folder
 from .repeat import command_line, gives_the_same
 from .solving import described, each_level, notices_of, reported, scene_of, solve_levels, verdict_of
 from .verdict import write_certificate
-
-if TYPE_CHECKING:
-    from parameterize.progress import ProgressCallback
-    from solve import ConvergenceRow, Solution
 
 log = logging.getLogger(__name__)
 
@@ -169,8 +165,6 @@ def solve_to(
     call this and share the solve; the first one writes, the others get None. Takes the other options of `run`, and
     raises as it does.
     """
-    from solve import check_device, check_problem
-
     options, path = problem or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
@@ -213,8 +207,6 @@ def study_to(
 
     Takes the other options of `run`, and raises as it does.
     """
-    from solve import check_problem, convergence
-
     options, path = options or StudyOptions(), Path(volume)
     equation, levels = options.problem(), options.levels()
     loaded = load_volume(path)
@@ -260,7 +252,7 @@ def _finish(
     state: RunFolder,
     volume: BSplineVolume,
     solution: Solution | None = None,
-    equation: Equation | None = None,
+    equation: "Equation | None" = None,
 ) -> Outcome:
     """Finish the report, write the page that shows it and return the output folder."""
     scene = scene_of(state, volume, solution, equation)

@@ -1,22 +1,22 @@
 """Says whether a surface is accepted and what is proved of a volume: for `check`, the report and the terminal."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from parameterize.arrays import in_brackets
+from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.jacobian import certify
+from parameterize.quality.quality import proved
+from parameterize.spline.volume import BSplineVolume
 
+from ..io.formats import load_volume
+from ..models import resolve
+from ..options import MapOptions, SurfaceOptions
 from ..report import advice
 from ..report import document as reports
-
-if TYPE_CHECKING:
-    from parameterize.spline.volume import BSplineVolume
-
-    from ..options import MapOptions, SurfaceOptions
-    from .output_folder import RunFolder
+from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 
@@ -26,8 +26,6 @@ def check_surface(mesh: str, options: SurfaceOptions, strict: bool = False) -> d
 
     strict: also refuse a surface that intersects itself.
     """
-    from ..models import resolve
-
     surface = resolve(mesh, **options.reading())
     if strict:
         surface.refuse_crossings()
@@ -36,17 +34,11 @@ def check_surface(mesh: str, options: SurfaceOptions, strict: bool = False) -> d
 
 def check_volume(path: str | Path) -> dict[str, Any]:
     """Certify a saved volume and return what was proved. Raises InputError for a file that is not a volume."""
-    from ..io.formats import load_volume
-
     return certified_facts(load_volume(path))
 
 
 def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
     """Certify a volume and return the section `parameterization` of report.json."""
-    from parameterize.certificate.boundary import check_boundary
-    from parameterize.certificate.jacobian import certify
-    from parameterize.quality.quality import proved
-
     certificate = certify(volume)
     facts = proved(volume.shape, volume.degrees, certificate, check_boundary(volume))
     return facts | advice.unproved(volume, certificate)
