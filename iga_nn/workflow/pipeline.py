@@ -24,8 +24,8 @@ from ..levels import as_csv, as_table, rows_of
 from ..options import PROBLEMS, Equation, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
 from ..report import document as reports
 from ..report import html
+from .cost_estimate import tell_memory
 from .mapping import map_surface
-from .memory import tell_memory
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
 from .repeat import command_line, gives_the_same
 from .solving import described, each_level, notices_of, reported, scene_of, solve_levels, verdict_of
