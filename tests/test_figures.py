@@ -18,7 +18,7 @@ from iga_nn.figures import evaluate as sampling
 from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
 from iga_nn.figures import solution as solution_figures
-from iga_nn.report.artifacts import draw_figures
+from iga_nn.workflow.output_folder import RunFolder
 from solve.study import benchmark_volume
 
 
@@ -185,9 +185,10 @@ def test_without_graphics_library_one_line_names_the_remedy(monkeypatch, caplog,
     rendering.can_draw.cache_clear()
     try:
         result = formula_parameterization()
-        missing = draw_figures(tmp_path, "map", {"volume": result.volume, "history": result.history})
+        state = RunFolder(tmp_path)
+        state.draw("map", volume=result.volume, history=result.history)
     finally:
         rendering.can_draw.cache_clear()
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
     assert "libegl1 libgl1-mesa-dri" in caplog.text
-    assert missing == dict.fromkeys(("lines.png", "cut.png", "distortion.png"), rendering.CANNOT_DRAW)
+    assert state.report["not_drawn"] == dict.fromkeys(("lines.png", "cut.png", "distortion.png"), rendering.CANNOT_DRAW)

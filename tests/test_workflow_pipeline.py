@@ -100,8 +100,8 @@ def test_a_hidden_file_has_a_folder_of_its_own():
 def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, monkeypatch):
     formula_training()
     seen = []
-    draw_figures = "iga_nn.report.artifacts.draw_figures"
-    monkeypatch.setattr(draw_figures, lambda folder, part, known, endings: seen.append(known["marks"]) or {})
+    draw = "iga_nn.workflow.output_folder.RunFolder.draw"
+    monkeypatch.setattr(draw, lambda state, part, **known: seen.append(known["marks"]))
     Path("corners.json").write_text("[7, 6, 5, 4, 3, 2, 1, 0]")
     pipeline.parameterize_to("cube", "out", mapping=MapOptions(corners=Path("corners.json")))
     pipeline.parameterize_to("cube", "out", force=True)

@@ -1,25 +1,20 @@
-"""Lists every file of an output folder: what it shows, which part of a run writes it; and draws the figures.
+"""Lists every file of an output folder: what it shows, which part of a run writes it, how a figure is drawn.
 
 The output folder, the report page, the live page and the table of docs/output.md are made from this table. A new figure
 needs a function in `iga_nn.figures` and a row here; `make docs` writes the table of docs/output.md anew.
 """
 
-import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from ..errors import one_line
 from ..options import PROBLEMS
-
-log = logging.getLogger(__name__)
 
 Part = Literal["report", "map", "solution", "study"]
 
 REPORT, PAGE = "report.json", "report.html"
-PNG = (".png",)
 SOLVED = {name: kind.title for name, kind in PROBLEMS.items()} | {"study": "convergence study"}  # section -> title
 SECTIONS: dict[str, Part] = {"config": "map", **dict.fromkeys(PROBLEMS, "solution"), "study": "study"}
 
@@ -44,6 +39,11 @@ class Artifact:
     def is_curve(self) -> bool:
         """Return whether the figure is drawn without VTK, and written as PDF, too, where that is wanted."""
         return self.draw.startswith("curves.")
+
+    def draw_to(self, path: Path, known: Mapping[str, Any]) -> None:
+        """Draw the figure from what is known, and write it."""
+        module, function = self.draw.split(".")
+        getattr(import_module(f"iga_nn.figures.{module}"), function)(path, *(known[name] for name in self.takes))
 
 
 _KNOTS = ("degrees", "knots_u", "knots_v", "knots_w")
@@ -85,29 +85,3 @@ def figures_of(report: Mapping[str, Any]) -> list[Artifact]:
     """Return the figures that belong to the sections a report has."""
     parts = {part for section, part in SECTIONS.items() if section in report}
     return [artifact for artifact in ARTIFACTS if artifact.draw and artifact.part in parts]
-
-
-def draw_figures(folder: Path, part: Part, known: Mapping[str, Any], endings: Sequence[str] = PNG) -> dict[str, str]:
-    """Draw each figure of one part that `known` suffices for, and return why others were not drawn, by file name.
-
-    One that fails costs nothing but itself. endings: of the files a curve is written to.
-    """
-    from ..figures import render
-
-    failures: dict[str, str] = {}
-    for artifact in ARTIFACTS:
-        if not artifact.draw or artifact.part != part or not known.keys() >= set(artifact.takes):
-            continue
-        if not artifact.is_curve and not render.can_draw():
-            failures[artifact.file] = render.CANNOT_DRAW
-            continue
-        module, function = artifact.draw.split(".")
-        draw = getattr(import_module(f"iga_nn.figures.{module}"), function)
-        for ending in endings if artifact.is_curve else PNG:
-            path = (folder / artifact.file).with_suffix(ending)
-            try:
-                draw(path, *(known[name] for name in artifact.takes))
-            except Exception as error:
-                failures[path.name] = one_line(error) or type(error).__name__
-                log.warning("%s could not be drawn: %s", path.name, failures[path.name])
-    return failures

@@ -109,7 +109,7 @@ def notices_of(found: Iterable[SolveReport]) -> list[str]:
 
 def scene_of(state: RunFolder, volume: BSplineVolume, *solved: Any) -> Any:
     """Return the interactive view of a volume and what is solved on it; None where it cannot be drawn."""
-    with state.drawing("interactive view"):
+    with state.timed("report"), state.drawing("interactive view"):
         from ..report import viewer
 
         return viewer.scene_of(volume, *solved)
