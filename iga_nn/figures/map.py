@@ -40,8 +40,7 @@ def _draw_around(path: str | Path | None, patches: list[Patch], title: str, mark
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, patches, marks)
     name_faces(figure)
-    figure.suptitle(title, fontsize=14)
-    return save(figure, path)
+    return save(figure, path, title)
 
 
 def draw_cut(path: str | Path | None, volume: BSplineVolume) -> Figure:
@@ -60,8 +59,7 @@ def draw_cut(path: str | Path | None, volume: BSplineVolume) -> Figure:
         panel.imshow(draw(without_octant(patches, octant), view, PANEL))
     name_faces(figure)
     color_bar(figure, panels, SHARES, DISTORTION)
-    figure.suptitle(f"Cut open: the octant {octant_label(octant)} is left out", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, f"Cut open: the octant {octant_label(octant)} is left out")
 
 
 def draw_distortion(path: str | Path | None, volume: BSplineVolume) -> Figure:
@@ -71,16 +69,14 @@ def draw_distortion(path: str | Path | None, volume: BSplineVolume) -> Figure:
     for panel, title, grid, values in zip(panels, SECTIONS, grids, distortions(volume, grids), strict=True):
         show_section(panel, title, points_on(volume, grid), colors(values, SHARES))
     color_bar(figure, panels, SHARES, DISTORTION)
-    figure.suptitle("Distortion on the mid-sections", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, "Distortion on the mid-sections")
 
 
 def draw_folds(path: str | Path | None, volume: BSplineVolume, places: Array) -> Figure:
     """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J > 0 is not proved."""
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, _glass(volume), places)
-    figure.suptitle(f"det J > 0 is not proved on {len(places)} spans: black balls", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, f"det J > 0 is not proved on {len(places)} spans: black balls")
 
 
 def draw_meeting(path: str | Path | None, volume: BSplineVolume, meeting: Meeting) -> Figure:
@@ -93,8 +89,7 @@ def draw_meeting(path: str | Path | None, volume: BSplineVolume, meeting: Meetin
     panels[0].imshow(draw(glass, view_of(glass), PANEL, mark))
     panels[0].set_title("whole boundary", fontsize=13)
     show_around(panels[1:], parts, mark)
-    figure.suptitle("The boundary meets itself at the black ball; the two parts near it", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, "The boundary meets itself at the black ball; the two parts near it")
 
 
 def _glass(volume: BSplineVolume) -> list[Patch]:

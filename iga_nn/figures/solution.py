@@ -29,8 +29,7 @@ def draw_error(
     for panel, title, where, values in zip(rows[1], SECTIONS, points[6:], errors[6:], strict=True):
         show_section(panel, title, where, colors(values, limits))
     color_bar(figure, rows, limits, r"$|u - u_h|$")
-    figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, "Error on the boundary and on the mid-sections")
 
 
 def draw_values(

@@ -96,8 +96,10 @@ def positive(values: NDArray[Any]) -> Array:
     return np.where(numbers > 0.0, numbers, np.nan)
 
 
-def save(figure: Figure, path: str | Path | None) -> Figure:
+def save(figure: Figure, path: str | Path | None, title: str = "") -> Figure:
     """Write the figure as PNG or PDF, by the ending of the path, and return it; atomic. None: only return it."""
+    if title:
+        figure.suptitle(title, fontsize=14)
     if path is not None:
         with replacing(Path(path)) as temporary:
             figure.savefig(temporary)
