@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from PIL import Image
+
 from ..errors import one_line
 from ..report.artifacts import PAGE
 from ..report.html import filled
@@ -71,8 +73,6 @@ def _picture(path: Path) -> str:
 @functools.lru_cache(maxsize=4096)
 def _thumbnail(path: Path, _written: int) -> str:
     """Return the thumbnail of a picture; the page is written many times, and each picture is read once."""
-    from PIL import Image
-
     stream = io.BytesIO()
     with Image.open(path) as image:
         small = image.convert("RGB")

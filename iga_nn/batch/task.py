@@ -9,11 +9,11 @@ from typing import Any
 from parameterize.progress import Progress
 
 from ..options import MapOptions, ProblemOptions
-from ..workflow import pipeline, watched
+from ..workflow import pipeline
 from ..workflow.output_folder import Outcome
 from ..workflow.watched import Ended, ended, logged, told
 
-LESS_MEMORY = f"give workers more --memory-limit, or {watched.LESS_MEMORY}"
+LESS_MEMORY = "give workers more --memory-limit, or lower --control-points or --refine"
 
 _stopped: set[str] = set()  # batches that were interrupted
 

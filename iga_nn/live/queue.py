@@ -26,7 +26,6 @@ from .worker import Message, Step
 log = logging.getLogger(__name__)
 
 NAME_LENGTH = 80
-STATES = {"done": "done", "stopped": "stopped", "refused": "failed", "failed": "failed"}  # of a run: of its job
 
 
 @dataclass(eq=False)
@@ -175,7 +174,8 @@ class Jobs:
                 if isinstance(message, Step):
                     self._take(job, message)
                 elif isinstance(message, Ended):
-                    state, text = STATES[message.state], message.line
+                    state = "failed" if message.state == "refused" else message.state
+                    text = message.line
                 else:
                     job.log.append(message)
                 self._changed(job)

@@ -97,7 +97,7 @@ def _work(
         return pipeline.parameterize_to(name, mapping=mapping, problem=poisson, progress=told(tell, halt.is_set))
 
     with logged(_Lines(sender), logging.INFO):
-        sender.send(ended(work))
+        sender.send(ended(work, "lower --control-points or --refine"))
 
 
 class _Lines(logging.Handler):

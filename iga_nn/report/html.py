@@ -9,6 +9,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
 from parameterize.files import save_text
 
 from ..errors import one_line
@@ -86,8 +88,6 @@ def scene_page(scene: dict[str, Any], title: str) -> str:
 
 def filled(template: str, **content: Any) -> str:
     """Return a template of this package with its content, which is escaped."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     loader = PackageLoader("iga_nn", "")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     return environment.get_template(template).render(content)

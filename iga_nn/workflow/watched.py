@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 LOGGERS = ("iga_nn", "parameterize", "solve")  # a run's log goes to these and those below them
 INTERVAL = 0.4  # seconds, at least, between two steps that are told
 SHARE = 0.05  # of a run's time, at most, that telling takes
-LESS_MEMORY = "lower --control-points or --refine"
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class Ended:
     report: Report | None = None
 
 
-def ended(run: Callable[[], Outcome | None], less_memory: str = LESS_MEMORY) -> Ended:
+def ended(run: Callable[[], Outcome | None], less_memory: str) -> Ended:
     """Run in a worker process and return how it ended; nothing is raised.
 
     The traceback of an internal error is printed here, since only this process knows it. less_memory: the remedy where
