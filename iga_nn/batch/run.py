@@ -15,9 +15,8 @@ from ..workflow import pipeline
 from ..workflow.cost_estimate import available_memory_mb
 from ..workflow.output_folder import forget, locked, writable
 from ..workflow.watched import Ended
-from .page import page
 from .surfaces import Entry, entries_of
-from .table import Batch, Row
+from .table import Batch, Row, page
 from .task import Task, Work, compute
 
 log = logging.getLogger(__name__)

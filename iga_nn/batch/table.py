@@ -1,20 +1,31 @@
-"""Keeps the table of a batch, one row a surface, and puts it into words, CSV and JSON."""
+"""Keeps the table of a batch, one row a surface, and puts it into words, CSV, JSON and a page that fetches nothing."""
 
+import base64
+import functools
+import io
+import logging
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
+from urllib.parse import quote
 
+from PIL import Image
+
+from ..errors import one_line
 from ..levels import csv_text
 from ..report import document as reports
+from ..report.artifacts import PAGE
+from ..report.html import filled
 from ..version import __version__
 from ..workflow.watched import Ended
 from .surfaces import Entry, printable
 
+log = logging.getLogger(__name__)
+
 SCHEMA = 1
 
 State = Literal["certified", "not certified", "not solved", "refused", "failed", "waiting"]
-STATES: tuple[State, ...] = ("certified", "not certified", "not solved", "refused", "failed", "waiting")
 FIGURES = {  # columns of batch.csv: their titles on the page
     "bijective": "det J > 0",
     "one_to_one": "one-to-one",
@@ -28,6 +39,12 @@ FIGURES = {  # columns of batch.csv: their titles on the page
     "seconds": "seconds",
 }
 COLUMNS = ("surface", "folder", "state", *FIGURES, "line")
+
+PICTURE = "faces.png"  # of an output folder
+THUMBNAIL = (120, 90)  # pixels, at most
+COLORS = 64
+KINDS = {"certified": "good", "not certified": "bad", "not solved": "unsure", "refused": "bad", "failed": "bad"}
+WHOLE = ("seconds", "dofs", "iterations")
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +97,7 @@ class Batch:
     def counts(self) -> dict[State, int]:
         """Return how many surfaces are in which state, without those that no surface is in."""
         found = Counter(row.state for row in self.rows)
-        return {state: found[state] for state in STATES if found[state]}
+        return {state: found[state] for state in get_args(State) if found[state]}
 
     @property
     def summary(self) -> str:
@@ -111,3 +128,59 @@ class Batch:
             for row in self.rows
         )
         return csv_text(COLUMNS, rows)
+
+
+def page(batch: Batch) -> str:
+    """Return the page as text."""
+    return filled(
+        "batch/batch.html",
+        title=batch.folder.name,
+        version=__version__,
+        summary=batch.summary,
+        titles=list(FIGURES.values()),
+        rows=[_row(row) for row in batch.rows],
+    )
+
+
+def _row(row: Row) -> dict[str, Any]:
+    """Return what the template shows of a row; each figure as its text and the value it is sorted by."""
+    report = row.entry.folder / PAGE
+    return {
+        "name": row.entry.name,
+        "state": row.state,
+        "kind": KINDS.get(row.state, ""),
+        "line": row.line,
+        "link": quote(f"{row.entry.folder.name}/{PAGE}", errors="surrogateescape") if report.is_file() else "",
+        "picture": _picture(row.entry.folder / PICTURE) if row.report is not None else "",
+        "figures": [(_text(name, value), "" if value is None else value) for name, value in row.figures().items()],
+    }
+
+
+def _text(name: str, value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, str):
+        return value
+    return f"{value:,.0f}" if name in WHOLE else f"{value:.3g}"
+
+
+def _picture(path: Path) -> str:
+    """Return a small picture in Base64, empty where there is none."""
+    try:
+        return _thumbnail(path, path.stat().st_mtime_ns)
+    except FileNotFoundError:
+        return ""  # nothing can be drawn on this machine
+    except Exception as error:  # no picture ends a batch
+        log.warning("%s: no thumbnail: %s", path, one_line(error))
+        return ""
+
+
+@functools.lru_cache(maxsize=4096)
+def _thumbnail(path: Path, _written: int) -> str:
+    """Return the thumbnail of a picture; the page is written many times, and each picture is read once."""
+    stream = io.BytesIO()
+    with Image.open(path) as image:
+        small = image.convert("RGB")
+        small.thumbnail(THUMBNAIL)
+        small.quantize(COLORS).save(stream, "png", optimize=True)
+    return base64.b64encode(stream.getvalue()).decode("ascii")
