@@ -12,7 +12,7 @@ from ..errors import InputError, expected_errors, one_line
 from ..options import MapOptions, PoissonOptions, WorkerOptions
 from ..report import document as reports
 from ..workflow import pipeline
-from ..workflow.cost_estimate import available_memory_mb
+from ..workflow.cost_estimate import warn_of_memory
 from ..workflow.output_folder import forget, locked, writable
 from ..workflow.watched import Ended
 from .surfaces import Entry, entries_of
@@ -168,7 +168,11 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
         show()
 
     try:
-        _warn_of_memory(workers, cluster.memory_limit(workers), len(waiting))
+        if workers.scheduler is None:
+            count = min(workers.workers, len(waiting))
+            wanted = count * cluster.memory_limit(workers)
+            what = f"{count} workers may take {wanted / 1e9:.1f} GB of memory"
+            warn_of_memory(wanted / 1e6, what, "lower --workers or --memory-limit, or free some")
         _write(batch)
         show()
         with (
@@ -184,18 +188,6 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {batch.summary}; the same command goes on") from None
     return batch
-
-
-def _warn_of_memory(workers: WorkerOptions, limit: int, surfaces: int) -> None:
-    """Warn where the workers of this machine may take more memory than is free."""
-    free, count = available_memory_mb(), min(workers.workers, surfaces)
-    if workers.scheduler is None and free is not None and count * limit / 1e6 > free:
-        log.warning(
-            "%d workers may take %.1f GB of memory, %.1f GB are free: lower --workers or --memory-limit, or free some",
-            count,
-            count * limit / 1e9,
-            free / 1e3,
-        )
 
 
 def _write(batch: Batch) -> None:

@@ -203,6 +203,13 @@ def available_memory_mb(processes: int = 1) -> float | None:
     return min(found, default=None)
 
 
+def warn_of_memory(wanted_mb: float, what: str, remedy: str) -> None:
+    """Warn where so many megabytes are not free. what: takes them, in words."""
+    free = available_memory_mb()
+    if free is not None and wanted_mb > free:
+        log.warning("%s, %.1f GB are free: %s", what, free / 1000.0, remedy)
+
+
 @dataclass(frozen=True)
 class SolveMemory:
     """Hold what a solve takes beside the program: megabytes that processes share, and those that each of them takes."""

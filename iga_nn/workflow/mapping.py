@@ -27,7 +27,7 @@ from ..models import resolve
 from ..options import Equation, MapOptions
 from ..report import advice
 from ..report import document as reports
-from .cost_estimate import Forecast, available_memory_mb, forecast
+from .cost_estimate import Forecast, forecast, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
 from .verdict import tell
 
@@ -106,7 +106,9 @@ def _prepare(
         state.begin("map", "solution")
     with state.timed("load"):
         expected = forecast(surface, config, device=device, unknowns=unknowns)
-    _announce(expected)
+    log.info("estimate: %s", expected)
+    needed = f"{expected.memory_mb / 1000.0:.1f} GB of memory are needed"
+    warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
     return _Given(surface, corners, marks, expected)
 
 
@@ -178,18 +180,6 @@ def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, 
             refused = error
     assert refused is not None
     raise refused
-
-
-def _announce(expected: Forecast) -> None:
-    """Log what the run will take, and warn where that much memory is not free."""
-    log.info("estimate: %s", expected)
-    free = available_memory_mb()
-    if free is not None and expected.memory_mb > free:
-        log.warning(
-            "%.1f GB of memory are needed, %.1f GB are free: lower --control-points or --refine, or free some",
-            expected.memory_mb / 1000.0,
-            free / 1000.0,
-        )
 
 
 def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None, checkpoint: Path) -> Parameterization:
