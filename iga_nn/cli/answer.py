@@ -25,11 +25,6 @@ def batch_exit_code(batch: Batch) -> int:
     return min(codes - {DONE}, default=DONE)
 
 
-def verdict_as_json(outcome: Outcome) -> str:
-    """Return the verdict of a finished run as JSON, for scripts."""
-    return reports.as_json(reports.verdict(outcome.report, outcome.folder))
-
-
 def verdict_in_words(outcome: Outcome) -> str:
     """Return a finished run for a reader: numbers, what to try, and in the end verdict, error and what to open."""
     verdict = reports.verdict(outcome.report, outcome.folder)

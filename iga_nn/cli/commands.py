@@ -371,9 +371,11 @@ def _minus_hint(argv: list[str]) -> str:
 
 def _finish(outcome: Outcome, output: OutputOptions) -> int:
     """Print the verdict and return the exit code."""
+    from ..report import document as reports
     from . import answer
 
-    _print(answer.verdict_as_json(outcome) if output.as_json else answer.verdict_in_words(outcome))
+    verdict = reports.verdict(outcome.report, outcome.folder)
+    _print(reports.as_json(verdict) if output.as_json else answer.verdict_in_words(outcome))
     return answer.exit_code(outcome.report)
 
 

@@ -63,7 +63,8 @@ class View:
 @cache
 def can_draw() -> bool:
     """Return whether VTK can draw here, tried in a child process: without a graphics library it crashes."""
-    _without_display()
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):  # then VTK takes EGL, without trying X and warning
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     probe = [sys.executable, "-P", "-c", PROBE]
     try:
         done = subprocess.run(probe, capture_output=True, timeout=120, check=False).returncode == 0
@@ -80,12 +81,6 @@ def check_drawable(what: str, known: Collection[str]) -> None:
         raise ValueError(f"no figure {what!r}: choose one of {', '.join(known)}")
     if not can_draw():
         raise RuntimeError(CANNOT_DRAW)
-
-
-def _without_display() -> None:
-    """Let VTK use EGL at once where there is no X server, instead of trying X first and warning."""
-    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
 def widest_view(points: Array, tilt: float = 0.0) -> View:
@@ -164,18 +159,16 @@ def _add_lines(plotter: Any, patches: Sequence[Patch], shift: Array) -> None:
     """Draw the parameter lines of the patches, moved by `shift`."""
     import pyvista
 
-    drawn = [row for patch in patches if patch.every for row in _parameter_lines(patch)]
+    drawn = []
+    for patch in patches:
+        if patch.every:  # first the lines of constant first parameter, (k, 3) each
+            drawn += [*patch.points[:: patch.every], *patch.points.transpose(1, 0, 2)[:: patch.every]]
     if not drawn:
         return
     starts = np.cumsum([0, *map(len, drawn)])
     cells = [np.r_[len(row), np.arange(start, start + len(row))] for row, start in zip(drawn, starts, strict=False)]
     lines = pyvista.PolyData(np.concatenate(drawn) + shift, lines=np.concatenate(cells))
     plotter.add_mesh(lines, color="black", line_width=LINE_WIDTH, lighting=False)
-
-
-def _parameter_lines(patch: Patch) -> list[Array]:
-    """Return the lines (k, 3) of constant first parameter, then those of constant second parameter."""
-    return [*patch.points[:: patch.every], *patch.points.transpose(1, 0, 2)[:: patch.every]]
 
 
 def _aim(plotter: Any, points: Array, view: View, pixels: tuple[int, int]) -> None:

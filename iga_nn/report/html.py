@@ -65,9 +65,10 @@ def _bare(report: Report, reason: str) -> str:
 def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
     """Return the page as text."""
     section = reports.solved(report)
+    what = next((title for name, title in SOLVED.items() if name in report), "spline volume")
     return filled(
         "report/page.html",
-        title=f"{Path(report['input']['file']).name}: {_heading(report)}",
+        title=f"{Path(report['input']['file']).name}: {what}",
         report=report,
         verdicts=_verdicts(report),
         facts=_facts(report),
@@ -81,20 +82,11 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
     )
 
 
-def scene_page(scene: dict[str, Any], title: str) -> str:
-    """Return a page with the interactive view alone, to stand in a frame of another page."""
-    return filled("report/scene.html", title=title, scene=scene)
-
-
 def filled(template: str, **content: Any) -> str:
     """Return a template of this package with its content, which is escaped."""
     loader = PackageLoader("iga_nn", "")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     return environment.get_template(template).render(content)
-
-
-def _heading(report: Report) -> str:
-    return next((text for section, text in SOLVED.items() if section in report), "spline volume")
 
 
 def _verdicts(report: Report) -> list[tuple[str, str, str]]:
