@@ -22,9 +22,10 @@ from mesh_files import obj
 from small_run import small_surface, tiny_config
 
 from iga_nn.cli.commands import main as command
+from iga_nn.io.formats import load_volume
 from iga_nn.options import MapOptions
 from iga_nn.workflow.output_folder import RunFolder, has_checkpoint
-from iga_nn.workflow.verdict import check_volume
+from iga_nn.workflow.verdict import certified_facts
 
 FORK = multiprocessing.get_context("fork")
 
@@ -86,7 +87,7 @@ def main() -> int:
         start = time.perf_counter()
         expected = finished(mesh, Path(place, "undisturbed"))
         seconds = time.perf_counter() - start
-        check_volume(Path(place, "undisturbed", "volume.npz"))  # loads what is compiled, for all that follow
+        certified_facts(load_volume(Path(place, "undisturbed", "volume.npz")))  # loads what is compiled, for all
         print(f"undisturbed: {seconds:.1f} s")
         for number in range(options.moments):
             moment = rng.uniform(0.02, 1.0) * seconds

@@ -250,18 +250,22 @@ def check(path: str, /, *, surface: SurfaceOptions = SURFACE, strict: bool = Fal
         path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
         strict: refuse a surface that intersects itself; without this option it is a notice.
     """
-    from ..io.formats import is_volume
+    from ..io.formats import is_volume, load_volume
+    from ..models import resolve
     from ..report import document as reports
-    from ..workflow.verdict import check_surface, check_volume
+    from ..workflow.verdict import certified_facts
     from . import answer
 
     if not is_volume(path):
-        facts = check_surface(path, surface, strict)
+        given = resolve(path, **surface.reading())
+        if strict:
+            given.refuse_crossings()
+        facts = given.summary()
         _print(reports.as_json(facts) if as_json else "accepted\n" + answer.facts_in_words(facts))
         return DONE
     if surface != SURFACE or strict:
         raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")
-    facts = check_volume(path)
+    facts = certified_facts(load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
 

@@ -1,4 +1,4 @@
-"""Says whether a surface is accepted and what is proved of a volume: for `check`, the report and the terminal."""
+"""Says what is proved of a volume: for `check`, the report and the terminal."""
 
 import hashlib
 import logging
@@ -11,30 +11,12 @@ from parameterize.certificate.jacobian import certify
 from parameterize.quality.quality import proved
 from parameterize.spline.volume import BSplineVolume
 
-from ..io.formats import load_volume
-from ..models import resolve
-from ..options import MapOptions, SurfaceOptions
+from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
 from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
-
-
-def check_surface(mesh: str, options: SurfaceOptions, strict: bool = False) -> dict[str, Any]:
-    """Return the section `input` of report.json for a surface that is accepted. Raises MeshError where it is not.
-
-    strict: also refuse a surface that intersects itself.
-    """
-    surface = resolve(mesh, **options.reading())
-    if strict:
-        surface.refuse_crossings()
-    return surface.summary()
-
-
-def check_volume(path: str | Path) -> dict[str, Any]:
-    """Certify a saved volume and return what was proved. Raises InputError for a file that is not a volume."""
-    return certified_facts(load_volume(path))
 
 
 def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
