@@ -10,11 +10,10 @@ from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import BSplineVolume
 
-from .color_range import ColorRange
 from .cutaway import best_cut, octant_label, patches_of, without_octant
 from .evaluate import SECTIONS, all_grids, distortions, face_window, points_on
 from .render import Patch, check_drawable, draw, plain_patch, view_of
-from .style import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, show_section
+from .style import PANEL, SAMPLES, ColorRange, color_bar, colors, name_faces, panels_of, save, show_around, show_section
 
 EVERY = 14  # samples between two parameter lines: a tenth of the cube
 DISTORTION = "tanh(√ARAP / 2), at volume 1"

@@ -10,10 +10,9 @@ from solve import Solution
 from solve.forms.problem import BoundaryValueProblem
 
 from ..levels import EXACT_ERRORS, TITLES
-from .color_range import error_range, even_range
 from .evaluate import SECTIONS, all_grids, points_on, sampled_error, solution_on
 from .render import Patch, check_drawable
-from .style import SAMPLES, color_bar, colors, panels_of, save, show_around, show_section
+from .style import SAMPLES, color_bar, colors, error_range, even_range, panels_of, save, show_around, show_section
 
 
 def draw_error(

@@ -1,13 +1,15 @@
 """Holds what the figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
 
 import io
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 from numpy.typing import NDArray
@@ -15,13 +17,15 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.files import replacing
 
-from .color_range import ColorRange
 from .evaluate import FACE_COLORS, MAP, face_labels
 from .render import Patch, draw, view_of, widest_view
 
 SAMPLES = 141  # per direction of a patch
 PANEL = (900, 700)  # pixels of one view
 NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
+DECADES = 1e-4  # lower end of a logarithmic range over the largest error of the best mesh
+SMALLEST = 1e-200  # smaller fields have no ticks on their colour bar
+ROUNDING = 1e-14  # values whose relative difference is smaller count as one
 
 
 class Picture(Figure):
@@ -74,6 +78,59 @@ def name_faces(figure: Figure) -> None:
         columnspacing=1.2,
         handlelength=1.4,
     )
+
+
+@dataclass(frozen=True)
+class ColorRange:
+    """Hold the limits of a colour scale.
+
+    remark: stands in place of ticks where the field has one value, such as "0 everywhere".
+    """
+
+    low: float
+    high: float
+    logarithmic: bool = False
+    remark: str = ""
+
+    def norm(self) -> Normalize:
+        """Return the range as a new object of matplotlib, which maps values to 0..1; colour bars change theirs."""
+        kind = LogNorm if self.logarithmic else Normalize
+        return kind(self.low, self.high, clip=True)
+
+    def shares(self, values: Array) -> Array:
+        """Return the places of values in the range, 0..1; 0.5 where the field has one value."""
+        if self.remark:
+            return np.full(np.shape(values), 0.5)
+        return np.asarray(self.norm()(np.ravel(values))).reshape(np.shape(values))
+
+    @property
+    def labels(self) -> tuple[str, str]:
+        """Return the texts at the two ends of a legend."""
+        form = "{:.1e}" if self.logarithmic else "{:.3g}"
+        return (self.remark, "") if self.remark else (form.format(self.low), form.format(self.high))
+
+
+def even_range(values: Sequence[Array]) -> ColorRange:
+    """Return the range from the lowest to the highest of all values."""
+    low, high = min(float(patch.min()) for patch in values), max(float(patch.max()) for patch in values)
+    size = max(abs(low), abs(high))
+    if size < SMALLEST:
+        return ColorRange(0.0, 1.0, remark=_smaller(size))
+    if high - low <= ROUNDING * size:
+        return ColorRange(0.0, 1.0, remark=f"{high:.4g} everywhere")
+    return ColorRange(low, high)
+
+
+def error_range(meshes: Sequence[Sequence[Array]]) -> ColorRange:
+    """Return a logarithmic range: from four decades below the largest error of the best mesh to that of the worst."""
+    tops = [max(float(error.max()) for error in errors) for errors in meshes]
+    if max(tops) < SMALLEST:
+        return ColorRange(0.0, 1.0, remark=_smaller(max(tops)))
+    return ColorRange(DECADES * min(top for top in tops if top >= SMALLEST), max(tops), logarithmic=True)
+
+
+def _smaller(size: float) -> str:
+    return f"below {size:.0e} everywhere" if size > 0.0 else "0 everywhere"
 
 
 def colors(values: Array, limits: ColorRange) -> Array:

@@ -18,9 +18,9 @@ from parameterize.spline.volume import BSplineVolume
 from solve import SplineField
 
 from ..figures import evaluate
-from ..figures.color_range import ColorRange, error_range, even_range
 from ..figures.evaluate import distortions, points_on, solution_on
 from ..figures.render import TILT, widest_view
+from ..figures.style import ColorRange, error_range, even_range
 from ..options import Equation
 
 SAMPLES = 81  # per direction of a patch
