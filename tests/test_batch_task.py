@@ -22,7 +22,7 @@ def told(monkeypatch):
 
 
 def task(mesh="cube", options=PoissonOptions(refine=(0,))):  # noqa: B008 - frozen
-    return Task(mesh, Path("out"), MapOptions(resume=True), options)
+    return Task(mesh, mesh, Path("out"), MapOptions(resume=True), options)
 
 
 def test_a_surface_leaves_what_run_leaves_and_tells_its_steps(told, formula_training, in_folder):

@@ -222,10 +222,11 @@ def _count(text: str) -> int | Literal["auto"]:
 # Models
 
 
-def _tasks(options: Options, leave_out: Sequence[str]) -> dict[str, Task]:
-    """The runs, by model."""
-    return {
-        name: Task(
+def _tasks(options: Options, leave_out: Sequence[str]) -> list[Task]:
+    """The runs of the models."""
+    return [
+        Task(
+            name,
             str(_file(name, options.models).absolute()),
             (options.out / name).absolute(),
             options.mapping,
@@ -233,7 +234,7 @@ def _tasks(options: Options, leave_out: Sequence[str]) -> dict[str, Task]:
         )
         for name in options.names
         if name not in leave_out
-    }
+    ]
 
 
 def _file(name: str, folder: Path) -> Path:

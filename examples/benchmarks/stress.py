@@ -152,11 +152,11 @@ def _parser() -> argparse.ArgumentParser:
 # Surfaces
 
 
-def _tasks(options: Options) -> dict[str, Task]:
-    """The runs, by the surface's name; its worker makes the mesh."""
+def _tasks(options: Options) -> list[Task]:
+    """The runs; the worker makes the mesh."""
     out = options.out.absolute()
     names = [f"{number:03d}-{kind_of(number)}" for number in options.numbers]
-    return {name: Task(str(out / "surfaces" / f"{name}.obj"), out / name, options.mapping, None) for name in names}
+    return [Task(name, str(out / "surfaces" / f"{name}.obj"), out / name, options.mapping, None) for name in names]
 
 
 def row_of(known: Known, options: Options) -> Row:

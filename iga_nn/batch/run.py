@@ -15,7 +15,7 @@ from ..workflow import pipeline
 from ..workflow.cost_estimate import warn_of_memory
 from ..workflow.output_folder import forget, locked, writable
 from ..workflow.watched import Ended
-from .surfaces import Entry, entries_of
+from .surfaces import entries_of
 from .table import Batch, Row, page
 from .task import Task, Work, compute
 
@@ -100,16 +100,15 @@ def run_batch(
     pipeline.checked(mapping, options)
     if out == "":
         raise InputError("out is empty: name a folder")
-    entries = entries_of([str(surface) for surface in surfaces], Path(out))
     corners = None if mapping.corners is None else mapping.corners.absolute()
     common = replace(mapping, corners=corners, resume=True)
-    tasks = [Task(entry.mesh, entry.folder, common, options, vector) for entry in entries]
-    return run_tasks(Path(out), entries, tasks, workers or WorkerOptions(), force=force, progress=progress)
+    entries = entries_of([str(surface) for surface in surfaces], Path(out))
+    tasks = [Task(entry.name, entry.mesh, entry.folder, common, options, vector) for entry in entries]
+    return run_tasks(Path(out), tasks, workers or WorkerOptions(), force=force, progress=progress)
 
 
 def run_tasks(
     out: Path,
-    entries: Sequence[Entry],
     tasks: Sequence[Task],
     workers: WorkerOptions,
     *,
@@ -117,7 +116,7 @@ def run_tasks(
     progress: Progress | None = None,
     work: Work = compute,
 ) -> Batch:
-    """Compute tasks, one for each entry, as `run_batch` does; their options may differ.
+    """Compute tasks as `run_batch` does; their options may differ.
 
     work: a function of a module that the workers can import; it calls `compute` with its arguments.
     """
@@ -125,19 +124,19 @@ def run_tasks(
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
     with locked(out):
-        batch = Batch(out, tuple(_found(entry, task, force) for entry, task in zip(entries, tasks, strict=True)))
+        batch = Batch(out, tuple(_found(task, force) for task in tasks))
         if "waiting" in batch.counts:
             return _computed(batch, tasks, workers, progress or (lambda *_: None), work)
         _write(batch)
         return batch
 
 
-def _found(entry: Entry, task: Task, force: bool) -> Row:
+def _found(task: Task, force: bool) -> Row:
     """Return the row of a surface as its folder is: finished, refused because of what is in it, or still to compute."""
-    row = Row(entry)
+    row = Row(task)
     try:
         if force:
-            forget(entry.folder)
+            forget(task.folder)
             return row
         finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.options, vector=task.vector)
     except expected_errors() as error:

@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from parameterize.progress import Progress
@@ -12,6 +11,7 @@ from ..options import MapOptions, ProblemOptions
 from ..workflow import pipeline
 from ..workflow.output_folder import Outcome
 from ..workflow.watched import Ended, ended, logged, told
+from .surfaces import Entry
 
 LESS_MEMORY = "give workers more --memory-limit, or lower --control-points or --refine"
 
@@ -19,14 +19,12 @@ _stopped: set[str] = set()  # batches that were interrupted
 
 
 @dataclass(frozen=True)
-class Task:
-    """Hold all that the result of one surface depends on, and the folder it goes to.
+class Task(Entry):
+    """Hold a surface of a batch and all that its result depends on.
 
     options: those of the problem to solve, None to parameterize the surface alone. vector: write curves as PDF, too.
     """
 
-    mesh: str
-    folder: Path
     mapping: MapOptions
     options: ProblemOptions | None
     vector: bool = False
