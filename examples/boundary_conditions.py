@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import iga_nn
-from iga_nn.figures import draw_values
 from iga_nn.figures.render import can_draw
+from iga_nn.figures.solution import draw_values
 from parameterize.spline.bspline import greville, open_uniform_knots
 
 OUTER, COOLING = 2.0, 2.0  # radius of the outer wall, that of the inner one being 1; heat transfer to the air

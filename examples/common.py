@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import iga_nn
-from iga_nn.figures import draw_values
 from iga_nn.figures.render import can_draw
+from iga_nn.figures.solution import draw_values
 
 
 def twisted_column(n: int = 6) -> iga_nn.BSplineVolume:

@@ -16,9 +16,8 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import iga_nn
-from iga_nn.figures import draw_study
-from iga_nn.figures.curves import Study
-from iga_nn.report.tables import as_csv, as_table
+from iga_nn.figures.curves import draw_study
+from iga_nn.levels import Study, as_csv, as_table
 from solve.study import benchmark_volume
 
 PROBLEM = iga_nn.Poisson(exact="exp(x+z)*sin(y)")

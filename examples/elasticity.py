@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import iga_nn
-from iga_nn.figures import draw_values
 from iga_nn.figures.render import can_draw
+from iga_nn.figures.solution import draw_values
 
 LENGTH, THICKNESS, YOUNG, WEIGHT = 8.0, 1.0, 1000.0, 0.05
 

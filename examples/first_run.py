@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import iga_nn
-from iga_nn.figures import draw_faces
+from iga_nn.figures.map import draw_faces
 from iga_nn.figures.render import can_draw
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import iga_nn
-from iga_nn.figures import draw_faces
+from iga_nn.figures.map import draw_faces
 from iga_nn.figures.render import can_draw
 
 

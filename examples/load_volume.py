@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 import iga_nn
-from iga_nn.figures import draw_error
 from iga_nn.figures.render import can_draw
+from iga_nn.figures.solution import draw_error
 
 
 def write_column(folder: Path, n: int = 10) -> Path:

@@ -1,12 +1,10 @@
 """Takes a closed surface mesh to a solved PDE on a certified trivariate B-spline.
 
 docs/method.md explains the map and its certificate with formulas, docs/solver.md the discretisation and its
-preconditioner, `iga_nn.io.formats` the files.
+preconditioner, docs/output.md the files.
 
 The public names are loaded on first use: importing the package loads neither torch nor VTK.
 """
-
-from __future__ import annotations
 
 import os
 from importlib import import_module
@@ -35,7 +33,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "SplineField": "solve",
     "Surface": "parameterize.surface.surface",
     "System": "solve",
-    "WorkerOptions": "iga_nn.batch.options",
+    "WorkerOptions": "iga_nn.options",
     "certify": "parameterize.certificate.jacobian",
     "convergence": "solve",
     "discretize": "solve",

@@ -16,7 +16,6 @@ from solve import convergence as convergence
 from solve import discretize as discretize
 from solve import solve_problem
 
-from .batch.options import WorkerOptions as WorkerOptions
 from .batch.run import run_batch as run_batch
 from .errors import InputError as InputError
 from .io.formats import export as export
@@ -24,6 +23,7 @@ from .io.formats import load_volume as load_volume
 from .options import ElasticityOptions as ElasticityOptions
 from .options import MapOptions as MapOptions
 from .options import PoissonOptions as PoissonOptions
+from .options import WorkerOptions as WorkerOptions
 from .samples import sample as sample
 from .version import __version__ as __version__
 from .workflow.pipeline import run as run

@@ -1,7 +1,5 @@
 """Holds the errors that the user's input causes, and puts them in one line."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

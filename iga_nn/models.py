@@ -1,7 +1,5 @@
 """Finds surfaces by name: a path, a sample, or a published model in the folder IGA_NN_DATA or in its repository."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,11 +24,6 @@ class Model:
 
     path: str
     sha256: str
-
-    @property
-    def url(self) -> str:
-        """Return the address of the raw file."""
-        return f"{RAW}/{self.path}"
 
 
 _ROWS = (files(__package__) / "models.txt").read_text(encoding="utf-8").splitlines()
@@ -68,17 +61,11 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
 
 
 def fetch_all(name: str, out: str | Path | None = None, *, force: bool = False) -> Iterator[Path]:
-    """Write the model of that name, or, for "g1", one after the other those of the set G1; yield the paths.
-
-    Raises as `fetch` does, and where `out` is given for the whole set.
-    """
-    if name != SET:
-        yield fetch(name, out, force=force)
-        return
-    if out is not None:
+    """Write the model of that name, or, for "g1", those of the set G1; yield the paths. Raises as `fetch` does."""
+    if name == SET and out is not None:
         raise InputError(f"{SET}: is a set of models, each written to NAME.obj: leave --out out")
-    for model in in_set():
-        yield fetch(model, force=force)
+    for model in in_set() if name == SET else [name]:
+        yield fetch(model, out, force=force)
 
 
 def in_set() -> list[str]:
@@ -117,19 +104,20 @@ def _download(name: str) -> Path:
     import pooch
 
     model = MODELS[name]
+    url, file = f"{RAW}/{model.path}", Path(model.path).name
     pooch.get_logger().setLevel("WARNING")
     try:
         path = pooch.retrieve(
-            model.url,
+            url,
             known_hash=f"sha256:{model.sha256}",
             path=pooch.os_cache("iga-nn"),
-            fname=Path(model.path).name,
+            fname=file,
             downloader=pooch.HTTPDownloader(timeout=TIMEOUT),
         )
     except (OSError, ValueError) as error:  # no network, or not the file with this checksum
         reason = "no connection" if "Connect" in type(error).__name__ else str(error).splitlines()[0][:120]
         raise InputError(
-            f"{name}: cannot be downloaded from {model.url} ({reason}): "
-            f"put {Path(model.path).name} into a folder and set {DATA_FOLDER} to that folder"
+            f"{name}: cannot be downloaded from {url} ({reason}): "
+            f"put {file} into a folder and set {DATA_FOLDER} to that folder"
         ) from None
     return Path(path)

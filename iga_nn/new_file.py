@@ -1,7 +1,5 @@
 """Checks the name of a file that a command writes, and writes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from parameterize.files import save_bytes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, fields
@@ -13,12 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 from .errors import InputError, input_errors
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from parameterize.config import Config
     from parameterize.spline.volume import BSplineVolume
     from solve import Elasticity, Poisson, Problem
-    from solve.forms.frame import UnitFrame
 
 Equation: TypeAlias = "Poisson | Elasticity | Problem"
 Formula = str  # one that starts with a minus is written --option=-x
@@ -27,9 +23,8 @@ MAX_CONTROL_POINTS = 100  # per direction
 MAX_REFINE = 6
 MAX_DEGREE = 8
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
-_CORNERS_BYTES = 65_536
-_LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
-_LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
+MAX_WORKERS = 256  # on one machine
+_LOCAL = ("workers", "threads_per_worker", "memory_limit")  # mean nothing for the workers of another scheduler
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,6 +311,46 @@ class ElasticityStudyOptions(StudyOptions):
         return own.problem()
 
 
+@dataclass(frozen=True, kw_only=True)
+class WorkerOptions:
+    """Say which workers compute the surfaces of a batch.
+
+    Attributes:
+        workers: worker processes on this machine; each computes one surface at a time.
+        threads_per_worker: threads that a surface is computed with; the result does not depend on them.
+        memory_limit: memory of a worker, such as 4GiB; one that takes more is ended, and 0 sets no limit.
+        retries: how often a surface goes on from its checkpoint after its worker was lost or its run failed.
+        scheduler: address of a dask scheduler, such as tcp://host:8786, whose workers compute instead of workers on
+            this machine; they must see the same folders under the same paths.
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.WorkerOptions(workers=4, memory_limit="2GiB").retries
+        1
+    """
+
+    workers: int = 2
+    threads_per_worker: int = 1
+    memory_limit: str = "4GiB"
+    retries: int = 1
+    scheduler: str | None = None
+
+    def check(self) -> None:
+        """Raise InputError for values that cannot be run; the memory limit is read where the workers start."""
+        for name in ("workers", "threads_per_worker"):
+            if not 1 <= getattr(self, name) <= MAX_WORKERS:
+                flag = name.replace("_", " ")
+                raise InputError(f"{flag} {getattr(self, name)}: must lie between 1 and {MAX_WORKERS}")
+        if self.retries < 0:
+            raise InputError(f"retries {self.retries}: must not be negative")
+        if self.scheduler == "":
+            raise InputError("scheduler is empty: give its address, such as tcp://host:8786")
+        given = [field.name for field in fields(self) if getattr(self, field.name) != field.default]
+        if self.scheduler is not None and (local := [name for name in _LOCAL if name in given]):
+            flag = "--" + local[0].replace("_", "-")
+            raise InputError(f"{flag}: is for workers on this machine; leave it out with --scheduler")
+
+
 def _check_count(name: str, count: int, fewest: int) -> None:
     """Raise InputError for a number of control points that cannot be run."""
     if not fewest <= count <= MAX_CONTROL_POINTS:
@@ -372,38 +407,3 @@ def _faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
 
 def _vector(text: str | None) -> list[str] | None:
     return None if text is None else text.split(";")
-
-
-def read_corners(path: Path, frame: UnitFrame | None = None) -> np.ndarray[Any, Any]:
-    """Return eight points (8, 3) in the surface's units or eight vertex numbers (8,) from a JSON file.
-
-    frame: that of the surface; where it is known, the file may hold {"XYZ": [...]}, points in scaled coordinates.
-    Raises InputError.
-    """
-    import numpy as np
-
-    try:
-        with path.open(encoding="utf-8") as stream:
-            given = json.loads(stream.read(_CORNERS_BYTES))
-        scaled = frame if isinstance(given, dict) and list(given) == ["XYZ"] else None
-        rows = np.array(given["XYZ"] if scaled else given, dtype=object)
-        if any(isinstance(number, bool) for number in rows.flat):
-            raise TypeError
-        rows = np.array(rows.tolist(), dtype=np.float64)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, TypeError, OverflowError, RecursionError):
-        expected = 'a JSON list of eight points or of eight vertex numbers, or {"XYZ": eight points}'
-        raise InputError(f"{path}: corners must be {expected}") from None
-    if rows.shape not in ((8, 3), (8,)) or not np.all(np.abs(rows) <= _LARGEST_COORDINATE):  # also refuses NaN
-        raise InputError(
-            f"{path}: corners must be eight points of three finite coordinates or eight vertex numbers, "
-            f"found an array of shape {rows.shape}"
-        )
-    if rows.shape == (8, 3):
-        return scaled.to_units(rows) if scaled else rows
-    if scaled:
-        raise InputError(f"{path}: XYZ must hold eight points of three coordinates; vertex numbers stand in a list")
-    if np.any(rows != np.rint(rows)) or np.abs(rows).max() > _LARGEST_WHOLE:
-        raise InputError(f"{path}: vertex numbers must be whole and at most {_LARGEST_WHOLE}")
-    return rows.astype(np.int64)

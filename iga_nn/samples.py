@@ -1,7 +1,5 @@
 """Makes small closed surfaces by formula, for the demo and the tests: the same numbers every time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

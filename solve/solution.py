@@ -153,4 +153,4 @@ class Solution(SplineField, Shown):
         what: "values", or "error" where the problem has an exact solution. file: PNG to write the figure to, too.
         Raises ValueError for another name or without an exact solution, RuntimeError where VTK cannot draw here.
         """
-        return above("figures.plot").plot_solution(self, what, file)
+        return above("figures.solution").plot_solution(self, what, file)

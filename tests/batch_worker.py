@@ -14,7 +14,6 @@ from types import FunctionType
 
 from small_run import FEW, tiny_config
 
-from iga_nn.batch import task as batch_task
 from iga_nn.options import MapOptions
 from iga_nn.workflow import pipeline
 from iga_nn.workflow.output_folder import RunFolder
@@ -23,8 +22,8 @@ from parameterize.quality.distances import SampledBoundary
 HOLD = "corners"  # the stage, after some checkpoints
 
 
-def followed_run(compute, task, progress):
-    mesh = Path(task.mesh)
+def followed_run(run, name, folder, progress, **given):
+    mesh = Path(name)
     if mesh.stem == "hungry":
         taken = []
         while True:
@@ -42,11 +41,11 @@ def followed_run(compute, task, progress):
                 progress(now)
                 time.sleep(0.05)
 
-    return compute(task, followed)
+    return run(name, folder, progress=followed, **given)
 
 
-if isinstance(batch_task._run, FunctionType):  # dask loads this file more than once
-    batch_task._run = partial(followed_run, batch_task._run)
+if isinstance(pipeline.parameterize_to, FunctionType):  # dask loads this file more than once
+    pipeline.parameterize_to = partial(followed_run, pipeline.parameterize_to)
     MapOptions.config = lambda _: tiny_config()
     SampledBoundary.of.__func__.__defaults__ = FEW
     RunFolder.draw = lambda *_, **__: None

@@ -173,8 +173,8 @@ def in_folder(
     empty files.
     """
     if request.node.get_closest_marker("pictures") is None:
-        monkeypatch.setattr("iga_nn.figures.can_draw", lambda: False)
-        monkeypatch.setattr("iga_nn.figures.picture.Picture.savefig", lambda _, path: Path(path).touch())
+        monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: False)
+        monkeypatch.setattr("iga_nn.figures.style.Picture.savefig", lambda _, path, **__: Path(path).touch())
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -17,10 +17,13 @@ EXAMPLES = Path(iga_nn.__file__).resolve().parents[1] / "examples"
 
 
 def load(name: str) -> ModuleType:
-    file = EXAMPLES / f"{name}.py"
+    return load_file(EXAMPLES / f"{name}.py")
+
+
+def load_file(file: Path) -> ModuleType:
     if str(file.parent) not in sys.path:
         sys.path.append(str(file.parent))  # as it is for a script: its neighbours can be imported
-    spec = importlib.util.spec_from_file_location(f"example_{name}", file)
+    spec = importlib.util.spec_from_file_location(f"example_{file.stem}", file)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses look their module up
     spec.loader.exec_module(module)

@@ -40,10 +40,11 @@ from mesh_files import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagge
 
 from iga_nn.errors import InputError, input_errors, one_line
 from iga_nn.io import splinepy as spline_files
-from iga_nn.io.formats import is_volume
-from iga_nn.options import SurfaceOptions, read_corners
+from iga_nn.io.formats import is_volume, load_volume
+from iga_nn.models import resolve
 from iga_nn.samples import sample
-from iga_nn.workflow.verdict import check_surface, check_volume
+from iga_nn.workflow.mapping import read_corners
+from iga_nn.workflow.verdict import certified_facts
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
@@ -226,9 +227,9 @@ def file_of(reader, seed, number, count):
 def check(path):
     """What `iga-nn check` does."""
     if is_volume(path):
-        check_volume(path)
+        certified_facts(load_volume(path))
     else:
-        check_surface(str(path), SurfaceOptions())
+        resolve(str(path)).summary()
 
 
 def given(read):

@@ -21,12 +21,13 @@ import torch._dynamo  # Adam would load it in every process
 from mesh_files import obj
 from small_run import FEW, small_surface, tiny_config
 
-import iga_nn.figures.picture  # the figures are not drawn, but matplotlib is loaded
+import iga_nn.figures.style  # the figures are not drawn, but matplotlib is loaded
 import iga_nn.report.html  # noqa: F401 the children would load it one by one
 from iga_nn.cli.commands import main as command
+from iga_nn.io.formats import load_volume
 from iga_nn.options import MapOptions
 from iga_nn.workflow.output_folder import RunFolder, has_checkpoint
-from iga_nn.workflow.verdict import check_volume
+from iga_nn.workflow.verdict import certified_facts
 from parameterize.quality.distances import SampledBoundary
 
 FORK = multiprocessing.get_context("fork")
@@ -90,7 +91,7 @@ def main() -> int:
         start = time.perf_counter()
         expected = finished(mesh, Path(place, "undisturbed"))
         seconds = time.perf_counter() - start
-        check_volume(Path(place, "undisturbed", "volume.npz"))  # loads what is compiled, for all that follow
+        certified_facts(load_volume(Path(place, "undisturbed", "volume.npz")))  # loads what is compiled, for all
         print(f"undisturbed: {seconds:.1f} s")
         for number in range(options.moments):
             moment = rng.uniform(0.02, 1.0) * seconds

@@ -13,8 +13,8 @@ from mesh_files import obj
 from small_run import small_surface
 
 from iga_nn.batch import cluster
-from iga_nn.batch.options import WorkerOptions
 from iga_nn.errors import InputError
+from iga_nn.options import WorkerOptions
 
 
 @pytest.mark.parametrize(

@@ -16,12 +16,11 @@ from conftest import formula_parameterization
 from PIL import Image
 
 import iga_nn
-from iga_nn.batch.page import page
 from iga_nn.batch.surfaces import Entry
-from iga_nn.batch.table import Batch, Row
-from iga_nn.batch.task import Ended
+from iga_nn.batch.table import Batch, Row, page
 from iga_nn.cli.answer import batch_exit_code
 from iga_nn.options import PoissonOptions
+from iga_nn.workflow.watched import Ended
 
 
 def row(name, folder=Path("out"), how=None):

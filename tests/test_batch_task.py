@@ -8,6 +8,7 @@ import pytest
 from iga_nn.batch import task as batch_task
 from iga_nn.batch.task import Task, compute
 from iga_nn.options import MapOptions, PoissonOptions
+from iga_nn.workflow import watched
 
 
 @pytest.fixture
@@ -15,12 +16,13 @@ def told(monkeypatch):
     messages = []
     worker = SimpleNamespace(log_event=lambda topic, message: messages.append((topic, message)))
     monkeypatch.setattr("distributed.get_worker", lambda: worker)
-    monkeypatch.setattr(batch_task, "INTERVAL", 0.0)
+    monkeypatch.setattr(watched, "INTERVAL", 0.0)
+    monkeypatch.setattr(watched, "SHARE", float("inf"))
     return messages
 
 
 def task(mesh="cube", options=PoissonOptions(refine=(0,))):  # noqa: B008 - frozen
-    return Task(mesh, Path("out"), MapOptions(resume=True), options)
+    return Task(mesh, mesh, Path("out"), MapOptions(resume=True), options)
 
 
 def test_a_surface_leaves_what_run_leaves_and_tells_its_steps(told, formula_training, in_folder):
@@ -48,7 +50,8 @@ def test_refusals_and_failures_are_lines(told, formula_training, in_folder, caps
         assert ended.state == "failed" and ended.line.startswith("out of memory: ")
     formula_training(error=RuntimeError("two\nlines"))
     ended = compute(task(), 0, "batch")
-    assert ended.state == "failed" and ended.line == "internal error, please report it: RuntimeError: two lines"
+    internal = "internal error, please report it: RuntimeError: two lines; the terminal shows the traceback"
+    assert ended.state == "failed" and ended.line == internal
     assert capsys.readouterr().err.count("Traceback") == 1
 
 

@@ -183,7 +183,8 @@ def test_what_went_on_from_a_checkpoint_has_no_time(formula):
 
 
 def test_a_solve_that_does_not_converge_is_a_status(formula, monkeypatch):
-    monkeypatch.setattr(solve, "solve_problem", partial(solve.solve_problem, max_iterations=1))
+    stopped = partial(solve.solve_problem, max_iterations=1)
+    monkeypatch.setattr("iga_nn.workflow.solving.solve_problem", stopped)
     assert g1.main(formula) == 1
     row = table(Path("out"))["duck"]
     assert "did not converge" in row["status"] and row["iterations_refine_0"] == "1"
@@ -193,7 +194,10 @@ def test_a_failure_is_a_row(formula, formula_training, capsys):
     formula_training(error=RuntimeError("no idea\nwhy"))
     assert g1.main(formula) == 1
     row = table(Path("out"))["duck"]
-    assert row["status"] == "internal error, please report it: RuntimeError: no idea why" and row["verdict"] == ""
+    assert (
+        row["status"] == "internal error, please report it: RuntimeError: no idea why; the terminal shows the traceback"
+        and row["verdict"] == ""
+    )
     assert "Traceback" in capsys.readouterr().err
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
-from rich.progress import Progress as Bar
 
 from iga_nn.batch.run import Running
 from iga_nn.batch.surfaces import Entry
 from iga_nn.batch.table import Batch, Row
 from iga_nn.cli import progress
+from parameterize.progress import Progress
 
 RUNNING = [Running("bean", "cube", 0.4), Running("duck", "spline", 0.9)]
 
@@ -21,26 +21,38 @@ def batch(*states):
 
 
 def test_one_bar_shows_how_many_ended_and_how_far_the_others_are():
-    with Bar(console=Console(file=io.StringIO())) as bar:
-        show = progress.batch_bar(bar)
-        show(batch("waiting", "waiting", "waiting", "certified"), [])
-        (task,) = bar.tasks
+    out = io.StringIO()
+    display = progress.Display(Console(file=out, force_terminal=True))
+    with display.bar:
+        progress.tell_batch(display.show, batch("waiting", "waiting", "waiting", "certified"), [])
+        (task,) = display.bar.tasks
         assert (task.completed, task.total, task.fields["state"]) == (1, 4, "workers start")
-        show(batch("waiting", "waiting", "refused", "certified"), RUNNING)
+        progress.tell_batch(display.show, batch("waiting", "waiting", "refused", "certified"), RUNNING)
         assert task.completed == pytest.approx(3.3) and task.fields["ended"] == "2/4"
         assert task.fields["state"] == "bean cube 40%, duck spline 90%"
-        show(batch("certified", "failed", "refused", "certified"), [])
+        display.bar.refresh()
+        progress.tell_batch(display.show, batch("certified", "failed", "refused", "certified"), [])
         assert task.completed == task.total == 4 and task.fields["state"] == ""
+    assert "duck spline 90%" in out.getvalue() and "surfaces;" not in out.getvalue()  # no lines beside the bar
 
 
 def test_plain_lines_come_every_ten_seconds(monkeypatch):
     now = [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
     out = io.StringIO()
-    show = progress.PlainBatchLines(Console(file=out, width=200))
+    display = progress.Display(Console(file=out, width=200))
     for now[0] in (1.0, 9.0, 11.0, 12.0, 22.0):
-        show(batch("waiting", "waiting", "certified"), RUNNING)
+        progress.tell_batch(display.show, batch("waiting", "waiting", "certified"), RUNNING)
     assert out.getvalue() == 2 * "1 of 3 surfaces; bean cube 40%, duck spline 90%\n"
+
+
+def test_a_run_has_a_line_for_every_stage():
+    out = io.StringIO()
+    display = progress.Display(Console(file=out, width=200))
+    for stage, step in (("cube", 0), ("cube", 1), ("edges", 0)):
+        progress.tell_run(display.show, Progress(stage, step, 5, 0.5, 1, 61.0))
+    rest = "/5, 1 fold, 1:01 left, then the spline fit, loss 5.000e-01"
+    assert out.getvalue().splitlines() == [f"cube     step 0{rest}", f"edges    step 0{rest}"]
 
 
 @pytest.mark.parametrize("quiet", [True, False])

@@ -10,7 +10,7 @@ from conftest import formula_parameterization
 from matplotlib.image import imread
 
 import iga_nn
-from iga_nn import figures
+from iga_nn.figures.map import draw_distortion
 from iga_nn.figures.render import can_draw
 from iga_nn.report.notebook import as_html
 from parameterize.surface.surface import surface_from_arrays
@@ -88,7 +88,7 @@ def test_plots_are_the_figures_of_the_report(solution, tmp_path, small_views):
         pytest.skip("VTK cannot draw on this machine")
     volume = solution.geometry
     shown = volume.plot("distortion", tmp_path / "shown.png")
-    figures.draw_distortion(tmp_path / "report.png", volume)
+    draw_distortion(tmp_path / "report.png", volume)
     assert np.array_equal(imread(tmp_path / "shown.png"), imread(tmp_path / "report.png"))
     assert shown._repr_png_().startswith(b"\x89PNG")
     assert [axes.get_title() for axes in solution.plot("error").axes][3:6] == ["u = 1/2", "v = 1/2", "w = 1/2"]
@@ -98,11 +98,11 @@ def test_plots_are_the_figures_of_the_report(solution, tmp_path, small_views):
 def test_plots_that_cannot_be_are_refused(solution, monkeypatch):
     with pytest.raises(ValueError, match="no figure 'face': choose one of faces, lines, cut, distortion"):
         solution.geometry.plot("face")
-    monkeypatch.setattr("iga_nn.figures.plot.can_draw", lambda: True)
+    monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: True)
     unknown = solve_problem(benchmark_volume(1), Poisson(source="1", boundary="0"))
     with pytest.raises(ValueError, match="no exact solution"):
         unknown.plot("error")
-    monkeypatch.setattr("iga_nn.figures.plot.can_draw", lambda: False)
+    monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: False)
     with pytest.raises(RuntimeError, match="cannot draw on this machine; remedy: "):
         solution.plot()
 

@@ -13,7 +13,7 @@ from documents import documented_names
 import iga_nn
 
 
-@pytest.mark.parametrize("name", ["parameterize", "solve", "iga_nn.io.formats"])
+@pytest.mark.parametrize("name", ["parameterize", "solve"])
 def test_examples_run(name, in_folder):
     parser, runner = doctest.DocTestParser(), doctest.DocTestRunner()
     runner.run(parser.get_doctest(import_module(name).__doc__, {}, name, name, 0))

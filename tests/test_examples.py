@@ -17,7 +17,7 @@ from small_run import shortened
 import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.figures.render import can_draw
-from iga_nn.options import read_corners
+from iga_nn.workflow.mapping import read_corners
 from parameterize.display import Shown
 from solve.study import benchmark_volume
 

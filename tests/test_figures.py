@@ -11,12 +11,14 @@ from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.image import imread
 
 import solve
-from iga_nn import figures as plotting
 from iga_nn.cli.commands import main
+from iga_nn.figures import curves
 from iga_nn.figures import cutaway as octant
 from iga_nn.figures import evaluate as sampling
+from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
-from iga_nn.report.figures import draw_figures
+from iga_nn.figures import solution as solution_figures
+from iga_nn.workflow.output_folder import RunFolder
 from solve.study import benchmark_volume
 
 
@@ -33,16 +35,16 @@ def colored_share(path) -> float:
 
 
 def test_history_marks_the_stages(tmp_path):
-    plotting.draw_history(tmp_path / "history.png", formula_parameterization().history)
+    curves.draw_history(tmp_path / "history.png", formula_parameterization().history)
     assert colored_share(tmp_path / "history.png") > 0.001
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
 
 
 def test_map_figures_show_the_map(tmp_path, drawing, small_views):
     volume = benchmark_volume(4)
-    plotting.draw_faces(tmp_path / "faces.png", volume)
-    plotting.draw_distortion(tmp_path / "distortion.png", volume)
-    plotting.draw_lines(tmp_path / "lines.png", volume)
+    map_figures.draw_faces(tmp_path / "faces.png", volume)
+    map_figures.draw_distortion(tmp_path / "distortion.png", volume)
+    map_figures.draw_lines(tmp_path / "lines.png", volume)
     assert colored_share(tmp_path / "faces.png") > 0.1
     assert colored_share(tmp_path / "distortion.png") > 0.1
 
@@ -56,8 +58,8 @@ def hue_share(path, color) -> float:
 
 def test_lines_leave_the_faces_their_colours(tmp_path, drawing):
     volume = benchmark_volume(2)
-    plotting.draw_faces(tmp_path / "faces.png", volume)
-    plotting.draw_lines(tmp_path / "lines.png", volume)
+    map_figures.draw_faces(tmp_path / "faces.png", volume)
+    map_figures.draw_lines(tmp_path / "lines.png", volume)
     assert all(hue_share(tmp_path / "lines.png", color) > 0.01 for color in sampling.FACE_COLORS)
     faces, lines = (imread(tmp_path / name)[60:, :, :3] for name in ("faces.png", "lines.png"))  # below the titles
     assert 0.02 < np.mean(np.abs(faces - lines).max(axis=-1) > 0.1) < 0.2
@@ -65,7 +67,7 @@ def test_lines_leave_the_faces_their_colours(tmp_path, drawing):
 
 def test_cut_shows_the_inside(tmp_path, drawing):
     volume = benchmark_volume(2)
-    plotting.draw_cut(tmp_path / "cut.png", volume)
+    map_figures.draw_cut(tmp_path / "cut.png", volume)
     left = imread(tmp_path / "cut.png")[:, :450, :3]
     inside = np.array(to_rgb(octant.INSIDE))
     brightness = left.mean(axis=-1, keepdims=True)
@@ -91,7 +93,7 @@ def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
 def test_error_figure_also_where_the_error_is_rounding(tmp_path, drawing, small_views):
     volume = benchmark_volume(4)
     problem = solve.Poisson(exact="x")
-    plotting.draw_error(tmp_path / "error.png", volume, solve.solve_problem(volume, problem), problem)
+    solution_figures.draw_error(tmp_path / "error.png", volume, solve.solve_problem(volume, problem), problem)
     assert colored_share(tmp_path / "error.png") > 0.05
 
 
@@ -108,7 +110,7 @@ def test_the_error_of_vectors_is_a_length():
 def test_study_has_a_curve_a_degree(tmp_path):
     problem = solve.Poisson(exact="x*y*z")
     study = {degree: solve.convergence(benchmark_volume(2), problem, (0, 1), degree) for degree in (2, 3)}
-    plotting.draw_study(tmp_path / "study.png", study)
+    curves.draw_study(tmp_path / "study.png", study)
     image = imread(tmp_path / "study.png")[..., :3]
     for color in sampling.FACE_COLORS[:2]:
         assert np.count_nonzero(np.abs(image - to_rgb(color)).max(axis=-1) < 0.02) > 100
@@ -117,7 +119,7 @@ def test_study_has_a_curve_a_degree(tmp_path):
 def test_a_study_draws_relative_errors_beside_absolute_ones():
     volume, problem = benchmark_volume(2), solve.Poisson(exact="1000*exp(x)*y*z")
     levels = solve.convergence(volume, problem, (0, 1))
-    figure = plotting.draw_study(None, {3: levels})
+    figure = curves.draw_study(None, {3: levels})
     figure.draw_without_rendering()
     for panel, name, relative in zip(figure.axes, ("l2", "h1_seminorm"), ("l2_relative", "h1_relative"), strict=True):
         (absolute,) = panel.child_axes
@@ -127,15 +129,15 @@ def test_a_study_draws_relative_errors_beside_absolute_ones():
         norm = getattr(levels[1].report, name) / drawn[1]  # of the solution
         assert absolute.get_ylim() == pytest.approx(norm * np.array(panel.get_ylim()))
     other = solve.convergence(benchmark_volume(2, amplitude=0.0), problem, (0,))
-    assert plotting.draw_study(None, {2: other, 3: levels}).axes[0].child_axes == []  # two volumes, two norms
+    assert curves.draw_study(None, {2: other, 3: levels}).axes[0].child_axes == []  # two volumes, two norms
     nothing = solve.convergence(volume, solve.Poisson(exact="0*x"), (0,))
-    assert plotting.draw_study(None, {3: nothing}).axes[0].get_ylabel() == "absolute"
+    assert curves.draw_study(None, {3: nothing}).axes[0].get_ylabel() == "absolute"
 
 
 @pytest.mark.pictures
 def test_plots_of_curves_are_also_written_as_pdf(in_folder, formula_training, monkeypatch):
     formula_training()
-    monkeypatch.setattr(plotting, "can_draw", lambda: False)  # this is about curves
+    monkeypatch.setattr(rendering, "can_draw", lambda: False)  # this is about curves
     benchmark_volume(2).save("map.npz")
     assert main(["parameterize", "cube", "--quiet", "--vector"]) == 0
     assert main(["solve", "poisson", "map.npz", "--quiet", "--vector"]) == 0
@@ -184,9 +186,10 @@ def test_without_graphics_library_one_line_names_the_remedy(monkeypatch, caplog,
     rendering.can_draw.cache_clear()
     try:
         result = formula_parameterization()
-        missing = draw_figures(tmp_path, "map", {"volume": result.volume, "history": result.history})
+        state = RunFolder(tmp_path)
+        state.draw("map", volume=result.volume, history=result.history)
     finally:
         rendering.can_draw.cache_clear()
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
     assert "libegl1 libgl1-mesa-dri" in caplog.text
-    assert missing == dict.fromkeys(("lines.png", "cut.png", "distortion.png"), rendering.CANNOT_DRAW)
+    assert state.report["not_drawn"] == dict.fromkeys(("lines.png", "cut.png", "distortion.png"), rendering.CANNOT_DRAW)

@@ -9,25 +9,28 @@ import pytest
 
 import iga_nn
 import solve
-from iga_nn import figures as plotting
 from iga_nn.cli.commands import main
 from iga_nn.figures import render as rendering
-from iga_nn.figures.color_range import error_range, even_range
+from iga_nn.figures.curves import draw_study
+from iga_nn.figures.solution import draw_error, draw_values
+from iga_nn.figures.style import error_range, even_range
 from iga_nn.options import PoissonOptions, StudyOptions
 from iga_nn.report import html as page
+from iga_nn.report.artifacts import ARTIFACTS
 from iga_nn.workflow import pipeline
 from solve.study import benchmark_volume
 
-MAP = {"draw_history": "history.png", "draw_faces": "faces.png", "draw_lines": "lines.png", "draw_cut": "cut.png"}
-MAP |= {"draw_distortion": "distortion.png", "draw_study": "convergence.png", "draw_error": "error.png"}
+DEFECTS = ("folds.png", "meeting.png")
+DRAW = {figure.file: f"iga_nn.figures.{figure.draw}" for figure in ARTIFACTS if figure.draw}  # file -> function
+MAP = [file for file in DRAW if file not in (*DEFECTS, "named_faces.png", "study.png")]
 
 
 @pytest.fixture
 def all_drawn(in_folder, monkeypatch):
     """Every figure but those that a test breaks is drawn at once, as an empty file; needs no graphics library."""
-    monkeypatch.setattr(plotting, "can_draw", lambda: True)
-    for name in (*MAP, "draw_folds", "draw_meeting"):
-        monkeypatch.setattr(plotting, name, lambda path, *given: path.write_bytes(b""))
+    monkeypatch.setattr(rendering, "can_draw", lambda: True)
+    for draw in DRAW.values():
+        monkeypatch.setattr(draw, lambda path, *given: path.write_bytes(b""))
 
 
 def broken(path, *given):
@@ -40,34 +43,32 @@ def look(folder):
     return json.loads((folder / "report.json").read_text(encoding="utf-8")), text
 
 
-@pytest.mark.parametrize("name", MAP)
-def test_a_figure_that_fails_costs_itself_alone(name, all_drawn, formula_training, in_folder, monkeypatch, caplog):
+@pytest.mark.parametrize("file", MAP)
+def test_a_figure_that_fails_costs_itself_alone(file, all_drawn, formula_training, in_folder, monkeypatch, caplog):
     formula_training()
-    monkeypatch.setattr(plotting, name, broken)
+    monkeypatch.setattr(DRAW[file], broken)
     outcome = iga_nn.run("poisson", "cube", "out")
     report, text = look(outcome.folder)
     reason = "Invalid vmin or vmax"
-    assert report["not_drawn"] == {MAP[name]: reason}
-    assert caplog.messages.count(f"{MAP[name]} could not be drawn: {reason}") == 1
-    assert f"{MAP[name]} could not be drawn: {reason}" in text
-    assert {file.name for file in outcome.folder.glob("*.png")} == set(MAP.values()) - {MAP[name]}
+    assert report["not_drawn"] == {file: reason}
+    assert caplog.messages.count(f"{file} could not be drawn: {reason}") == 1
+    assert f"{file} could not be drawn: {reason}" in text
+    assert {drawn.name for drawn in outcome.folder.glob("*.png")} == set(MAP) - {file}
     assert report["seconds"]["total"] > 0.0 and (outcome.folder / "solution.npz").is_file()
 
 
-@pytest.mark.parametrize(("name", "file"), [("draw_folds", "folds.png"), ("draw_meeting", "meeting.png")])
-def test_a_figure_of_a_defect_that_fails_costs_itself_alone(
-    name, file, all_drawn, formula_training, in_folder, monkeypatch
-):
+@pytest.mark.parametrize("file", DEFECTS)
+def test_a_figure_of_a_defect_that_fails_costs_itself_alone(file, all_drawn, formula_training, in_folder, monkeypatch):
     formula_training(amplitude=0.4)  # folds, and its boundary meets itself
-    monkeypatch.setattr(plotting, name, broken)
+    monkeypatch.setattr(DRAW[file], broken)
     report, _ = look(pipeline.parameterize_to("cube", "out").folder)
     assert report["not_drawn"] == {file: "Invalid vmin or vmax"}
 
 
 def test_the_figures_of_a_solve_and_of_a_study_cost_themselves_alone(all_drawn, in_folder, monkeypatch):
     benchmark_volume(2).save("map.npz")
-    monkeypatch.setattr(plotting, "draw_study", broken)
-    monkeypatch.setattr(plotting, "draw_faces", broken)
+    monkeypatch.setattr(DRAW["study.png"], broken)
+    monkeypatch.setattr(DRAW["named_faces.png"], broken)
     report, _ = look(pipeline.solve_to("map.npz", "out", problem=PoissonOptions(neumann=("u1",))).folder)
     assert set(report["not_drawn"]) == {"convergence.png", "named_faces.png"}
     outcome, _ = pipeline.study_to("map.npz", "study", options=StudyOptions(refine=("0", "1")))
@@ -95,7 +96,7 @@ def test_a_page_that_fails_is_written_bare(in_folder, monkeypatch):
 
 
 def test_plotting_that_cannot_be_imported_costs_the_figures(in_folder, monkeypatch):
-    monkeypatch.setattr(plotting, "can_draw", None)
+    monkeypatch.setattr(rendering, "can_draw", None)
     benchmark_volume(2).save("map.npz")
     report, _ = look(pipeline.solve_to("map.npz", "out").folder)
     assert set(report["not_drawn"]) == {"figures"}
@@ -131,9 +132,9 @@ def test_errors_of_any_size_are_drawn(size, tmp_path, small_views):
     solution = solve.solve_problem(volume, solve.Poisson(source="0"))
     field = replace(solution, coefficients=np.full(solution.coefficients.shape, size))
     zero = solve.Poisson(exact="0")
-    plotting.draw_error(tmp_path / "error.png", volume, field, zero)
-    plotting.draw_values(tmp_path / "values.png", volume, field, "u")
-    plotting.draw_study(tmp_path / "study.png", {3: [solve.ConvergenceRow(solution.report, None, None)]})
+    draw_error(tmp_path / "error.png", volume, field, zero)
+    draw_values(tmp_path / "values.png", volume, field, "u")
+    draw_study(tmp_path / "study.png", {3: [solve.ConvergenceRow(solution.report, None, None)]})
     from iga_nn.report.viewer import scene_of
 
     ends = {entry["name"]: (entry["low"], entry["high"]) for entry in scene_of(volume, field, zero)["fields"]}

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from iga_nn.errors import InputError
-from iga_nn.options import read_corners
+from iga_nn.workflow.mapping import read_corners
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.files import save_arrays
 from parameterize.spline.volume import BSplineVolume

@@ -14,7 +14,7 @@ from volumes import spans_at
 
 from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
-from iga_nn.io.formats import FORMATS, Format, export, is_volume, load_volume
+from iga_nn.io.formats import export, is_volume, load_volume
 from parameterize.spline.bernstein import binomials, elevation
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
@@ -444,15 +444,6 @@ def test_bad_requests_are_one_line(arguments, says, in_folder, capsys):
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("iga-nn:") and says in line
     assert set(Path().iterdir()) == before and Path("here.vtu").read_text() == "mine\n"
-
-
-def test_a_format_without_solutions_refuses_one(in_folder, capsys, monkeypatch):
-    monkeypatch.setitem(FORMATS, "bare", Format(".bare", lambda path, *_: path.touch()))
-    benchmark_volume(2).save("map.npz")
-    assert main(["export", "map.npz", "--to", "bare", "--solution", "solution.npz"]) == 2
-    assert "'bare': holds no solution; leave --solution out" in capsys.readouterr().err
-    assert not Path("map.bare").exists()
-    assert main(["export", "map.npz", "--to", "bare"]) == 0 and Path("map.bare").exists()
 
 
 def test_force_replaces(in_folder):

@@ -10,9 +10,10 @@ from mesh_files import CUBE, TRIANGLES, obj
 
 from iga_nn.live import worker as job_process
 from iga_nn.live.queue import Jobs, safe_name
-from iga_nn.live.worker import End, Step
+from iga_nn.live.worker import Step
 from iga_nn.models import resolve
 from iga_nn.options import MapOptions, PoissonOptions
+from iga_nn.workflow.watched import Ended
 from parameterize.progress import Progress
 
 AT = Progress("cube", 3, 10, 0.5, 0, 7.0)
@@ -33,7 +34,7 @@ class Runs:
         while not (self.let_go.is_set() or job.stop.is_set()):
             time.sleep(0.01)
         self.running -= 1
-        yield End("stopped" if job.stop.is_set() else "done")
+        yield Ended("stopped" if job.stop.is_set() else "done")
 
 
 @pytest.fixture
@@ -81,7 +82,7 @@ def test_one_runs_at_a_time_and_the_others_wait_in_order(jobs, runs):
 
 
 def test_a_problem_is_solved_on_a_finished_volume_and_again_on_the_same(tmp_path):
-    jobs = Jobs(tmp_path, resolve_path, lambda job: iter([End("done")]), lambda job: None)
+    jobs = Jobs(tmp_path, resolve_path, lambda job: iter([Ended("done")]), lambda job: None)
     first = accepted(jobs, "my cube.obj")
     first.results.mkdir()
     first.volume.write_bytes(b"volume")
@@ -175,8 +176,8 @@ def test_names_are_files_in_the_jobs_folder(given, kept, tmp_path):
 def test_the_process_says_why_it_failed(tmp_path: Path):
     (tmp_path / "cut.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\n")
     *before, last = job_process.run(tmp_path, "cut.obj", MapOptions(), PoissonOptions(), Event())
-    assert isinstance(last, End) and last.state == "failed" and last.text.startswith("cut.obj: ")
-    assert not any(isinstance(message, End) for message in before)
+    assert isinstance(last, Ended) and last.state == "refused" and last.line.startswith("cut.obj: ")
+    assert not any(isinstance(message, Ended) for message in before)
 
 
 def test_a_stopped_process_is_gone(tmp_path: Path, monkeypatch):
@@ -186,4 +187,4 @@ def test_a_stopped_process_is_gone(tmp_path: Path, monkeypatch):
     stop.set()
     start = time.monotonic()
     messages = list(job_process.run(tmp_path, "cube.obj", MapOptions(), PoissonOptions(), stop))
-    assert messages == [End("stopped")] and time.monotonic() - start < 10.0
+    assert messages == [Ended("stopped")] and time.monotonic() - start < 10.0

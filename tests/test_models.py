@@ -211,10 +211,9 @@ def test_fetch_refuses_unknown_models_and_bad_targets(an_empty_folder, data_fold
 def test_every_model_has_a_checksum_and_a_public_address():
     assert len(MODELS) == 21
     for name, model in MODELS.items():
-        assert model.url.startswith("https://raw.githubusercontent.com/")
-        assert Path(model.url).stem == name
+        assert model.path.count("/") >= 3 and Path(model.path).stem == name  # owner, repository, commit, file
         assert len(bytes.fromhex(model.sha256)) == 32
-    assert data.DATA_FOLDER == "IGA_NN_DATA"
+    assert data.RAW == "https://raw.githubusercontent.com" and data.DATA_FOLDER == "IGA_NN_DATA"
 
 
 @pytest.mark.slow

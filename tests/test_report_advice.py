@@ -13,7 +13,7 @@ from iga_nn.cli.commands import main
 from iga_nn.options import MapOptions
 from iga_nn.report import advice
 from iga_nn.report import document as report
-from iga_nn.report.figures import draw_figures
+from iga_nn.workflow.output_folder import RunFolder
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.jacobian import certify
 from solve.study import benchmark_volume
@@ -111,14 +111,14 @@ def test_the_pictures_of_an_older_run_go(formula_training, in_folder):
 
 def test_where_the_boundary_meets_itself_there_is_a_picture(tmp_path, small_views):
     volume = bent(1.3)
-    draw_figures(tmp_path, "map", {"volume": volume, "meeting": check_boundary(volume).meeting})
+    RunFolder(tmp_path).draw("map", volume=volume, meeting=check_boundary(volume).meeting)
     assert shown(tmp_path / "meeting.png") and not (tmp_path / "folds.png").exists()
 
 
 def test_folds_are_drawn_with_their_number(tmp_path, small_views):
     volume = folded_at_one_end()
     places = advice.span_places(volume, certify(volume).unproved)
-    draw_figures(tmp_path, "map", {"volume": volume, "places": places})
+    RunFolder(tmp_path).draw("map", volume=volume, places=places)
     assert shown_in_grey(tmp_path / "folds.png")
 
 

@@ -114,7 +114,7 @@ def test_quiet_and_json_keep_stdout_for_the_verdict(formula_training, in_folder,
 
 def test_too_little_memory_is_a_warning_even_when_quiet(formula_training, in_folder, capsys, monkeypatch):
     formula_training()
-    monkeypatch.setattr("iga_nn.workflow.mapping.available_memory_mb", lambda: 100.0)
+    monkeypatch.setattr("iga_nn.workflow.cost_estimate.available_memory_mb", lambda: 100.0)
     assert main(["parameterize", "cube", "--out", "out", "--quiet"]) == 0
     assert "GB of memory are needed, 0.1 GB are free" in capsys.readouterr().err
 

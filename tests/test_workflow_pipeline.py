@@ -31,7 +31,7 @@ def test_run_returns_what_it_wrote(formula_training, in_folder):
 
 def test_volume_and_report_outlive_a_failing_solve(formula_training, in_folder, monkeypatch):
     formula_training()
-    monkeypatch.setattr("solve.solve_problem", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("iga_nn.workflow.solving.solve_problem", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         iga_nn.run("poisson", "cube", "out")
     assert (in_folder / "out" / "volume.npz").exists()
@@ -48,7 +48,7 @@ def test_a_refused_solve_leaves_a_page_of_the_map(formula_training, in_folder):
         raise ValueError("exact is not finite at x=0.5")
 
     with pytest.MonkeyPatch.context() as patched, pytest.raises(InputError, match="not finite"):
-        patched.setattr("solve.solve_problem", refuse)
+        patched.setattr("iga_nn.workflow.solving.solve_problem", refuse)
         iga_nn.run("poisson", "cube", "out")
     report = json.loads((in_folder / "out" / "report.json").read_text())
     assert report["not_solved"] == "exact is not finite at x=0.5" and "total" not in report["seconds"]
@@ -72,7 +72,7 @@ def test_the_checkpoint_stays_until_all_is_solved(formula_training, in_folder, m
     checkpoint.touch()
     again = MapOptions(resume=True)
     with monkeypatch.context() as patched:
-        patched.setattr("solve.solve_problem", lambda *_, **__: 1 / 0)
+        patched.setattr("iga_nn.workflow.solving.solve_problem", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             iga_nn.run("poisson", "cube", "out", mapping=again)
     assert checkpoint.exists()
@@ -100,8 +100,8 @@ def test_a_hidden_file_has_a_folder_of_its_own():
 def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, monkeypatch):
     formula_training()
     seen = []
-    draw_figures = "iga_nn.report.figures.draw_figures"
-    monkeypatch.setattr(draw_figures, lambda folder, part, known, endings: seen.append(known["marks"]) or {})
+    draw = "iga_nn.workflow.output_folder.RunFolder.draw"
+    monkeypatch.setattr(draw, lambda state, part, **known: seen.append(known["marks"]))
     Path("corners.json").write_text("[7, 6, 5, 4, 3, 2, 1, 0]")
     pipeline.parameterize_to("cube", "out", mapping=MapOptions(corners=Path("corners.json")))
     pipeline.parameterize_to("cube", "out", force=True)

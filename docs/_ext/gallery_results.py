@@ -11,7 +11,7 @@ from typing import Any
 from sphinx.application import Sphinx
 
 from iga_nn.io.formats import load_volume
-from iga_nn.report.html import scene_page
+from iga_nn.report.html import filled
 from iga_nn.report.viewer import scene_of
 from solve import SplineField
 
@@ -62,7 +62,8 @@ def write_view(app: Sphinx, name: str) -> str:
     scene = scene_of(load_volume(files[0]), SplineField.load(solved) if solved.exists() else None, samples=SAMPLES)
     target = Path(app.outdir) / "scenes" / f"{name}.html"
     target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(scene_page(scene, name.replace("_", " ")), encoding="utf-8")
+    page = filled("report/scene.html", title=name.replace("_", " "), scene=scene)
+    target.write_text(page, encoding="utf-8")
     return "solution" if solved.exists() else "faces"
 
 

@@ -21,15 +21,14 @@ from typing import Any, Literal
 
 import processes
 
-from iga_nn.batch.options import WorkerOptions
 from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
 from iga_nn.batch.task import Task
 from iga_nn.errors import InputError
+from iga_nn.levels import csv_text
 from iga_nn.models import DATA_FOLDER
-from iga_nn.options import MapOptions, PoissonOptions
+from iga_nn.options import MapOptions, PoissonOptions, WorkerOptions
 from iga_nn.report import document as reports
-from iga_nn.report.tables import csv_text
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.files import save_text
 from solve.forms.poisson import DEFAULT_EXACT
@@ -223,10 +222,11 @@ def _count(text: str) -> int | Literal["auto"]:
 # Models
 
 
-def _tasks(options: Options, leave_out: Sequence[str]) -> dict[str, Task]:
-    """The runs, by model."""
-    return {
-        name: Task(
+def _tasks(options: Options, leave_out: Sequence[str]) -> list[Task]:
+    """The runs of the models."""
+    return [
+        Task(
+            name,
             str(_file(name, options.models).absolute()),
             (options.out / name).absolute(),
             options.mapping,
@@ -234,7 +234,7 @@ def _tasks(options: Options, leave_out: Sequence[str]) -> dict[str, Task]:
         )
         for name in options.names
         if name not in leave_out
-    }
+    ]
 
 
 def _file(name: str, folder: Path) -> Path:

@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from iga_nn.batch.options import WorkerOptions
 from iga_nn.batch.run import Running, run_tasks
-from iga_nn.batch.surfaces import Entry
 from iga_nn.batch.table import Batch, Row
-from iga_nn.batch.task import Ended, Task, compute
+from iga_nn.batch.task import Task, compute
 from iga_nn.errors import InputError
+from iga_nn.options import WorkerOptions
 from iga_nn.workflow.output_folder import has_checkpoint
+from iga_nn.workflow.watched import Ended
 from parameterize.files import save_text
 from parameterize.threads import default_threads
 
@@ -62,12 +62,12 @@ def times_of(row: Row) -> dict[str, Any]:
 def run(
     prog: str,
     out: Path,
-    tasks: dict[str, Task],
+    tasks: Sequence[Task],
     workers: WorkerOptions,
     keep: Callable[[Batch], None],
     work: Callable[[Task, int, str], Ended] = compute_measured,
 ) -> int:
-    """Compute the tasks, by name, as a batch; keep the rows after each that ends, and return an exit code.
+    """Compute the tasks as a batch; keep the rows after each that ends, and return an exit code.
 
     It is 0, 130 where the batch was interrupted, and 2 where the folder cannot be written.
     """
@@ -80,9 +80,8 @@ def run(
             keep(batch)
             ended = waiting
 
-    entries = [Entry(name, task.mesh, task.folder) for name, task in tasks.items()]
     try:
-        keep(run_tasks(out, entries, list(tasks.values()), workers, progress=show, work=work))
+        keep(run_tasks(out, tasks, workers, progress=show, work=work))
     except KeyboardInterrupt as error:
         print(f"{prog}: {error or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED

@@ -19,14 +19,13 @@ from statistics import median
 import processes
 from hard_shapes import KINDS, compute_shape, kind_of
 
-from iga_nn.batch.options import WorkerOptions
 from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
 from iga_nn.batch.task import Task
 from iga_nn.errors import InputError
-from iga_nn.options import MapOptions
+from iga_nn.levels import csv_text
+from iga_nn.options import MapOptions, WorkerOptions
 from iga_nn.report import document as reports
-from iga_nn.report.tables import csv_text
 from parameterize.files import save_text
 
 SETTINGS = "{0.preset}, seed {0.seed}, {0.control_points} control points, steps times {0.steps_factor:g}"
@@ -153,11 +152,11 @@ def _parser() -> argparse.ArgumentParser:
 # Surfaces
 
 
-def _tasks(options: Options) -> dict[str, Task]:
-    """The runs, by the surface's name; its worker makes the mesh."""
+def _tasks(options: Options) -> list[Task]:
+    """The runs; the worker makes the mesh."""
     out = options.out.absolute()
     names = [f"{number:03d}-{kind_of(number)}" for number in options.numbers]
-    return {name: Task(str(out / "surfaces" / f"{name}.obj"), out / name, options.mapping, None) for name in names}
+    return [Task(name, str(out / "surfaces" / f"{name}.obj"), out / name, options.mapping, None) for name in names]
 
 
 def row_of(known: Known, options: Options) -> Row:

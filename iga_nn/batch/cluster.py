@@ -1,7 +1,5 @@
 """Lets dask compute the surfaces of a batch: worker processes of this machine, or those of a scheduler."""
 
-from __future__ import annotations
-
 import logging
 import os
 import signal
@@ -17,8 +15,9 @@ from dask.utils import format_bytes, parse_bytes
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, Worker, WorkerPlugin, wait
 
 from ..errors import InputError, one_line
-from .options import WorkerOptions
-from .task import LESS_MEMORY, Ended, Task, Work, compute, stop
+from ..options import WorkerOptions
+from ..workflow.watched import Ended
+from .task import LESS_MEMORY, Task, Work, compute, stop
 
 log = logging.getLogger(__name__)
 

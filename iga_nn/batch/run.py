@@ -1,7 +1,5 @@
 """Carries a batch from the surfaces to the table: skips what is finished, computes the rest, keeps what is known."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -11,16 +9,15 @@ from pathlib import Path
 from parameterize.files import save_text
 
 from ..errors import InputError, expected_errors, one_line
-from ..options import MapOptions, PoissonOptions
+from ..options import MapOptions, PoissonOptions, WorkerOptions
 from ..report import document as reports
 from ..workflow import pipeline
-from ..workflow.cost_estimate import available_memory_mb
+from ..workflow.cost_estimate import warn_of_memory
 from ..workflow.output_folder import forget, locked, writable
-from .options import WorkerOptions
-from .page import page
-from .surfaces import Entry, entries_of
-from .table import Batch, Row
-from .task import Ended, Task, Work, compute
+from ..workflow.watched import Ended
+from .surfaces import entries_of
+from .table import Batch, Row, page
+from .task import Task, Work, compute
 
 log = logging.getLogger(__name__)
 
@@ -103,16 +100,15 @@ def run_batch(
     pipeline.checked(mapping, options)
     if out == "":
         raise InputError("out is empty: name a folder")
-    entries = entries_of([str(surface) for surface in surfaces], Path(out))
     corners = None if mapping.corners is None else mapping.corners.absolute()
     common = replace(mapping, corners=corners, resume=True)
-    tasks = [Task(entry.mesh, entry.folder, common, options, vector) for entry in entries]
-    return run_tasks(Path(out), entries, tasks, workers or WorkerOptions(), force=force, progress=progress)
+    entries = entries_of([str(surface) for surface in surfaces], Path(out))
+    tasks = [Task(entry.name, entry.mesh, entry.folder, common, options, vector) for entry in entries]
+    return run_tasks(Path(out), tasks, workers or WorkerOptions(), force=force, progress=progress)
 
 
 def run_tasks(
     out: Path,
-    entries: Sequence[Entry],
     tasks: Sequence[Task],
     workers: WorkerOptions,
     *,
@@ -120,7 +116,7 @@ def run_tasks(
     progress: Progress | None = None,
     work: Work = compute,
 ) -> Batch:
-    """Compute tasks, one for each entry, as `run_batch` does; their options may differ.
+    """Compute tasks as `run_batch` does; their options may differ.
 
     work: a function of a module that the workers can import; it calls `compute` with its arguments.
     """
@@ -128,19 +124,19 @@ def run_tasks(
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
     with locked(out):
-        batch = Batch(out, tuple(_found(entry, task, force) for entry, task in zip(entries, tasks, strict=True)))
+        batch = Batch(out, tuple(_found(task, force) for task in tasks))
         if "waiting" in batch.counts:
             return _computed(batch, tasks, workers, progress or (lambda *_: None), work)
         _write(batch)
         return batch
 
 
-def _found(entry: Entry, task: Task, force: bool) -> Row:
+def _found(task: Task, force: bool) -> Row:
     """Return the row of a surface as its folder is: finished, refused because of what is in it, or still to compute."""
-    row = Row(entry)
+    row = Row(task)
     try:
         if force:
-            forget(entry.folder)
+            forget(task.folder)
             return row
         finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.options, vector=task.vector)
     except expected_errors() as error:
@@ -171,7 +167,11 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
         show()
 
     try:
-        _warn_of_memory(workers, cluster.memory_limit(workers), len(waiting))
+        if workers.scheduler is None:
+            count = min(workers.workers, len(waiting))
+            wanted = count * cluster.memory_limit(workers)
+            what = f"{count} workers may take {wanted / 1e9:.1f} GB of memory"
+            warn_of_memory(wanted / 1e6, what, "lower --workers or --memory-limit, or free some")
         _write(batch)
         show()
         with (
@@ -187,18 +187,6 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {batch.summary}; the same command goes on") from None
     return batch
-
-
-def _warn_of_memory(workers: WorkerOptions, limit: int, surfaces: int) -> None:
-    """Warn where the workers of this machine may take more memory than is free."""
-    free, count = available_memory_mb(), min(workers.workers, surfaces)
-    if workers.scheduler is None and free is not None and count * limit / 1e6 > free:
-        log.warning(
-            "%d workers may take %.1f GB of memory, %.1f GB are free: lower --workers or --memory-limit, or free some",
-            count,
-            count * limit / 1e9,
-            free / 1e3,
-        )
 
 
 def _write(batch: Batch) -> None:

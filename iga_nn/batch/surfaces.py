@@ -1,7 +1,5 @@
 """Turns what the user names (files, folders, patterns, samples, models, g1) into surfaces with a folder each."""
 
-from __future__ import annotations
-
 import glob
 from collections import Counter
 from collections.abc import Iterator, Sequence

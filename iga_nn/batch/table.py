@@ -1,22 +1,31 @@
-"""Keeps the table of a batch, one row a surface, and puts it into words, CSV and JSON."""
+"""Keeps the table of a batch, one row a surface, and puts it into words, CSV, JSON and a page that fetches nothing."""
 
-from __future__ import annotations
-
+import base64
+import functools
+import io
+import logging
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self, get_args
+from urllib.parse import quote
 
+from PIL import Image
+
+from ..errors import one_line
+from ..levels import csv_text
 from ..report import document as reports
-from ..report.tables import csv_text
+from ..report.artifacts import PAGE
+from ..report.html import filled
 from ..version import __version__
+from ..workflow.watched import Ended
 from .surfaces import Entry, printable
-from .task import Ended
+
+log = logging.getLogger(__name__)
 
 SCHEMA = 1
 
 State = Literal["certified", "not certified", "not solved", "refused", "failed", "waiting"]
-STATES: tuple[State, ...] = ("certified", "not certified", "not solved", "refused", "failed", "waiting")
 FIGURES = {  # columns of batch.csv: their titles on the page
     "bijective": "det J > 0",
     "one_to_one": "one-to-one",
@@ -31,6 +40,12 @@ FIGURES = {  # columns of batch.csv: their titles on the page
 }
 COLUMNS = ("surface", "folder", "state", *FIGURES, "line")
 
+PICTURE = "faces.png"  # of an output folder
+THUMBNAIL = (120, 90)  # pixels, at most
+COLORS = 64
+KINDS = {"certified": "good", "not certified": "bad", "not solved": "unsure", "refused": "bad", "failed": "bad"}
+WHOLE = ("seconds", "dofs", "iterations")
+
 
 @dataclass(frozen=True, eq=False)
 class Row:
@@ -41,10 +56,10 @@ class Row:
     line: str = ""
     report: reports.Report | None = None
 
-    def ended(self, how: Ended) -> Row:
+    def ended(self, how: Ended) -> Self:
         """Return the row of the surface once its task has ended."""
         if how.report is not None:
-            return replace(self, state=_verdict(how.report), line="", report=how.report)
+            return replace(self, state=reports.state(how.report), line="", report=how.report)
         state: State = "refused" if how.state == "refused" else "failed" if how.state == "failed" else "waiting"
         line = how.line.replace(self.entry.mesh, self.entry.name).removeprefix(f"{self.entry.name}: ")
         return replace(self, state=state, line=printable(line))
@@ -71,12 +86,6 @@ class Row:
         return f"{self.entry.name}: {', '.join(facts)}"
 
 
-def _verdict(report: reports.Report) -> State:
-    if not reports.is_certified(report):
-        return "not certified"
-    return "certified" if reports.is_converged(report) and reports.is_meaningful(report) else "not solved"
-
-
 @dataclass(frozen=True, eq=False)
 class Batch:
     """Hold all rows of a batch and the folder of its results, in the order the surfaces were named."""
@@ -88,7 +97,7 @@ class Batch:
     def counts(self) -> dict[State, int]:
         """Return how many surfaces are in which state, without those that no surface is in."""
         found = Counter(row.state for row in self.rows)
-        return {state: found[state] for state in STATES if found[state]}
+        return {state: found[state] for state in get_args(State) if found[state]}
 
     @property
     def summary(self) -> str:
@@ -96,7 +105,7 @@ class Batch:
         counts = ", ".join(f"{count} {state}" for state, count in self.counts.items())
         return f"{len(self.rows)} surface{'s' * (len(self.rows) != 1)}: {counts}"
 
-    def with_row(self, number: int, row: Row) -> Batch:
+    def with_row(self, number: int, row: Row) -> Self:
         """Return the batch with another row in that place."""
         return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
 
@@ -119,3 +128,59 @@ class Batch:
             for row in self.rows
         )
         return csv_text(COLUMNS, rows)
+
+
+def page(batch: Batch) -> str:
+    """Return the page as text."""
+    return filled(
+        "batch/batch.html",
+        title=batch.folder.name,
+        version=__version__,
+        summary=batch.summary,
+        titles=list(FIGURES.values()),
+        rows=[_row(row) for row in batch.rows],
+    )
+
+
+def _row(row: Row) -> dict[str, Any]:
+    """Return what the template shows of a row; each figure as its text and the value it is sorted by."""
+    report = row.entry.folder / PAGE
+    return {
+        "name": row.entry.name,
+        "state": row.state,
+        "kind": KINDS.get(row.state, ""),
+        "line": row.line,
+        "link": quote(f"{row.entry.folder.name}/{PAGE}", errors="surrogateescape") if report.is_file() else "",
+        "picture": _picture(row.entry.folder / PICTURE) if row.report is not None else "",
+        "figures": [(_text(name, value), "" if value is None else value) for name, value in row.figures().items()],
+    }
+
+
+def _text(name: str, value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, str):
+        return value
+    return f"{value:,.0f}" if name in WHOLE else f"{value:.3g}"
+
+
+def _picture(path: Path) -> str:
+    """Return a small picture in Base64, empty where there is none."""
+    try:
+        return _thumbnail(path, path.stat().st_mtime_ns)
+    except FileNotFoundError:
+        return ""  # nothing can be drawn on this machine
+    except Exception as error:  # no picture ends a batch
+        log.warning("%s: no thumbnail: %s", path, one_line(error))
+        return ""
+
+
+@functools.lru_cache(maxsize=4096)
+def _thumbnail(path: Path, _written: int) -> str:
+    """Return the thumbnail of a picture; the page is written many times, and each picture is read once."""
+    stream = io.BytesIO()
+    with Image.open(path) as image:
+        small = image.convert("RGB")
+        small.thumbnail(THUMBNAIL)
+        small.quantize(COLORS).save(stream, "png", optimize=True)
+    return base64.b64encode(stream.getvalue()).decode("ascii")

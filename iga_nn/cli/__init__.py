@@ -1,1 +1,7 @@
-"""Runs the command line: commands, options, exit codes and progress."""
+"""Is what a user types and sees: the commands, their progress, their answers and these exit codes."""
+
+DONE = 0
+BAD_INPUT = 2
+NOT_CERTIFIED = 3  # wins over NOT_SOLVED
+NOT_SOLVED = 4
+INTERRUPTED = 130

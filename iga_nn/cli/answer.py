@@ -1,42 +1,28 @@
 """Returns what a command prints when it is done, and the exit code that goes with it."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from ..batch.table import Batch
 from ..levels import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..workflow.output_folder import Outcome
-from .exit_codes import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED
+from . import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED
 
-if TYPE_CHECKING:
-    from ..batch.table import Batch
-
+CODES = {"certified": DONE, "not certified": NOT_CERTIFIED, "not solved": NOT_SOLVED}  # of a state
 SHOWN_ERRORS = (*EXACT_ERRORS, *ESTIMATES)
 
 
 def exit_code(report: reports.Report) -> int:
     """Return the exit code of a finished report."""
-    if not reports.is_certified(report):
-        return NOT_CERTIFIED
-    return DONE if reports.is_converged(report) and reports.is_meaningful(report) else NOT_SOLVED
+    return CODES[reports.state(report)]
 
 
 def batch_exit_code(batch: Batch) -> int:
     """Return the exit code of a batch: that of its worst surface."""
-    counts = batch.counts
-    if counts.keys() & {"refused", "failed", "waiting"}:
-        return BAD_INPUT
-    if "not certified" in counts:
-        return NOT_CERTIFIED
-    return NOT_SOLVED if "not solved" in counts else DONE
-
-
-def verdict_as_json(outcome: Outcome) -> str:
-    """Return the verdict of a finished run as JSON, for scripts."""
-    return reports.as_json(reports.verdict(outcome.report, outcome.folder))
+    codes = {CODES.get(state, BAD_INPUT) for state in batch.counts}
+    return min(codes - {DONE}, default=DONE)
 
 
 def verdict_in_words(outcome: Outcome) -> str:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from cyclopts import App, CycloptsError, Parameter, Token, convert
 
-from ..batch.options import WorkerOptions
 from ..errors import InputError, expected_errors, input_errors, one_line
 from ..options import (
     PROBLEMS,
@@ -27,9 +26,10 @@ from ..options import (
     ProblemOptions,
     StudyOptions,
     SurfaceOptions,
+    WorkerOptions,
 )
 from ..version import __version__
-from .exit_codes import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
+from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
 from .progress import shown_batch, shown_progress
 
 if TYPE_CHECKING:
@@ -94,14 +94,8 @@ class OutputOptions:
         return {"out": self.out, "force": self.force, "vector": self.vector}
 
 
-OutputFlags = Annotated[OutputOptions, Parameter(name="*")]  # each field of the options is a flag
-SurfaceFlags = Annotated[SurfaceOptions, Parameter(name="*")]
-MapFlags = Annotated[MapOptions, Parameter(name="*")]
-WorkerFlags = Annotated[WorkerOptions, Parameter(name="*")]
-PoissonFlags = Annotated[PoissonOptions, Parameter(name="*")]
-ElasticityFlags = Annotated[ElasticityOptions, Parameter(name="*")]
-StudyFlags = Annotated[StudyOptions, Parameter(name="*")]
-ElasticityStudyFlags = Annotated[ElasticityStudyOptions, Parameter(name="*")]
+for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions):
+    Parameter(name="*")(kind)  # each field of these options, and of those derived from them, is a flag
 
 OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
 WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
@@ -109,7 +103,7 @@ WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), Poiss
 
 @run_app.command(name="poisson")
 def run_poisson(
-    mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP, poisson: PoissonFlags = POISSON
+    mesh: Mesh, /, *, output: OutputOptions = OUTPUT, mapping: MapOptions = MAP, poisson: PoissonOptions = POISSON
 ) -> int:
     """Parameterize a surface, certify the spline and solve Poisson's equation on it."""
     return _run(mesh, output, mapping, poisson)
@@ -117,7 +111,12 @@ def run_poisson(
 
 @run_app.command(name="elasticity")
 def run_elasticity(
-    mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP, elasticity: ElasticityFlags = ELASTICITY
+    mesh: Mesh,
+    /,
+    *,
+    output: OutputOptions = OUTPUT,
+    mapping: MapOptions = MAP,
+    elasticity: ElasticityOptions = ELASTICITY,
 ) -> int:
     """Parameterize a surface, certify the spline and solve linear elasticity on it.
 
@@ -126,23 +125,22 @@ def run_elasticity(
     return _run(mesh, output, mapping, elasticity)
 
 
-def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: ProblemOptions) -> int:
+def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: ProblemOptions | None = None) -> int:
     """Parameterize a surface, solve a problem on the volume, print the verdict and return the exit code."""
     from ..workflow import pipeline
 
     with shown_progress(output.quiet) as progress:
-        known = output.folder | {problem.section: problem}
-        outcome = pipeline.run(problem.section, mesh, mapping=mapping, progress=progress, **known)
+        outcome = pipeline.parameterize_to(mesh, mapping=mapping, problem=problem, progress=progress, **output.folder)
     return _finish(outcome, output)
 
 
 @app.command(name="batch")
 def run_many(
     *surfaces: str,
-    output: OutputFlags = OUTPUT,
-    workers: WorkerFlags = WORKERS,
-    mapping: MapFlags = MAP,
-    poisson: PoissonFlags = POISSON,
+    output: OutputOptions = OUTPUT,
+    workers: WorkerOptions = WORKERS,
+    mapping: MapOptions = MAP,
+    poisson: PoissonOptions = POISSON,
 ) -> int:
     """Run many surfaces in worker processes, each into its own folder in --out, with one table of them all.
 
@@ -167,13 +165,9 @@ def run_many(
 
 
 @app.command(name="parameterize")
-def parameterize_mesh(mesh: Mesh, /, *, output: OutputFlags = OUTPUT, mapping: MapFlags = MAP) -> int:
+def parameterize_mesh(mesh: Mesh, /, *, output: OutputOptions = OUTPUT, mapping: MapOptions = MAP) -> int:
     """Turn a surface into a certified trivariate B-spline."""
-    from ..workflow import pipeline
-
-    with shown_progress(output.quiet) as progress:
-        outcome = pipeline.parameterize_to(mesh, mapping=mapping, progress=progress, **output.folder)
-    return _finish(outcome, output)
+    return _run(mesh, output, mapping)
 
 
 @solve_app.command(name="poisson")
@@ -183,8 +177,8 @@ def solve_poisson(
     *,
     device: Literal["cpu", "cuda"] = "cpu",
     mpi: Mpi = False,
-    output: OutputFlags = OUTPUT,
-    poisson: PoissonFlags = POISSON,
+    output: OutputOptions = OUTPUT,
+    poisson: PoissonOptions = POISSON,
 ) -> int:
     """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
 
@@ -199,7 +193,7 @@ def solve_poisson(
 
 @solve_app.command(name="elasticity")
 def solve_elasticity(
-    volume: Volume, /, *, mpi: Mpi = False, output: OutputFlags = OUTPUT, elasticity: ElasticityFlags = ELASTICITY
+    volume: Volume, /, *, mpi: Mpi = False, output: OutputOptions = OUTPUT, elasticity: ElasticityOptions = ELASTICITY
 ) -> int:
     """Solve linear elasticity on a volume.npz.
 
@@ -220,7 +214,7 @@ def _solve(volume: Path, output: OutputOptions, problem: ProblemOptions, mpi: bo
 
 
 @study_app.default
-def study_volume(volume: Volume, /, *, output: OutputFlags = OUTPUT, study: StudyFlags = STUDY) -> int:
+def study_volume(volume: Volume, /, *, output: OutputOptions = OUTPUT, study: StudyOptions = STUDY) -> int:
     """Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors and their rates.
 
     Results go to STEM-study in the current folder, unless --out names another.
@@ -230,7 +224,7 @@ def study_volume(volume: Volume, /, *, output: OutputFlags = OUTPUT, study: Stud
 
 @study_app.command(name="elasticity")
 def study_elasticity(
-    volume: Volume, /, *, output: OutputFlags = OUTPUT, study: ElasticityStudyFlags = ELASTICITY_STUDY
+    volume: Volume, /, *, output: OutputOptions = OUTPUT, study: ElasticityStudyOptions = ELASTICITY_STUDY
 ) -> int:
     """Do the same for linear elasticity with a given displacement."""
     return _study(volume, output, study)
@@ -249,25 +243,29 @@ def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
 
 
 @app.command(name="check")
-def check(path: str, /, *, surface: SurfaceFlags = SURFACE, strict: bool = False, as_json: Json = False) -> int:
+def check(path: str, /, *, surface: SurfaceOptions = SURFACE, strict: bool = False, as_json: Json = False) -> int:
     """Say whether a surface is accepted, or whether a volume is certified; write nothing.
 
     Args:
         path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
         strict: refuse a surface that intersects itself; without this option it is a notice.
     """
-    from ..io.formats import is_volume
+    from ..io.formats import is_volume, load_volume
+    from ..models import resolve
     from ..report import document as reports
-    from ..workflow.verdict import check_surface, check_volume
+    from ..workflow.verdict import certified_facts
     from . import answer
 
     if not is_volume(path):
-        facts = check_surface(path, surface, strict)
+        given = resolve(path, **surface.reading())
+        if strict:
+            given.refuse_crossings()
+        facts = given.summary()
         _print(reports.as_json(facts) if as_json else "accepted\n" + answer.facts_in_words(facts))
         return DONE
     if surface != SURFACE or strict:
         raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")
-    facts = check_volume(path)
+    facts = certified_facts(load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
 
@@ -327,8 +325,8 @@ def serve_page(
     port: int = 8080,
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
     max_upload: int = 64,
-    mapping: MapFlags = MAP,
-    poisson: PoissonFlags = POISSON,
+    mapping: MapOptions = MAP,
+    poisson: PoissonOptions = POISSON,
 ) -> None:
     """Serve a page to this computer's browser: drop a surface, watch it become a volume, download the files.
 
@@ -377,9 +375,11 @@ def _minus_hint(argv: list[str]) -> str:
 
 def _finish(outcome: Outcome, output: OutputOptions) -> int:
     """Print the verdict and return the exit code."""
+    from ..report import document as reports
     from . import answer
 
-    _print(answer.verdict_as_json(outcome) if output.as_json else answer.verdict_in_words(outcome))
+    verdict = reports.verdict(outcome.report, outcome.folder)
+    _print(reports.as_json(verdict) if output.as_json else answer.verdict_in_words(outcome))
     return answer.exit_code(outcome.report)
 
 

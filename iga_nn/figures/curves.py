@@ -1,23 +1,16 @@
 """Draws curves: the loss over the steps, the errors over the mesh size."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..levels import Study
 from .evaluate import FACE_COLORS
 from .style import blank, positive, save
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solve import ConvergenceRow
-
-Study = Mapping[int, Sequence["ConvergenceRow"]]  # degree -> its levels, coarsest first
 
 TERMS = {  # of the loss, as parameterize names them
     "arap": "ARAP distortion",

@@ -1,7 +1,5 @@
 """Cuts the volume open: images of the cube's faces and mid-sections without those of one of its eight octants."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product

@@ -1,9 +1,6 @@
 """Evaluates what figures show: points of a volume on the cube's faces and sections, and the values there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,12 +8,9 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array
 from parameterize.quality.quality import arap
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
-from solve.field import Points
+from solve.field import Points, SplineField
 from solve.forms.frame import UnitFrame
-
-if TYPE_CHECKING:
-    from solve import SplineField
-    from solve.forms.problem import BoundaryValueProblem
+from solve.forms.problem import BoundaryValueProblem
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 

@@ -1,25 +1,19 @@
 """Draws a map: faces, parameter lines, cut, distortion, and where it is not proved or meets itself."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import BSplineVolume
 
-from .color_range import ColorRange
 from .cutaway import best_cut, octant_label, patches_of, without_octant
 from .evaluate import SECTIONS, all_grids, distortions, face_window, points_on
-from .render import Patch, draw, plain_patch, view_of
-from .style import PANEL, SAMPLES, color_bar, colors, name_faces, panels_of, save, show_around, show_section
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .render import Patch, check_drawable, draw, plain_patch, view_of
+from .style import PANEL, SAMPLES, ColorRange, color_bar, colors, name_faces, panels_of, save, show_around, show_section
 
 EVERY = 14  # samples between two parameter lines: a tenth of the cube
 DISTORTION = "tanh(√ARAP / 2), at volume 1"
@@ -28,7 +22,7 @@ WINDOW = 0.15  # of the cube, on every side of a meeting place
 MEETING_COLORS = ("#4477aa", "#ee6677")
 
 
-def draw_faces(path: Path | None, volume: BSplineVolume, marks: Array | None = None) -> Figure:
+def draw_faces(path: str | Path | None, volume: BSplineVolume, marks: Array | None = None) -> Figure:
     """Draw the images of the six faces of the cube, each in its colour, from the front and from behind.
 
     marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
@@ -36,20 +30,19 @@ def draw_faces(path: Path | None, volume: BSplineVolume, marks: Array | None = N
     return _draw_around(path, patches_of(volume, SAMPLES)[:6], "Images of the six faces of the unit cube", marks)
 
 
-def draw_lines(path: Path | None, volume: BSplineVolume) -> Figure:
+def draw_lines(path: str | Path | None, volume: BSplineVolume) -> Figure:
     """Draw lines of constant parameters, a tenth apart, on the images of the six faces, from the front and behind."""
     return _draw_around(path, patches_of(volume, SAMPLES, EVERY)[:6], "Lines of constant u, v, w, a tenth apart")
 
 
-def _draw_around(path: Path | None, patches: list[Patch], title: str, marks: Array | None = None) -> Figure:
+def _draw_around(path: str | Path | None, patches: list[Patch], title: str, marks: Array | None = None) -> Figure:
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, patches, marks)
     name_faces(figure)
-    figure.suptitle(title, fontsize=14)
-    return save(figure, path)
+    return save(figure, path, title)
 
 
-def draw_cut(path: Path | None, volume: BSplineVolume) -> Figure:
+def draw_cut(path: str | Path | None, volume: BSplineVolume) -> Figure:
     """Draw the volume without one octant of the cube (the paper's Fig. 9): parameter lines, and the distortion.
 
     The octant and the view are those that show most of the cut.
@@ -65,30 +58,27 @@ def draw_cut(path: Path | None, volume: BSplineVolume) -> Figure:
         panel.imshow(draw(without_octant(patches, octant), view, PANEL))
     name_faces(figure)
     color_bar(figure, panels, SHARES, DISTORTION)
-    figure.suptitle(f"Cut open: the octant {octant_label(octant)} is left out", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, f"Cut open: the octant {octant_label(octant)} is left out")
 
 
-def draw_distortion(path: Path | None, volume: BSplineVolume) -> Figure:
+def draw_distortion(path: str | Path | None, volume: BSplineVolume) -> Figure:
     """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2."""
     figure, (panels,) = panels_of(1, 3)
     grids = all_grids(SAMPLES)[6:]
     for panel, title, grid, values in zip(panels, SECTIONS, grids, distortions(volume, grids), strict=True):
         show_section(panel, title, points_on(volume, grid), colors(values, SHARES))
     color_bar(figure, panels, SHARES, DISTORTION)
-    figure.suptitle("Distortion on the mid-sections", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, "Distortion on the mid-sections")
 
 
-def draw_folds(path: Path | None, volume: BSplineVolume, places: Array) -> Figure:
+def draw_folds(path: str | Path | None, volume: BSplineVolume, places: Array) -> Figure:
     """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J > 0 is not proved."""
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, _glass(volume), places)
-    figure.suptitle(f"det J > 0 is not proved on {len(places)} spans: black balls", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, f"det J > 0 is not proved on {len(places)} spans: black balls")
 
 
-def draw_meeting(path: Path | None, volume: BSplineVolume, meeting: Meeting) -> Figure:
+def draw_meeting(path: str | Path | None, volume: BSplineVolume, meeting: Meeting) -> Figure:
     """Draw the place where the boundary meets itself: on the whole boundary, and the two parts there from two sides."""
     mark = np.array([meeting.point])
     windows = [points_on(volume, face_window(parameter, WINDOW, SAMPLES)) for parameter in meeting.parameters]
@@ -98,10 +88,18 @@ def draw_meeting(path: Path | None, volume: BSplineVolume, meeting: Meeting) -> 
     panels[0].imshow(draw(glass, view_of(glass), PANEL, mark))
     panels[0].set_title("whole boundary", fontsize=13)
     show_around(panels[1:], parts, mark)
-    figure.suptitle("The boundary meets itself at the black ball; the two parts near it", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, "The boundary meets itself at the black ball; the two parts near it")
 
 
 def _glass(volume: BSplineVolume) -> list[Patch]:
     """Return the six faces as transparent patches."""
     return [plain_patch(points_on(volume, grid), "0.6", opacity=0.25) for grid in all_grids(SAMPLES)[:6]]
+
+
+PLOTS = {"faces": draw_faces, "lines": draw_lines, "cut": draw_cut, "distortion": draw_distortion}
+
+
+def plot_volume(volume: BSplineVolume, what: str, file: str | Path | None) -> Figure:
+    """Return one of the figures PLOTS of a volume, written to `file`, too, where one is named."""
+    check_drawable(what, PLOTS)
+    return PLOTS[what](file, volume)

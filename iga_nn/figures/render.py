@@ -1,17 +1,16 @@
 """Draws surface patches by VTK, off screen, where this machine can draw."""
 
-from __future__ import annotations
-
 import logging
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
@@ -56,15 +55,16 @@ class View:
     up: Array
     towards: Array
 
-    def turned(self) -> View:
+    def turned(self) -> Self:
         """Return the view from behind."""
-        return View(-self.right, self.up, -self.towards)
+        return replace(self, right=-self.right, towards=-self.towards)
 
 
 @cache
 def can_draw() -> bool:
     """Return whether VTK can draw here, tried in a child process: without a graphics library it crashes."""
-    _without_display()
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):  # then VTK takes EGL, without trying X and warning
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     probe = [sys.executable, "-P", "-c", PROBE]
     try:
         done = subprocess.run(probe, capture_output=True, timeout=120, check=False).returncode == 0
@@ -75,10 +75,12 @@ def can_draw() -> bool:
     return done
 
 
-def _without_display() -> None:
-    """Let VTK use EGL at once where there is no X server, instead of trying X first and warning."""
-    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+def check_drawable(what: str, known: Collection[str]) -> None:
+    """Raise ValueError where there is no such figure, RuntimeError where this machine cannot draw it."""
+    if what not in known:
+        raise ValueError(f"no figure {what!r}: choose one of {', '.join(known)}")
+    if not can_draw():
+        raise RuntimeError(CANNOT_DRAW)
 
 
 def widest_view(points: Array, tilt: float = 0.0) -> View:
@@ -100,8 +102,6 @@ def widest_view(points: Array, tilt: float = 0.0) -> View:
 
 def plain_patch(points: Array, color: str, **look: Any) -> Patch:
     """Return a patch in one of matplotlib's colours. points: (m, n, 3)."""
-    from matplotlib.colors import to_rgb
-
     return Patch(points, np.broadcast_to(to_rgb(color), points.shape), **look)
 
 
@@ -159,18 +159,16 @@ def _add_lines(plotter: Any, patches: Sequence[Patch], shift: Array) -> None:
     """Draw the parameter lines of the patches, moved by `shift`."""
     import pyvista
 
-    drawn = [row for patch in patches if patch.every for row in _parameter_lines(patch)]
+    drawn = []
+    for patch in patches:
+        if patch.every:  # first the lines of constant first parameter, (k, 3) each
+            drawn += [*patch.points[:: patch.every], *patch.points.transpose(1, 0, 2)[:: patch.every]]
     if not drawn:
         return
     starts = np.cumsum([0, *map(len, drawn)])
     cells = [np.r_[len(row), np.arange(start, start + len(row))] for row, start in zip(drawn, starts, strict=False)]
     lines = pyvista.PolyData(np.concatenate(drawn) + shift, lines=np.concatenate(cells))
     plotter.add_mesh(lines, color="black", line_width=LINE_WIDTH, lighting=False)
-
-
-def _parameter_lines(patch: Patch) -> list[Array]:
-    """Return the lines (k, 3) of constant first parameter, then those of constant second parameter."""
-    return [*patch.points[:: patch.every], *patch.points.transpose(1, 0, 2)[:: patch.every]]
 
 
 def _aim(plotter: Any, points: Array, view: View, pixels: tuple[int, int]) -> None:

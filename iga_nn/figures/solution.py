@@ -1,26 +1,23 @@
 """Draws a solution: its values on the boundary, its error on the boundary and on the mid-sections."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from parameterize.spline.volume import BSplineVolume
+from solve import Solution
+from solve.forms.problem import BoundaryValueProblem
 
 from ..levels import EXACT_ERRORS, TITLES
-from .color_range import error_range, even_range
 from .evaluate import SECTIONS, all_grids, points_on, sampled_error, solution_on
-from .render import Patch
-from .style import SAMPLES, color_bar, colors, panels_of, save, show_around, show_section
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from solve import Solution
-    from solve.forms.problem import BoundaryValueProblem
+from .render import Patch, check_drawable
+from .style import SAMPLES, color_bar, colors, error_range, even_range, panels_of, save, show_around, show_section
 
 
-def draw_error(path: Path | None, volume: BSplineVolume, solution: Solution, problem: BoundaryValueProblem) -> Figure:
+def draw_error(
+    path: str | Path | None, volume: BSplineVolume, solution: Solution, problem: BoundaryValueProblem
+) -> Figure:
     """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms."""
     points, errors = sampled_error(volume, solution, problem, SAMPLES)
     limits = error_range([errors])
@@ -31,12 +28,11 @@ def draw_error(path: Path | None, volume: BSplineVolume, solution: Solution, pro
     for panel, title, where, values in zip(rows[1], SECTIONS, points[6:], errors[6:], strict=True):
         show_section(panel, title, where, colors(values, limits))
     color_bar(figure, rows, limits, r"$|u - u_h|$")
-    figure.suptitle("Error on the boundary and on the mid-sections", fontsize=14)
-    return save(figure, path)
+    return save(figure, path, "Error on the boundary and on the mid-sections")
 
 
 def draw_values(
-    path: Path | None, volume: BSplineVolume, solution: Solution, title: str, *, exaggerate: float | None = None
+    path: str | Path | None, volume: BSplineVolume, solution: Solution, title: str, *, exaggerate: float | None = None
 ) -> Figure:
     """Draw u_h, or the length of a vector u_h, on the boundary, from the front and from behind.
 
@@ -53,6 +49,17 @@ def draw_values(
     show_around(panels, [Patch(p, colors(v, limits)) for p, v in zip(points, values, strict=True)])
     color_bar(figure, panels, limits, title)
     return save(figure, path)
+
+
+def plot_solution(solution: Solution, what: str, file: str | Path | None) -> Figure:
+    """Return the values of a solution, or its error, on the boundary; the error on the mid-sections, too."""
+    check_drawable(what, ("values", "error"))
+    if what == "error":
+        if solution.problem.exact is None:
+            raise ValueError("the error is not known: the problem has no exact solution; plot 'values'")
+        return draw_error(file, solution.geometry, solution, solution.problem)
+    title = "u" if solution.coefficients.ndim == 3 else "|u|"
+    return draw_values(file, solution.geometry, solution, title)
 
 
 def _write_numbers(panel: Any, solution: Solution) -> None:

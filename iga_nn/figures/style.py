@@ -1,31 +1,44 @@
 """Holds what the figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
 
-from __future__ import annotations
-
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch as Swatch
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.files import replacing
 
-from .color_range import ColorRange
 from .evaluate import FACE_COLORS, MAP, face_labels
 from .render import Patch, draw, view_of, widest_view
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 SAMPLES = 141  # per direction of a patch
 PANEL = (900, 700)  # pixels of one view
+NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
+DECADES = 1e-4  # lower end of a logarithmic range over the largest error of the best mesh
+SMALLEST = 1e-200  # smaller fields have no ticks on their colour bar
+ROUNDING = 1e-14  # values whose relative difference is smaller count as one
+
+
+class Picture(Figure):
+    """A figure outside pyplot, which need not be closed; a notebook shows it as the last value of a cell."""
+
+    def _repr_png_(self) -> bytes:
+        stream = io.BytesIO()
+        self.savefig(stream, format="png", dpi=NOTEBOOK_DPI)
+        return stream.getvalue()
 
 
 def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
-    """Return a figure and its axes outside pyplot: it need not be closed and asks for no window system."""
-    from .picture import Picture
-
+    """Return an empty figure and its axes."""
     figure = Picture(figsize=inches, dpi=110, layout="constrained")
     return figure, figure.subplots(rows, columns, **grid)
 
@@ -55,8 +68,6 @@ def show_section(panel: Any, title: str, points: Array, colors: Array) -> None:
 
 def name_faces(figure: Figure) -> None:
     """Write below the panels what the six colours stand for."""
-    from matplotlib.patches import Patch as Swatch
-
     swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
     figure.legend(
         handles=swatches,
@@ -69,19 +80,66 @@ def name_faces(figure: Figure) -> None:
     )
 
 
+@dataclass(frozen=True)
+class ColorRange:
+    """Hold the limits of a colour scale.
+
+    remark: stands in place of ticks where the field has one value, such as "0 everywhere".
+    """
+
+    low: float
+    high: float
+    logarithmic: bool = False
+    remark: str = ""
+
+    def norm(self) -> Normalize:
+        """Return the range as a new object of matplotlib, which maps values to 0..1; colour bars change theirs."""
+        kind = LogNorm if self.logarithmic else Normalize
+        return kind(self.low, self.high, clip=True)
+
+    def shares(self, values: Array) -> Array:
+        """Return the places of values in the range, 0..1; 0.5 where the field has one value."""
+        if self.remark:
+            return np.full(np.shape(values), 0.5)
+        return np.asarray(self.norm()(np.ravel(values))).reshape(np.shape(values))
+
+    @property
+    def labels(self) -> tuple[str, str]:
+        """Return the texts at the two ends of a legend."""
+        form = "{:.1e}" if self.logarithmic else "{:.3g}"
+        return (self.remark, "") if self.remark else (form.format(self.low), form.format(self.high))
+
+
+def even_range(values: Sequence[Array]) -> ColorRange:
+    """Return the range from the lowest to the highest of all values."""
+    low, high = min(float(patch.min()) for patch in values), max(float(patch.max()) for patch in values)
+    size = max(abs(low), abs(high))
+    if size < SMALLEST:
+        return ColorRange(0.0, 1.0, remark=_smaller(size))
+    if high - low <= ROUNDING * size:
+        return ColorRange(0.0, 1.0, remark=f"{high:.4g} everywhere")
+    return ColorRange(low, high)
+
+
+def error_range(meshes: Sequence[Sequence[Array]]) -> ColorRange:
+    """Return a logarithmic range: from four decades below the largest error of the best mesh to that of the worst."""
+    tops = [max(float(error.max()) for error in errors) for errors in meshes]
+    if max(tops) < SMALLEST:
+        return ColorRange(0.0, 1.0, remark=_smaller(max(tops)))
+    return ColorRange(DECADES * min(top for top in tops if top >= SMALLEST), max(tops), logarithmic=True)
+
+
+def _smaller(size: float) -> str:
+    return f"below {size:.0e} everywhere" if size > 0.0 else "0 everywhere"
+
+
 def colors(values: Array, limits: ColorRange) -> Array:
     """Return red, green, blue (m, n, 3) of values (m, n)."""
-    from matplotlib import colormaps
-
     return np.asarray(colormaps[MAP](limits.shares(values)))[..., :3]
 
 
 def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:
     """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import ListedColormap
-
     shades = ListedColormap([colormaps[MAP](0.5)]) if limits.remark else MAP
     bar = figure.colorbar(ScalarMappable(limits.norm(), shades), ax=panels, shrink=0.85, aspect=28)
     if limits.remark:
@@ -95,9 +153,11 @@ def positive(values: NDArray[Any]) -> Array:
     return np.where(numbers > 0.0, numbers, np.nan)
 
 
-def save(figure: Figure, path: Path | None) -> Figure:
+def save(figure: Figure, path: str | Path | None, title: str = "") -> Figure:
     """Write the figure as PNG or PDF, by the ending of the path, and return it; atomic. None: only return it."""
+    if title:
+        figure.suptitle(title, fontsize=14)
     if path is not None:
-        with replacing(path) as temporary:
+        with replacing(Path(path)) as temporary:
             figure.savefig(temporary)
     return figure

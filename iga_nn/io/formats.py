@@ -1,53 +1,31 @@
 """Reads and writes volumes in the files of other programs: the table of formats, and where a solution goes.
 
-Our own files are NumPy archives without pickles. volume.npz holds, in the units of the input,
-
-    F(u, v, w) = sum_ijk control_points[i, j, k] N_i(u) N_j(v) N_k(w),    0 <= u, v, w <= 1:
-
-`degrees` (3,), open knot vectors `knots_u`, `knots_v`, `knots_w` of n + degree + 1 numbers from 0 to 1, and
-`control_points` (n_u, n_v, n_w, 3). solution.npz holds u_h in the same way, on knots of its own: `coefficients`
-(m_u, m_v, m_w), of displacements (m_u, m_v, m_w, 3). boundary.npz holds the surface's `vertices` (n, 3), their
-`parameters` (n, 3) on the cube's faces and the triangles `faces` (m, 3). Any program that knows splines can read them:
-
->>> import numpy as np
->>> from scipy.interpolate import NdBSpline
->>> from solve import benchmark_volume
->>> benchmark_volume(2).save("volume.npz")
->>> data = np.load("volume.npz")
->>> knots = data["knots_u"], data["knots_v"], data["knots_w"]
->>> map_by_scipy = NdBSpline(knots, data["control_points"], tuple(data["degrees"].tolist()))
->>> np.allclose(map_by_scipy([0.1, 0.5, 0.9]), benchmark_volume(2)([[0.1, 0.5, 0.9]]), atol=1e-14)
-True
+docs/output.md explains our own files, NumPy archives without pickles.
 
 A solution, scalar or a displacement, is exported with its volume into every format: `vtk` and `view` hold it as the
 point data `u`, the others as a second file beside the volume's. `io.splinepy` explains G+Smo XML, MFEM meshes and
 splinepy's JSON, which are also read; `io.vtk` those for ParaView. IGES and STEP have no trivariate splines.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from parameterize.files import replacing
 from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.readers.file import FORMATS as SURFACES
+from solve.discretization.space import TrialSpace, longest_edge
+from solve.field import SplineField
 
 from ..errors import InputError, input_errors
 from ..new_file import check_new
-from ..options import PROBLEMS
+from ..options import PROBLEMS, Equation
 from ..report import document as reports
 from . import splinepy, vtk
-from .splinepy_gate import kind_of
-
-if TYPE_CHECKING:
-    from solve.field import SplineField
-
-    from ..options import Equation
+from .splinepy_gate import CHECKS, kind_of
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
@@ -57,26 +35,20 @@ class Format:
     """Hold a format of another program.
 
     ending: of its files, after the volume's stem. write: puts the volume into a file; it is also given the solution and
-    its problem, None where there are none.
-    read: None where the format is only written. field_ending, write_field: of the second file, beside the volume's,
-    that takes the solution. is_whole: `write` puts the solution into the volume's file. A format that does neither
-    refuses a solution.
+    its problem, None where there are none. beside: ending and writer of a second file, where the solution needs one.
     """
 
     ending: str
     write: Callable[..., None]
-    read: Callable[[Path], BSplineVolume] | None = None
-    field_ending: str = ""
-    write_field: Callable[[Path, SplineField], None] | None = None
-    is_whole: bool = False
+    beside: tuple[str, Callable[[Path, SplineField], None]] | None = None
 
 
 FORMATS = {
-    "gismo": Format(".xml", splinepy.write_gismo, partial(splinepy.read, kind="gismo"), "_u.xml", splinepy.write_gismo),
-    "mfem": Format(".mesh", splinepy.write_mfem, partial(splinepy.read, kind="mfem"), ".gf", splinepy.write_mfem_field),
-    "vtk": Format("_bezier.vtu", vtk.write_bezier, is_whole=True),
-    "view": Format("_view.vtu", vtk.write_view, is_whole=True),
-    "json": Format(".json", splinepy.write_json, partial(splinepy.read, kind="json"), "_u.json", splinepy.write_json),
+    "gismo": Format(".xml", splinepy.write_gismo, ("_u.xml", splinepy.write_gismo)),
+    "mfem": Format(".mesh", splinepy.write_mfem, (".gf", splinepy.write_mfem_field)),
+    "vtk": Format("_bezier.vtu", vtk.write_bezier),
+    "view": Format("_view.vtu", vtk.write_view),
+    "json": Format(".json", splinepy.write_json, ("_u.json", splinepy.write_json)),
 }
 
 
@@ -86,10 +58,8 @@ def is_volume(path: str | Path) -> bool:
     Files of other programs begin alike (glTF as JSON, 3MF as a ZIP archive), so the ending must be one that is read
     here, for a volume or for a surface; a volume may be in a .zip, too.
     """
-    from parameterize.surface.readers.file import FORMATS as SURFACES
-
     source = Path(path)
-    endings = ("", ".zip", *(one.ending for one in FORMATS.values() if one.read), *SURFACES)
+    endings = ("", ".zip", *(FORMATS[kind].ending for kind in CHECKS), *SURFACES)
     return source.suffix == ".npz" or (
         source.suffix.lower() in endings and source.is_file() and kind_of(source) is not None
     )
@@ -128,8 +98,7 @@ def load_volume(path: str | Path) -> BSplineVolume:
         kind = kind_of(source) if source.is_file() else "npz"
         if kind is None and source.suffix != ".npz":
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
-        found = FORMATS.get(kind or "npz")
-        volume = found.read(source) if found and found.read else BSplineVolume.load(source)
+        volume = splinepy.read(source, kind) if kind in CHECKS else BSplineVolume.load(source)
     if min(float(np.diff(np.unique(knots)).min()) for knots in volume.knots) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
     return volume
@@ -175,12 +144,11 @@ def export(
     if to not in FORMATS:
         raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines")
     chosen = FORMATS[to]
-    if solution and not (chosen.is_whole or chosen.write_field):
-        raise InputError(f"format {to!r}: holds no solution; leave --solution out, or export it --to vtk")
     target = check_new(
         Path(volume).stem + chosen.ending if out is None else out, chosen.ending[chosen.ending.index(".") :]
     )
-    beside = target.with_name(target.stem + chosen.field_ending) if solution and chosen.write_field else target
+    field_ending, write_field = chosen.beside if solution and chosen.beside else ("", None)
+    beside = target.with_name(target.stem + field_ending) if write_field else target
     for file in (target, beside):
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
@@ -189,22 +157,19 @@ def export(
     try:
         with replacing(target) as temporary:
             chosen.write(temporary, loaded, field, problem)
-            if field is not None and chosen.write_field is not None:
+            if field is not None and write_field is not None:
                 with replacing(beside) as temporary_beside:
-                    chosen.write_field(temporary_beside, field)
+                    write_field(temporary_beside, field)
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
     return target
 
 
-def _load_solution(path: Path, volume: BSplineVolume) -> tuple[SplineField, Equation | None]:
+def _load_solution(path: Path, volume: BSplineVolume) -> "tuple[SplineField, Equation | None]":
     """Return a solution and the problem that the report beside it names, None where its exact solution is not known.
 
     Raises InputError where the solution does not belong to the volume: by its knots, or by the h of its report.
     """
-    from solve.discretization.space import TrialSpace, longest_edge
-    from solve.field import SplineField
-
     with input_errors():
         field = SplineField.load(path)
     if field.coefficients.shape[3:] not in ((), (3,)):

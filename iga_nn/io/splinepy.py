@@ -15,22 +15,18 @@ A solution u_h(u, v, w) has a file of its own in G+Smo's and splinepy's formats,
 of one coordinate, or of three for displacements (`geoDim`, `dim`).
 """
 
-from __future__ import annotations
-
 import logging
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from parameterize.spline.volume import BSplineVolume
+from solve.field import SplineField
 
 from ..errors import InputError, one_line
 from .splinepy_gate import checked_text
-
-if TYPE_CHECKING:
-    from solve.field import SplineField
 
 INSTALL = "pip install 'iga-nn[interop]'"
 WEIGHTS_ALIKE = 1e-12  # relative

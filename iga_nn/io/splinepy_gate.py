@@ -5,8 +5,6 @@ resolves XML entities, evaluates MFEM's rows as Python literals and assumes one 
 Each function raises ValueError with the reason.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Sequence
@@ -39,7 +37,7 @@ def checked_text(path: Path, kind: str) -> str:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise ValueError("is not a text file in UTF-8") from None
-    return _CHECKS[kind](text)
+    return CHECKS[kind](text)
 
 
 def _check_gismo(text: str) -> str:
@@ -115,4 +113,4 @@ def _check_one(patches: Sequence[object]) -> None:
         raise ValueError(f"holds {len(patches)} patches; a volume is one: save the one you mean in a file of its own")
 
 
-_CHECKS: dict[str, Callable[[str], str]] = {"gismo": _check_gismo, "mfem": _check_mfem, "json": _check_json}
+CHECKS: dict[str, Callable[[str], str]] = {"gismo": _check_gismo, "mfem": _check_mfem, "json": _check_json}

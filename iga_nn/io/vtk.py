@@ -29,17 +29,14 @@ from parameterize.quality.quality import arap
 from parameterize.spline.bernstein import elevation, extraction
 from parameterize.spline.bspline import apply_along, divided_spans, insert_knots, sparse_rows
 from parameterize.spline.volume import BSplineVolume
-from solve.field import Points
+from solve.field import Points, SplineField
 from solve.forms.frame import UnitFrame
 
 from ..figures.evaluate import error_at
+from ..options import Equation
 
 if TYPE_CHECKING:
     import pyvista
-
-    from solve.field import SplineField
-
-    from ..options import Equation
 
 SAMPLES = 3  # intervals of the view per span and direction
 BEZIER_HEXAHEDRON = 79

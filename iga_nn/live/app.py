@@ -1,7 +1,5 @@
 """Checks the options of the live page, `iga-nn app`, and that its packages are installed; then serves it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory

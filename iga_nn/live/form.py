@@ -1,7 +1,5 @@
 """Reads the form in which the live page asks for the data of Poisson's equation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

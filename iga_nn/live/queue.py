@@ -4,8 +4,6 @@ A job's states are checking -> refused | ready -> waiting -> running -> done | f
 started again.
 """
 
-from __future__ import annotations
-
 import logging
 import re
 import shutil
@@ -22,7 +20,8 @@ from parameterize.surface.surface import MeshError, Surface
 from ..errors import one_line
 from ..options import PoissonOptions
 from ..workflow.output_folder import default_folder
-from .worker import End, Message, Step
+from ..workflow.watched import Ended
+from .worker import Message, Step
 
 log = logging.getLogger(__name__)
 
@@ -174,8 +173,9 @@ class Jobs:
             for message in self._run(job):
                 if isinstance(message, Step):
                     self._take(job, message)
-                elif isinstance(message, End):
-                    state, text = message.state, message.text
+                elif isinstance(message, Ended):
+                    state = "failed" if message.state == "refused" else message.state
+                    text = message.line
                 else:
                     job.log.append(message)
                 self._changed(job)

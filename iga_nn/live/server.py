@@ -4,8 +4,6 @@ All open tabs share the list of jobs; each tab chooses which one it shows. The b
 needs no graphics library for them.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import webbrowser

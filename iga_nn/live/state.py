@@ -1,7 +1,5 @@
 """Turns a job into what the browser shows of it: plain values, and arrays for vtk.js."""
 
-from __future__ import annotations
-
 import base64
 import math
 from typing import Any

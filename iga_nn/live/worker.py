@@ -3,8 +3,6 @@
 It is a process so that a stop works during every step, and so that its memory is freed when it ends.
 """
 
-from __future__ import annotations
-
 import logging
 import multiprocessing
 import os
@@ -16,17 +14,15 @@ from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event as SharedEvent
 from pathlib import Path
 from threading import Event
-from typing import Literal
 
 from parameterize.arrays import Array
 from parameterize.progress import Progress
 
-from ..errors import expected_errors, one_line
 from ..options import MapOptions, PoissonOptions
-from ..workflow import logged, pipeline
+from ..workflow import pipeline
+from ..workflow.output_folder import Outcome
+from ..workflow.watched import Ended, ended, logged, told
 
-INTERVAL = 0.4  # seconds, at least, between two steps that are reported
-SHARE = 0.05  # of the job's time, at most, that reporting takes
 GRACE = 3.0  # seconds a job has to stop by itself, leaving a checkpoint
 
 
@@ -38,19 +34,11 @@ class Step:
     mapped: Array | None
 
 
-@dataclass(frozen=True)
-class End:
-    """Say how the job ended. text: why it failed."""
-
-    state: Literal["done", "failed", "stopped"]
-    text: str = ""
-
-
-Message = Step | str | End  # a string is a line of the log
+Message = Step | str | Ended  # a string is a line of the log
 
 
 def run(folder: Path, name: str, mapping: MapOptions | None, poisson: PoissonOptions, stop: Event) -> Iterator[Message]:
-    """Run the surface `name` in `folder`, which also takes the results; yield messages as they come, an End last.
+    """Run the surface `name` in `folder`, which also takes the results; yield messages as they come, an Ended last.
 
     mapping: None where the file is a volume, on which the problem is only solved.
     """
@@ -71,7 +59,7 @@ def run(folder: Path, name: str, mapping: MapOptions | None, poisson: PoissonOpt
 def _follow(
     receiver: Connection, halt: SharedEvent, stop: Event, process: multiprocessing.process.BaseProcess
 ) -> Iterator[Message]:
-    """Yield messages up to the End; where the process exits without one, add it."""
+    """Yield messages up to the Ended; where the process exits without one, add it."""
     patience = float("inf")
     while True:
         if stop.is_set() and not halt.is_set():
@@ -86,10 +74,10 @@ def _follow(
         except (EOFError, OSError):
             process.join()
             code = process.exitcode
-            yield End("stopped") if stop.is_set() else End("failed", f"the job's process exited with code {code}")
+            yield Ended("stopped") if stop.is_set() else Ended("failed", f"the job's process exited with code {code}")
             return
         yield message
-        if isinstance(message, End):
+        if isinstance(message, Ended):
             return
 
 
@@ -99,45 +87,26 @@ def _work(
     """Run the job in the child process, in the job's folder: messages then name the file as the user does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C in the terminal
     os.chdir(folder)
-    teller = _Teller(sender, halt)
-    try:
-        with logged(teller, logging.INFO):
-            if mapping is None:
-                pipeline.solve_to(name, problem=poisson, force=True)  # over what a stopped solve left
-            else:
-                pipeline.run("poisson", name, mapping=mapping, poisson=poisson, progress=teller.step)
-    except KeyboardInterrupt:
-        sender.send(End("stopped"))
-    except expected_errors() as error:
-        sender.send(End("failed", one_line(error)))
-    except Exception as error:
-        sender.send(
-            End("failed", f"internal error, please report it: {one_line(error)}; the terminal shows the traceback")
-        )
-        raise
-    else:
-        sender.send(End("done"))
+
+    def tell(now: Progress) -> None:
+        sender.send(Step(replace(now, mapped=None), now.mapped() if now.mapped is not None else None))
+
+    def work() -> Outcome | None:
+        if mapping is None:
+            return pipeline.solve_to(name, problem=poisson, force=True)  # over what a stopped solve left
+        return pipeline.parameterize_to(name, mapping=mapping, problem=poisson, progress=told(tell, halt.is_set))
+
+    with logged(_Lines(sender), logging.INFO):
+        sender.send(ended(work, "lower --control-points or --refine"))
 
 
-class _Teller(logging.Handler):
-    """Sends the lines of the log and some of the steps; interrupts the training when a stop is asked for."""
+class _Lines(logging.Handler):
+    """Sends the lines of the log."""
 
-    def __init__(self, sender: Connection, halt: SharedEvent) -> None:
+    def __init__(self, sender: Connection) -> None:
         super().__init__()
-        self._sender, self._halt, self._next = sender, halt, 0.0
+        self._sender = sender
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Send a line of the log."""
+        """Send a line."""
         self._sender.send(record.getMessage())
-
-    def step(self, progress: Progress) -> None:
-        """Report the state after a step of the training."""
-        if self._halt.is_set():
-            raise KeyboardInterrupt
-        start = time.monotonic()
-        if start < self._next:
-            return
-        mapped = progress.mapped() if progress.mapped is not None else None
-        self._sender.send(Step(replace(progress, mapped=None), mapped))
-        end = time.monotonic()
-        self._next = end + max(INTERVAL, (end - start) / SHARE)

@@ -1,34 +1,26 @@
 """Says where a map is not certified, and what to try."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from parameterize.arrays import Array, in_brackets
+from parameterize.arrays import Array, IntArray, in_brackets
+from parameterize.certificate.jacobian import Certificate
 from parameterize.spline.bspline import midpoints
+from parameterize.spline.volume import BSplineVolume
 
-from ..options import MAX_CONTROL_POINTS
+from ..options import MAX_CONTROL_POINTS, MapOptions
 from .document import Report, is_certified
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from parameterize.certificate.jacobian import Certificate
-    from parameterize.spline.volume import BSplineVolume
-
-    from ..options import MapOptions
 
 SHOWN = 5  # places
 
 
-def span_parameters(volume: BSplineVolume, spans: NDArray[np.int64]) -> Array:
+def span_parameters(volume: BSplineVolume, spans: IntArray) -> Array:
     """Return the midpoints (k, 3), in the cube, of knot spans numbered by (k, 3)."""
     return np.stack([midpoints(knots)[spans[:, axis]] for axis, knots in enumerate(volume.knots)], axis=1)
 
 
-def span_places(volume: BSplineVolume, spans: NDArray[np.int64]) -> Array:
+def span_places(volume: BSplineVolume, spans: IntArray) -> Array:
     """Return the images (k, 3) of the midpoints of spans (k, 3), in the volume's units."""
     return volume(span_parameters(volume, spans)) if len(spans) else np.empty((0, 3))
 

@@ -1,14 +1,13 @@
 """Lists every file of an output folder: what it shows, which part of a run writes it, how a figure is drawn.
 
-The output folder, the report page and the live page are made from this table; a test compares that of docs/output.md
-with it. A new figure needs a function in `iga_nn.figures` and a row here.
+The output folder, the report page, the live page and the table of docs/output.md are made from this table. A new figure
+needs a function in `iga_nn.figures` and a row here; `make docs` writes the table of docs/output.md anew.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
+from importlib import import_module
+from pathlib import Path
 from typing import Any, Literal
 
 from ..options import PROBLEMS
@@ -25,18 +24,26 @@ class Artifact:
     """Describe one file of an output folder.
 
     part: the part of a run that writes it. shows: what the file holds or the figure shows; the heading of a figure.
-    arrays: names in an archive. draw: the function of `iga_nn.figures` that draws the figure from `takes`, the names of
-    what must be known; the figure is left out where one of them is not.
-    is_curve: drawn without VTK, and written as PDF, too, where that is wanted.
+    draw: module and function of `iga_nn.figures` that draw the figure from `takes`, the names of what must be known;
+    the figure is left out where one of them is not. arrays: names in an archive.
     """
 
     file: str
     part: Part
     shows: str
-    arrays: tuple[str, ...] = ()
     draw: str = ""
     takes: tuple[str, ...] = ()
-    is_curve: bool = False
+    arrays: tuple[str, ...] = ()
+
+    @property
+    def is_curve(self) -> bool:
+        """Return whether the figure is drawn without VTK, and written as PDF, too, where that is wanted."""
+        return self.draw.startswith("curves.")
+
+    def draw_to(self, path: Path, known: Mapping[str, Any]) -> None:
+        """Draw the figure from what is known, and write it."""
+        module, function = self.draw.split(".")
+        getattr(import_module(f"iga_nn.figures.{module}"), function)(path, *(known[name] for name in self.takes))
 
 
 _KNOTS = ("degrees", "knots_u", "knots_v", "knots_w")
@@ -44,32 +51,27 @@ _BOUNDARY = ("vertices", "parameters", "faces")
 _ERROR = ("volume", "solution", "problem")
 
 
-def _figure(file: str, part: Part, shows: str, draw: str, *takes: str, is_curve: bool = False) -> Artifact:
-    return Artifact(file, part, shows, draw=draw, takes=takes, is_curve=is_curve)
-
-
-_curve = partial(_figure, is_curve=True)
-
-
 ARTIFACTS = (  # in the order of the pages
-    Artifact("volume.npz", "map", "the spline volume", (*_KNOTS, "control_points")),
-    Artifact("solution.npz", "solution", "the solution on the finest mesh", (*_KNOTS, "coefficients")),
-    Artifact("boundary.npz", "map", "the map from the surface to the cube's faces", _BOUNDARY),
+    Artifact("volume.npz", "map", "the spline volume", arrays=(*_KNOTS, "control_points")),
+    Artifact("solution.npz", "solution", "the solution on the finest mesh", arrays=(*_KNOTS, "coefficients")),
+    Artifact("boundary.npz", "map", "the map from the surface to the cube's faces", arrays=_BOUNDARY),
     Artifact(PAGE, "report", "the report to read: verdict, figures, tables and an interactive view, in one file"),
     Artifact(REPORT, "report", "the report for programs: input, configuration, versions, certificate, errors, seconds"),
     Artifact("history.npz", "map", "the loss, its terms and the number of folded samples at every training step"),
     Artifact("study.csv", "study", "the errors and their rates in a convergence study"),
-    _figure("meeting.png", "map", "where the boundary meets itself", "draw_meeting", "volume", "meeting"),
-    _figure("folds.png", "map", "where det J > 0 is not proved", "draw_folds", "volume", "places"),
-    _figure("faces.png", "map", "images of the cube's faces", "draw_faces", "volume", "marks"),
-    _figure("lines.png", "map", "parameter lines on the cube's faces", "draw_lines", "volume"),
-    _figure("cut.png", "map", "the volume cut open, with the distortion inside", "draw_cut", "volume"),
-    _figure("distortion.png", "map", "distortion on three sections", "draw_distortion", "volume"),
-    _curve("history.png", "map", "loss over the training steps", "draw_history", "history"),
-    _figure("named_faces.png", "solution", "the volume's faces by name", "draw_faces", "named_volume"),
-    _curve("convergence.png", "solution", "errors over the mesh size", "draw_study", "levels"),
-    _figure("error.png", "solution", "error on the boundary and on three sections", "draw_error", *_ERROR),
-    _curve("study.png", "study", "errors of the convergence study over the mesh size", "draw_study", "study"),
+    Artifact("meeting.png", "map", "where the boundary meets itself", "map.draw_meeting", ("volume", "meeting")),
+    Artifact("folds.png", "map", "where det J > 0 is not proved", "map.draw_folds", ("volume", "places")),
+    Artifact("faces.png", "map", "images of the cube's faces", "map.draw_faces", ("volume", "marks")),
+    Artifact("lines.png", "map", "parameter lines on the cube's faces", "map.draw_lines", ("volume",)),
+    Artifact("cut.png", "map", "the volume cut open, with the distortion inside", "map.draw_cut", ("volume",)),
+    Artifact("distortion.png", "map", "distortion on three sections", "map.draw_distortion", ("volume",)),
+    Artifact("history.png", "map", "loss over the training steps", "curves.draw_history", ("history",)),
+    Artifact("named_faces.png", "solution", "the volume's faces by name", "map.draw_faces", ("named_volume",)),
+    Artifact("convergence.png", "solution", "errors over the mesh size", "curves.draw_study", ("levels",)),
+    Artifact("error.png", "solution", "error on the boundary and on three sections", "solution.draw_error", _ERROR),
+    Artifact(
+        "study.png", "study", "errors of the convergence study over the mesh size", "curves.draw_study", ("study",)
+    ),
 )
 
 

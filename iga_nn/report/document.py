@@ -1,7 +1,5 @@
 """Writes, reads and judges report.json."""
 
-from __future__ import annotations
-
 import json
 import math
 import platform
@@ -9,7 +7,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -89,6 +87,13 @@ def is_meaningful(report: Report) -> bool:
     """Return whether the numbers of the finest solve mean something; True where nothing was solved."""
     levels = solved(report).get("levels", [])
     return not levels or levels[-1].get("meaningful", True) is not False
+
+
+def state(report: Report) -> Literal["certified", "not certified", "not solved"]:
+    """Return what a finished run has reached; "not solved" where the numbers of a solve are not to be trusted."""
+    if not is_certified(report):
+        return "not certified"
+    return "certified" if is_converged(report) and is_meaningful(report) else "not solved"
 
 
 def solved(report: Report) -> Report:

@@ -3,29 +3,22 @@
 The page is laid out by the template page.html, which escapes whatever it is given; this module chooses its content.
 """
 
-from __future__ import annotations
-
 import base64
 import logging
-from collections.abc import Mapping
 from html import escape
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from parameterize.files import save_text
 
 from ..errors import one_line
-from ..levels import TITLES, capitalized
+from ..levels import TITLES, as_rows, capitalized
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, SOLVED, figures_of
 from .document import Report
-from .tables import as_rows
-
-if TYPE_CHECKING:
-    from .viewer import Scene
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +40,7 @@ ORIGINS = {
 }
 
 
-def write(folder: Path, report: Report, scene: Scene | None) -> None:
+def write(folder: Path, report: Report, scene: dict[str, Any] | None) -> None:
     """Write report.html from a finished report and the figures in its folder; atomic.
 
     scene: for the interactive view, None where it could not be drawn. Where the page cannot be laid out, a bare one
@@ -69,12 +62,13 @@ def _bare(report: Report, reason: str) -> str:
     )
 
 
-def page(report: Report, scene: Scene | None, folder: Path) -> str:
+def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
     """Return the page as text."""
     section = reports.solved(report)
-    return _render(
-        "page.html",
-        title=f"{Path(report['input']['file']).name}: {_heading(report)}",
+    what = next((title for name, title in SOLVED.items() if name in report), "spline volume")
+    return filled(
+        "report/page.html",
+        title=f"{Path(report['input']['file']).name}: {what}",
         report=report,
         verdicts=_verdicts(report),
         facts=_facts(report),
@@ -88,31 +82,11 @@ def page(report: Report, scene: Scene | None, folder: Path) -> str:
     )
 
 
-def scene_page(scene: Scene, title: str) -> str:
-    """Return a page with the interactive view alone, to stand in a frame of another page."""
-    return _render("scene.html", title=title, scene=scene)
-
-
-def _render(template: str, **content: Any) -> str:
-    """Return a template of this folder with its content, and with the style and the viewer."""
-    here = files(__package__)
-    return filled(__package__, template, {"style": here / "page.css", "script": here / "viewer.js"}, **content)
-
-
-def filled(package: str, template: str, inserted: Mapping[str, Traversable], **content: Any) -> str:
-    """Return a package's template with its content, which is escaped, and with files of ours as they are."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-
-    environment = Environment(
-        loader=PackageLoader(package, ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    own = {name: Markup(file.read_text(encoding="utf-8")) for name, file in inserted.items()}  # noqa: S704
-    return environment.get_template(template).render(own, **content)
-
-
-def _heading(report: Report) -> str:
-    return next((text for section, text in SOLVED.items() if section in report), "spline volume")
+def filled(template: str, **content: Any) -> str:
+    """Return a template of this package with its content, which is escaped."""
+    loader = PackageLoader("iga_nn", "")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return environment.get_template(template).render(content)
 
 
 def _verdicts(report: Report) -> list[tuple[str, str, str]]:

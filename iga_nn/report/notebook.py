@@ -1,7 +1,5 @@
 """Lays out what a notebook shows of a result: its facts as a table, without pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from functools import singledispatch
@@ -17,8 +15,8 @@ from parameterize.surface.surface import Surface
 from solve.solution import Solution
 from solve.study import Convergence
 
+from ..levels import as_rows
 from . import document as reports
-from .tables import as_rows
 
 
 @singledispatch

@@ -5,27 +5,23 @@ Nine patches (the six faces, u = 1/2, v = 1/2, w = 1/2) are sampled on lattices 
 volume with all its fields.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
+from solve import SplineField
 
 from ..figures import evaluate
-from ..figures.color_range import ColorRange, error_range, even_range
 from ..figures.evaluate import distortions, points_on, solution_on
 from ..figures.render import TILT, widest_view
-
-if TYPE_CHECKING:
-    from solve import SplineField
-
-    from ..options import Equation
+from ..figures.style import ColorRange, error_range, even_range
+from ..options import Equation
 
 SAMPLES = 81  # per direction of a patch
 
@@ -35,7 +31,7 @@ Scene = dict[str, Any]
 def scene_of(
     volume: BSplineVolume,
     solution: SplineField | None = None,
-    problem: Equation | None = None,
+    problem: "Equation | None" = None,
     *,
     samples: int = SAMPLES,
 ) -> Scene:
@@ -43,8 +39,6 @@ def scene_of(
 
     samples: points per direction of a patch.
     """
-    from matplotlib import colormaps
-
     grids = evaluate.all_grids(samples)
     points = [points_on(volume, grid) for grid in grids]
     fields = [_field("distortion", "tanh(√ARAP / 2), volume 1", distortions(volume, grids), ColorRange(0.0, 1.0))]

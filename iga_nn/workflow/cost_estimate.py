@@ -1,26 +1,36 @@
-"""Estimates the time and the memory of a run before it starts, from counts and the time of two small pieces of work.
+"""Estimates the time and the memory of a run, and the memory of a solve, before it starts.
 
-The pieces, run on all threads, are a pass (the network forward and backward on 1000 points) and a product with the
-second derivative of the spline's distortion. How many of them a run takes is known from conch and duck, and of
-hard surfaces from bone and homer.
+That of a run comes from counts and the time of two small pieces of work on all threads: a pass (the network forward and
+backward on 1000 points) and a product with the second derivative of the spline's distortion. How many of them a run
+takes is known from conch and duck, and of hard surfaces from bone and homer. That of a solve comes from counts alone.
 """
 
 from __future__ import annotations
 
+import logging
 import math
+import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from parameterize.config import Config, RefinementConfig, SplineConfig
+from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.surface import Surface
+from solve.discretization.errors import POINTS
+from solve.discretization.quadrature import rule_of
+from solve.discretization.space import trial_space
+
+from ..options import Equation, ProblemOptions
 
 if TYPE_CHECKING:
     import torch
 
-    from parameterize.config import Config, RefinementConfig, SplineConfig
-    from parameterize.surface.surface import Surface
+log = logging.getLogger(__name__)
 
 Clock = Callable[[], float]
 REPEATS = 3
@@ -41,6 +51,12 @@ HARD_AFTER = (3, 14)  # likewise each time that knots were inserted
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
+
+# Of a solve, counted in numbers of 8 bytes; tests compare them with what a solve takes.
+SYMMETRIC, OTHER = 25, 85  # an unknown: vectors of conjugate gradients or GMRES, preconditioner, norms
+BLOCK, CONSTANT = 6, 9  # a quadrature point: a tensor, kept or for a moment; the geometry of a constant law
+PLANES = 30  # arrays of a plane of points, where the error is measured
+EVERYWHERE = 3  # an unknown: the solution, whole on every process
 
 
 @dataclass(frozen=True)
@@ -185,3 +201,57 @@ def available_memory_mb(processes: int = 1) -> float | None:
     if limit != resource.RLIM_INFINITY:
         found.append(max(0.0, (limit - pages * resource.getpagesize()) / 1e6))
     return min(found, default=None)
+
+
+def warn_of_memory(wanted_mb: float, what: str, remedy: str) -> None:
+    """Warn where so many megabytes are not free. what: takes them, in words."""
+    free = available_memory_mb()
+    if free is not None and wanted_mb > free:
+        log.warning("%s, %.1f GB are free: %s", what, free / 1000.0, remedy)
+
+
+@dataclass(frozen=True)
+class SolveMemory:
+    """Hold what a solve takes beside the program: megabytes that processes share, and those that each of them takes."""
+
+    shared_mb: float
+    each_mb: float
+
+    def on(self, processes: int) -> float:
+        """Return the megabytes of each of some processes."""
+        return self.shared_mb / processes + self.each_mb
+
+
+def solve_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptions) -> SolveMemory:
+    """Return the forecast for the finest level."""
+    form, space = equation.form, trial_space(volume, max(options.refine), options.degree)
+    rule = rule_of(volume, space, equation.on(volume).form.tensor, options.quadrature)
+    points = float(np.prod(rule.shape, dtype=float))
+    unknowns = float(form.components * space.dofs)
+    kept = CONSTANT * form.constant + BLOCK + form.has_reaction
+    (_, *degrees), (_, *functions) = space.degrees, space.shape
+    plane = min(POINTS, math.prod((p + 2) * n for p, n in zip(degrees, functions, strict=True)))
+    shared = points * kept + unknowns * (SYMMETRIC if form.symmetric else OTHER)
+    each = plane * PLANES + EVERYWHERE * unknowns + volume.control_points.size
+    return SolveMemory(8e-6 * shared, 8e-6 * each)
+
+
+def tell_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptions, comm: Any = None) -> None:
+    """Log what the finest level will take, warn where that is not free, and say how many processes could solve it."""
+    processes, here = 1, 1
+    if comm is not None:
+        processes, here = comm.size, comm.allgather(platform.node()).count(platform.node())
+    wanted, free = solve_memory(volume, equation, options), available_memory_mb(here)
+    needed = wanted.on(processes)
+    log.info("estimate: %.2f GB of memory%s", needed / 1000.0, f" on each of {processes} processes" * (processes > 1))
+    if free is None or needed <= free:
+        return
+    spans = len(trial_space(volume, max(options.refine), options.degree).breaks[0]) - 1
+    enough = next((count for count in range(processes + 1, spans + 1) if wanted.on(count) <= free), None)
+    more = f", or take {enough} processes with as much memory each: mpiexec -n {enough} iga-nn solve .. --mpi"
+    log.warning(
+        "%.2f GB of memory are needed, %.2f GB are free: lower --refine%s",
+        needed / 1000.0,
+        free / 1000.0,
+        more if enough else "",
+    )

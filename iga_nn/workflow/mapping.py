@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -11,28 +12,34 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.files import save_arrays
+from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import FACE_NAMES
+from parameterize.surface.geometry import vertex_normals
+from parameterize.surface.surface import Surface
+from solve import ExpressionError
+from solve.diagnostics import empty_formulas
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
 from ..models import resolve
-from ..options import Equation, MapOptions, read_corners
+from ..options import Equation, MapOptions
 from ..report import advice
 from ..report import document as reports
-from .cost_estimate import Forecast, available_memory_mb, forecast
+from .cost_estimate import Forecast, forecast, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
 from .verdict import tell
 
 if TYPE_CHECKING:
-    from parameterize.progress import ProgressCallback
     from parameterize.run import Parameterization
-    from parameterize.surface.surface import Surface
 
 log = logging.getLogger(__name__)
 
 _TRIED = 50  # points of the surface
+_CORNERS_BYTES = 65_536
+_LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
+_LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +106,43 @@ def _prepare(
         state.begin("map", "solution")
     with state.timed("load"):
         expected = forecast(surface, config, device=device, unknowns=unknowns)
-    _announce(expected)
+    log.info("estimate: %s", expected)
+    needed = f"{expected.memory_mb / 1000.0:.1f} GB of memory are needed"
+    warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
     return _Given(surface, corners, marks, expected)
+
+
+def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray:
+    """Return eight points (8, 3) in the surface's units or eight vertex numbers (8,) from a JSON file.
+
+    frame: that of the surface; where it is known, the file may hold {"XYZ": [...]}, points in scaled coordinates.
+    Raises InputError.
+    """
+    try:
+        with path.open(encoding="utf-8") as stream:
+            given = json.loads(stream.read(_CORNERS_BYTES))
+        scaled = frame if isinstance(given, dict) and list(given) == ["XYZ"] else None
+        rows = np.array(given["XYZ"] if scaled else given, dtype=object)
+        if any(isinstance(number, bool) for number in rows.flat):
+            raise TypeError
+        rows = np.array(rows.tolist(), dtype=np.float64)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, TypeError, OverflowError, RecursionError):
+        expected = 'a JSON list of eight points or of eight vertex numbers, or {"XYZ": eight points}'
+        raise InputError(f"{path}: corners must be {expected}") from None
+    if rows.shape not in ((8, 3), (8,)) or not np.all(np.abs(rows) <= _LARGEST_COORDINATE):  # also refuses NaN
+        raise InputError(
+            f"{path}: corners must be eight points of three finite coordinates or eight vertex numbers, "
+            f"found an array of shape {rows.shape}"
+        )
+    if rows.shape == (8, 3):
+        return scaled.to_units(rows) if scaled else rows
+    if scaled:
+        raise InputError(f"{path}: XYZ must hold eight points of three coordinates; vertex numbers stand in a list")
+    if np.any(rows != np.rint(rows)) or np.abs(rows).max() > _LARGEST_WHOLE:
+        raise InputError(f"{path}: vertex numbers must be whole and at most {_LARGEST_WHOLE}")
+    return rows.astype(np.int64)
 
 
 def _frame(surface: Surface) -> UnitFrame:
@@ -112,9 +154,6 @@ def _frame(surface: Surface) -> UnitFrame:
 
 def _check_data(equation: Equation, surface: Surface) -> None:
     """Check the problem's data on the surface: no points inside are known yet. Raises ExpressionError."""
-    from parameterize.surface.geometry import vertex_normals
-    from solve.diagnostics import empty_formulas
-
     equation = equation.placed(_frame(surface))
     points = surface.vertices.T
     for evaluate in (equation.boundary_at, equation.source_at, equation.form.tensor, equation.form.mass):
@@ -131,8 +170,6 @@ def _check_data(equation: Equation, surface: Surface) -> None:
 
 def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:
     """Raise the ExpressionError that `evaluate` raises at all points tried: a face's data need only be valid on it."""
-    from solve import ExpressionError
-
     refused = None
     for row in np.linspace(0, len(points) - 1, _TRIED).astype(int):
         try:
@@ -142,18 +179,6 @@ def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, 
             refused = error
     assert refused is not None
     raise refused
-
-
-def _announce(expected: Forecast) -> None:
-    """Log what the run will take, and warn where that much memory is not free."""
-    log.info("estimate: %s", expected)
-    free = available_memory_mb()
-    if free is not None and expected.memory_mb > free:
-        log.warning(
-            "%.1f GB of memory are needed, %.1f GB are free: lower --control-points or --refine, or free some",
-            expected.memory_mb / 1000.0,
-            free / 1000.0,
-        )
 
 
 def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None, checkpoint: Path) -> Parameterization:

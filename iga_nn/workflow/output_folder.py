@@ -1,7 +1,5 @@
 """Holds one output folder for one run: its report so far, and the clock."""
 
-from __future__ import annotations
-
 import logging
 import os
 import shutil
@@ -18,7 +16,7 @@ from parameterize.progress import timed
 
 from ..errors import InputError, one_line
 from ..report import document as reports
-from ..report.artifacts import REPORT, Part, files_of
+from ..report.artifacts import ARTIFACTS, REPORT, Part, files_of
 
 log = logging.getLogger(__name__)
 
@@ -52,30 +50,32 @@ class RunFolder:
         return timed(self.seconds, step)
 
     def draw(self, part: Part, **known: Any) -> None:
-        """Draw the figures of one part of a run.
+        """Draw the figures of one part of a run for which `known`, by the names of the table, suffices."""
+        with self.timed("report"), self.drawing("figures"):
+            from ..figures import render
 
-        known: what the figures show, by the names that the table of artifacts uses. Figures that fail are listed in the
-        report as `not_drawn`, with the reason.
-        """
-        endings = (".png", ".pdf") if self.vector else (".png",)
-        with self.drawing("figures"):
-            from ..report.figures import draw_figures
-
-            self._note_failures(draw_figures(self.folder, part, known, endings))
+            for figure in ARTIFACTS:
+                if not figure.draw or figure.part != part or not known.keys() >= set(figure.takes):
+                    continue
+                if not figure.is_curve and not render.can_draw():
+                    self._not_drawn(figure.file, render.CANNOT_DRAW)
+                    continue
+                for ending in (".png", ".pdf") if figure.is_curve and self.vector else (".png",):
+                    path = (self.folder / figure.file).with_suffix(ending)
+                    with self.drawing(path.name):
+                        figure.draw_to(path, known)
 
     @contextmanager
     def drawing(self, what: str) -> Iterator[None]:
         """Let the block draw: where it fails, in importing matplotlib or VTK for example, the report says so."""
-        with self.timed("report"):
-            try:
-                yield
-            except Exception as error:  # no figure ends a run
-                self._note_failures({what: one_line(error) or type(error).__name__})
-                log.warning("%s could not be drawn: %s", what, one_line(error))
+        try:
+            yield
+        except Exception as error:  # no figure ends a run
+            self._not_drawn(what, one_line(error) or type(error).__name__)
+            log.warning("%s could not be drawn: %s", what, one_line(error))
 
-    def _note_failures(self, failures: dict[str, str]) -> None:
-        if failures:
-            self.report["not_drawn"] = self.report.get("not_drawn", {}) | failures
+    def _not_drawn(self, what: str, reason: str) -> None:
+        self.report.setdefault("not_drawn", {})[what] = reason
 
     def begin(self, *parts: Part) -> None:
         """Remove the report and the files of these parts that an older run left; call it once the input is accepted."""

@@ -3,36 +3,33 @@
 Every file is written as soon as its content is known, so that a late failure loses nothing that was computed before.
 """
 
-from __future__ import annotations
-
 import logging
 from collections import deque
 from contextlib import ExitStack, nullcontext
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from parameterize.files import save_text
+from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import BSplineVolume
+from solve import ConvergenceRow, Solution, check_device, check_problem, convergence
 from solve.discretization.space import agreed
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
+from ..levels import as_csv, as_table, rows_of
 from ..options import PROBLEMS, Equation, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
 from ..report import document as reports
-from ..report import html, tables
+from ..report import html
+from .cost_estimate import tell_memory
 from .mapping import map_surface
-from .memory import tell_memory
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
 from .repeat import command_line, gives_the_same
 from .solving import described, each_level, notices_of, reported, scene_of, solve_levels, verdict_of
 from .verdict import write_certificate
-
-if TYPE_CHECKING:
-    from parameterize.progress import ProgressCallback
-    from solve import ConvergenceRow, Solution
 
 log = logging.getLogger(__name__)
 
@@ -99,39 +96,7 @@ def run(
             raise InputError(f"{name} must be {kind.__name__}(...), got {value!r:.80}")
     if others := [name for name, value in given.items() if value is not None]:
         raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
-    equation, unknowns = checked(mapping, options)
-    command = command_line(f"run {problem}", mesh, mapping, options, out=out)
-    with open_folder(mesh, out, force, mapping.resume, vector) as state:
-        if state.finished:
-            return _finished_by(command, state.finished, vector, problem)
-        volume = map_surface(state, mesh, mapping, progress, command, equation, unknowns).volume
-        solution = solve_levels(state, volume, equation, options)
-        return _finish(state, volume, solution, equation)
-
-
-def checked(mapping: MapOptions, options: ProblemOptions) -> tuple[Equation, int]:
-    """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
-    equation, degree = options.problem(), mapping.config().spline.degree
-    blank = BSplineVolume.uniform(np.zeros((mapping.most_control_points,) * 3 + (3,)), degree)
-    return equation, check_size(blank, max(options.refine), options.degree, equation.form.components)
-
-
-def finished_run(
-    mesh: str | Path, out: str | Path, mapping: MapOptions, options: ProblemOptions | None, *, vector: bool = False
-) -> Outcome | None:
-    """Return the finished result of that run in its folder, None where there is none.
-
-    options: those of the problem, None for `parameterize_to`. Raises InputError where another command made the result,
-    or where files of it are gone.
-    """
-    report = reports.read(Path(out))
-    if report is None or not reports.is_finished(report):
-        return None
-    finished = Outcome(Path(out), report)
-    if options is None:
-        return _finished_by(command_line("parameterize", mesh, mapping, out=out), finished, vector)
-    command = command_line(f"run {options.section}", mesh, mapping, options, out=out)
-    return _finished_by(command, finished, vector, options.section)
+    return parameterize_to(mesh, out, mapping=mapping, problem=options, force=force, vector=vector, progress=progress)
 
 
 def parameterize_to(
@@ -139,17 +104,49 @@ def parameterize_to(
     out: str | Path | None = None,
     *,
     mapping: MapOptions | None = None,
+    problem: ProblemOptions | None = None,
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
 ) -> Outcome:
-    """Parameterize a surface as `run` does, without solving a problem."""
+    """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does."""
     mapping = mapping or MapOptions()
-    command = command_line("parameterize", mesh, mapping, out=out)
+    equation, unknowns = (None, 0) if problem is None else checked(mapping, problem)
+    command = _command(mesh, out, mapping, problem)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
-            return _finished_by(command, state.finished, vector)
-        return _finish(state, map_surface(state, mesh, mapping, progress, command).volume)
+            return _finished_by(command, state.finished, vector, problem)
+        volume = map_surface(state, mesh, mapping, progress, command, equation, unknowns).volume
+        if problem is None or equation is None:
+            return _finish(state, volume)
+        return _finish(state, volume, solve_levels(state, volume, equation, problem), equation)
+
+
+def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, problem: ProblemOptions | None) -> str:
+    """Return the command that repeats such a run."""
+    if problem is None:
+        return command_line("parameterize", mesh, mapping, out=out)
+    return command_line(f"run {problem.section}", mesh, mapping, problem, out=out)
+
+
+def checked(mapping: MapOptions, problem: ProblemOptions) -> tuple[Equation, int]:
+    """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
+    equation, degree = problem.problem(), mapping.config().spline.degree
+    blank = BSplineVolume.uniform(np.zeros((mapping.most_control_points,) * 3 + (3,)), degree)
+    return equation, check_size(blank, max(problem.refine), problem.degree, equation.form.components)
+
+
+def finished_run(
+    mesh: str | Path, out: str | Path, mapping: MapOptions, problem: ProblemOptions | None, *, vector: bool = False
+) -> Outcome | None:
+    """Return the finished result of `parameterize_to` in its folder, None where there is none.
+
+    Raises InputError where another command made the result, or where files of it are gone.
+    """
+    report = reports.read(Path(out))
+    if report is None or not reports.is_finished(report):
+        return None
+    return _finished_by(_command(mesh, out, mapping, problem), Outcome(Path(out), report), vector, problem)
 
 
 def solve_to(
@@ -168,8 +165,6 @@ def solve_to(
     call this and share the solve; the first one writes, the others get None. Takes the other options of `run`, and
     raises as it does.
     """
-    from solve import check_device, check_problem
-
     options, path = problem or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
@@ -212,8 +207,6 @@ def study_to(
 
     Takes the other options of `run`, and raises as it does.
     """
-    from solve import check_problem, convergence
-
     options, path = options or StudyOptions(), Path(volume)
     equation, levels = options.problem(), options.levels()
     loaded = load_volume(path)
@@ -230,23 +223,20 @@ def study_to(
             for degree in degrees:
                 study[degree] = convergence(loaded, equation, levels, degree, certified=verdict_of(state))
                 log.info("degree %d: solved", degree)
-        save_text(state.folder / "study.csv", tables.as_csv(study))
+        save_text(state.folder / "study.csv", as_csv(study))
         notices = notices_of(row.report for row in chain(*study.values()))
         known = described(equation, loaded) | ({"exact": options.exact} if options.exact else {})
-        state.write(study=known | {"levels": tables.rows_of(study), "notices": notices})
+        state.write(study=known | {"levels": rows_of(study), "notices": notices})
         state.draw("study", study=study)
-        return _finish(state, loaded), tables.as_table(study)
+        return _finish(state, loaded), as_table(study)
 
 
-def _finished_by(command: str, finished: Outcome, vector: bool, problem: str | None = None) -> Outcome:
-    """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone.
-
-    problem: the one that the run is to solve, None where it solves none.
-    """
+def _finished_by(command: str, finished: Outcome, vector: bool, problem: ProblemOptions | None) -> Outcome:
+    """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone."""
     folder, made_by = finished.folder, finished.report.get("command", "")
-    if problem is not None and problem not in finished.report:
+    if problem is not None and problem.section not in finished.report:
         path = folder / "volume.npz"
-        raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {problem} {path}` solves on it")
+        raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {problem.section} {path}` solves on it")
     if not gives_the_same(made_by, command):
         raise InputError(f"{folder}: holds the result of `{made_by}`; --force replaces it, --out names another folder")
     wanted = ["volume.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
@@ -262,7 +252,7 @@ def _finish(
     state: RunFolder,
     volume: BSplineVolume,
     solution: Solution | None = None,
-    equation: Equation | None = None,
+    equation: "Equation | None" = None,
 ) -> Outcome:
     """Finish the report, write the page that shows it and return the output folder."""
     scene = scene_of(state, volume, solution, equation)

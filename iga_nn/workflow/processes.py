@@ -1,7 +1,5 @@
 """Runs a command on the processes of an MPI job: one prints and writes, and none waits for one that failed."""
 
-from __future__ import annotations
-
 import logging
 import sys
 import time

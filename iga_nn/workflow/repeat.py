@@ -1,7 +1,5 @@
 """Writes the command that repeats a result, from the options it was made with."""
 
-from __future__ import annotations
-
 import shlex
 from dataclasses import fields
 from pathlib import Path

@@ -1,15 +1,15 @@
 """Solves a problem on the volume of an output folder, level after level, and writes what is found."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from parameterize.spline.volume import BSplineVolume
+from solve import ConvergenceRow, Solution, SolveReport, rates, solve_problem
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
@@ -17,10 +17,6 @@ from ..options import Equation, ProblemOptions
 from ..report import document as reports
 from ..report import html
 from .output_folder import RunFolder
-
-if TYPE_CHECKING:
-    from parameterize.spline.volume import BSplineVolume
-    from solve import Solution, SolveReport
 
 log = logging.getLogger(__name__)
 
@@ -32,8 +28,6 @@ def solve_levels(
 
     solution.npz holds the finest so far. solver: keywords of `solve.solve_problem`.
     """
-    from solve import rates
-
     solutions: list[Solution] = []
     with reported(state, volume), state.timed("solve"):
         for solution in each_level(volume, equation, options, certified=verdict_of(state), **solver):
@@ -59,8 +53,6 @@ def each_level(volume: BSplineVolume, equation: Equation, options: ProblemOption
 
     solver: keywords of `solve.solve_problem`. Processes of an MPI job do this together.
     """
-    from solve import solve_problem
-
     solver |= options.solver()
     for level in sorted(options.refine):
         try:
@@ -94,8 +86,6 @@ def verdict_of(state: RunFolder) -> str:
 
 def _draw_errors(state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation) -> None:
     """Draw the error where the exact solution is known, and the convergence where there are several levels."""
-    from solve import ConvergenceRow
-
     is_finite = all(np.all(np.isfinite(solution.coefficients)) for solution in solutions)
     if equation.exact is None or not is_finite:  # not finite: the solver broke down
         return
@@ -119,7 +109,7 @@ def notices_of(found: Iterable[SolveReport]) -> list[str]:
 
 def scene_of(state: RunFolder, volume: BSplineVolume, *solved: Any) -> Any:
     """Return the interactive view of a volume and what is solved on it; None where it cannot be drawn."""
-    with state.drawing("interactive view"):
+    with state.timed("report"), state.drawing("interactive view"):
         from ..report import viewer
 
         return viewer.scene_of(volume, *solved)

@@ -1,52 +1,26 @@
-"""Says whether a surface is accepted and what is proved of a volume: for `check`, the report and the terminal."""
-
-from __future__ import annotations
+"""Says what is proved of a volume: for `check`, the report and the terminal."""
 
 import hashlib
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from parameterize.arrays import in_brackets
+from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.jacobian import certify
+from parameterize.quality.quality import proved
+from parameterize.spline.volume import BSplineVolume
 
+from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
-
-if TYPE_CHECKING:
-    from parameterize.spline.volume import BSplineVolume
-
-    from ..options import MapOptions, SurfaceOptions
-    from .output_folder import RunFolder
+from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 
 
-def check_surface(mesh: str, options: SurfaceOptions, strict: bool = False) -> dict[str, Any]:
-    """Return the section `input` of report.json for a surface that is accepted. Raises MeshError where it is not.
-
-    strict: also refuse a surface that intersects itself.
-    """
-    from ..models import resolve
-
-    surface = resolve(mesh, **options.reading())
-    if strict:
-        surface.refuse_crossings()
-    return surface.summary()
-
-
-def check_volume(path: str | Path) -> dict[str, Any]:
-    """Certify a saved volume and return what was proved. Raises InputError for a file that is not a volume."""
-    from ..io.formats import load_volume
-
-    return certified_facts(load_volume(path))
-
-
 def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
     """Certify a volume and return the section `parameterization` of report.json."""
-    from parameterize.certificate.boundary import check_boundary
-    from parameterize.certificate.jacobian import certify
-    from parameterize.quality.quality import proved
-
     certificate = certify(volume)
     facts = proved(volume.shape, volume.degrees, certificate, check_boundary(volume))
     return facts | advice.unproved(volume, certificate)

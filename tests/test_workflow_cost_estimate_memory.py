@@ -7,7 +7,7 @@ import pytest
 from volumes import mapped
 
 from iga_nn.options import ElasticityOptions, PoissonOptions
-from iga_nn.workflow import memory
+from iga_nn.workflow import cost_estimate
 from solve import benchmark_volume, solve_problem
 
 SHEARED = mapped(lambda u, v, w: (u + 3.0 * v, v, w + 1.5 * u))
@@ -27,7 +27,7 @@ SHEARED = mapped(lambda u, v, w: (u + 3.0 * v, v, w + 1.5 * u))
 def test_a_solve_takes_what_was_said(volume, options):
     """Within a factor of 1.6: the arrays alone, without those of a first solve that compiles."""
     problem, how = options.problem(), options.solver() | {"threads": 1}
-    said = memory.solve_memory(volume, problem, options).on(1)
+    said = cost_estimate.solve_memory(volume, problem, options).on(1)
     solve_problem(benchmark_volume(3, max(volume.degrees)), problem, **how)
     tracemalloc.start()
     solve_problem(volume, problem, refine=max(options.refine), tolerance=0.1, **how)
@@ -38,12 +38,12 @@ def test_a_solve_takes_what_was_said(volume, options):
 
 def test_what_does_not_fit_names_the_processes_that_would(monkeypatch, caplog):
     volume, options = benchmark_volume(6), PoissonOptions(refine=(0, 5))
-    wanted = memory.solve_memory(volume, options.problem(), options)
+    wanted = cost_estimate.solve_memory(volume, options.problem(), options)
     for free, named in ((2.0 * wanted.on(1), None), (wanted.on(3), 3), (0.9 * wanted.each_mb, None)):
-        monkeypatch.setattr(memory, "available_memory_mb", lambda _, free=free: free)
+        monkeypatch.setattr(cost_estimate, "available_memory_mb", lambda _, free=free: free)
         caplog.clear()
         with caplog.at_level(logging.INFO, "iga_nn"):
-            memory.tell_memory(volume, options.problem(), options)
+            cost_estimate.tell_memory(volume, options.problem(), options)
         said = [record.getMessage() for record in caplog.records]
         assert said[0] == f"estimate: {wanted.on(1) / 1000.0:.2f} GB of memory"
         assert len(said) == 1 + (free < wanted.on(1))
