@@ -148,7 +148,7 @@ class SplineConfig:
     last_slides: int = 20  # before the boundary map is made, and again after `last_sweeps`
     last_sweeps: int = 600  # over the triangles that the last slides flipped, at most
     first_gain: float = 8e-3  # the first round ends once a step lowers the energy by less than this share of it
-    gain: float = 5e-4  # likewise the later ones
+    gain: float = 8e-4  # likewise the later ones, sliding included
     memory: int = 4  # differences of Newton steps from which the next place is guessed
     damping: float = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
     damping_growth: float = 3.0  # factor after each further one, and divisor after a full step

@@ -393,11 +393,12 @@ def _descend(rounds: _Rounds, history: History, progress: ProgressCallback) -> T
         else:
             acceleration.add(point.control, found.control)
         ahead = _look_ahead(found, acceleration, energy)
-        gain = point.total - (ahead or found).total  # before sliding, which may raise the energy of what is folded
+        before = point.total
         if ahead is None:
             energy.slide(found.control)
             ahead = replace(found, outer=energy.surface_part(found.control))
         point = ahead
+        gain = before - min(found.total, point.total)  # sliding may raise the energy of what is folded
         done = number * steps + step + 1
         history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
         total = max(number + 1, len(config.usual_steps)) * steps
