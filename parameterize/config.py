@@ -172,7 +172,7 @@ class RefinementConfig:
     distortion: float = 0.25  # what the distortion above its limit counts, all squared distances together counting 1
     narrowest: float = 0.2  # of the first spline's spans: none gets narrower than this share of their length
     vertex: float = 3.0  # factor of the spline stage's `vertex`: the boundary counts more once the map is in shape
-    gain: float = 2e-4  # in place of the spline stage's
+    gain: float = 3e-4  # in place of the spline stage's
     rounds: int = 8  # after a refinement, at most
     polish: int = 3  # of them, while the map is certified, at most
 

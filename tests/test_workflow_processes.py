@@ -80,7 +80,7 @@ def test_more_processes_than_spans_is_a_line(tmp_path):
     benchmark_volume(1).save(tmp_path / "map.npz")
     done = mpiexec(2, *SOLVE[:-3], "0", "--mpi", "--quiet", "--out", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert _said(done) == ["warning: 2 processes for 1 spans of u: the others have no work"]
+    assert _said(done) == ["warning: spans of u: 1, processes: 2; the others have no work"]
 
 
 def test_what_does_not_fit_mpi_is_a_line(folder, monkeypatch, capsys):

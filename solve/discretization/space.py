@@ -73,7 +73,7 @@ class TrialSpace:
         """Return what this process keeps of the space where the processes of a communicator share it."""
         slab = replace(self, comm=comm, parent=self)
         if comm.size > slab.spans[-1] and comm.rank == 0:
-            log.warning("%d processes for %d spans of u: the others have no work", comm.size, slab.spans[-1])
+            log.warning("spans of u: %d, processes: %d; the others have no work", slab.spans[-1], comm.size)
         own = self.knots[0][slab.rows.start : slab.rows.stop + self.degrees[0] + 1]
         return replace(slab, knots=(own, *self.knots[1:]))
 

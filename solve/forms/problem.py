@@ -203,28 +203,35 @@ class LawWithData(BoundaryValueProblem, Form):
 
 @dataclass(frozen=True)
 class Problem(BoundaryValueProblem):
-    """A law of one's own, -div flux + react = f, with data as those of `Poisson`.
+    """A law of one's own, -div flux + react = f, with data on the images of the cube's six faces.
 
-    Each datum is, for c components, a sequence of c entries, or one entry where c = 1. Functions take points x (3, ...)
-    and return (...). A function or a field may also stand for all components: (c, ...).
+    Each datum is, for c components, a sequence of c entries, or one entry where c = 1. An entry is a formula in x, y, z
+    and X, Y, Z, a function of points x (3, ...) that returns (...), or a field (`solution.field`) on the same volume.
+    A function or a field may also stand for all components: (c, ...).
 
     Parameters
     ----------
     form : Form
         The law.
-    exact, source, boundary : datum, optional
-        The solution, where it is known, the source f, and the values of u on faces.
+    exact : datum, optional
+        The solution, where it is known; as formulas it gives the source and all data on faces.
+    source : datum, optional
+        f.
+    boundary : datum, optional
+        Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
     neumann : dict of face name to datum or None
-        flux . n, n the outward unit normal.
+        flux . n on "u0", ..., "w1", n the outward unit normal; None: from `exact`.
     robin : dict of face name to (entry, datum or None)
-        (alpha, g) of flux . n + alpha u = g; alpha is one entry.
+        (alpha, g) of flux . n + alpha u = g; alpha one entry, not negative; None for g: from `exact`.
 
     Raises
     ------
     TypeError
         For what is no instance of a subclass of `Form`.
-    ExpressionError, ValueError
-        As `Poisson` does.
+    ExpressionError
+        For a formula that is refused.
+    ValueError
+        Where data cannot be known or do not fit.
 
     Examples
     --------
