@@ -34,7 +34,7 @@ def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("parameterize.run.parameterize", lambda *_, **__: formula_parameterization())
-        patched.setattr("iga_nn.figures.can_draw", lambda: False)
+        patched.setattr("iga_nn.figures.render.can_draw", lambda: False)
         patched.chdir(folder)
         iga_nn.run("poisson", "cube", "out/cube", poisson=PoissonOptions(refine=(0, 1)))
     return folder / "out"

@@ -153,6 +153,7 @@ class _Rounds:
     polished: int = 0  # rounds after that, or after the map was certified for the first time
     fewest: int = sys.maxsize  # spans unproved when their number was last halved
     halved: int = 0  # the round in which that was
+    off: float = math.inf  # mean squared distance of the best map from the surface
     lost: bool = False  # whether the rounds end without a certified map
 
     @property
@@ -212,6 +213,7 @@ class _Rounds:
         if self.number == 0 or self.growing or found.rank <= self.best.rank:
             places = self.energy.surface.places
             self.best, self.best_places = found, (places.parameters, places.cube_faces)
+            self.off = self._distance(found.control)
         many = len(unproved) > config.most_watched
         if not many:
             self.energy.barrier.activate(unproved)
@@ -229,9 +231,12 @@ class _Rounds:
         """Whether nothing is certified, and the last rounds unfold no more, or only by leaving the surface."""
         if self.growing or self.certified:
             return False
-        config, surface = self.energy.config, self.energy.surface
-        off = np.square(surface.residuals(self.control)).sum(axis=1).mean()
-        return self.number > self.halved + config.stalling or bool(off > config.far**2)
+        config = self.energy.config
+        return self.number > self.halved + config.stalling or self._distance(self.control) > config.far**2
+
+    def _distance(self, control: Tensor) -> float:
+        """Return the mean squared distance of a map from the surface at the parameters as they are."""
+        return float(np.square(self.energy.surface.residuals(control)).sum(axis=1).mean())
 
     def _smoothed(self, found: Optimized) -> Optimized:
         """Smooth the map near spans that the last rounds have not unfolded; return it where fewer are unproved then."""
@@ -244,7 +249,7 @@ class _Rounds:
         return smoothed if smoothed.faults < found.faults else found
 
     def _mended(self, found: Optimized) -> Optimized:
-        """Move what folds again back to where it was certified; return the map found where that does not suffice."""
+        """Move what folds again back to where it was certified; return the map found where that brings nothing."""
         config, held = self.energy.config, np.zeros(self.energy.barrier.weights.shape, dtype=bool)
         mended = found
         for _ in range(config.mendings):
@@ -256,9 +261,14 @@ class _Rounds:
             mended = Optimized.of(torch.where(back, self.best.control, found.control), self.knots, config)
         if mended is found or mended.rank > self.best.rank:
             return found
+        places = self.energy.surface.places
+        before = places.parameters, places.cube_faces
+        self.energy.slide(mended.control)
+        if self._distance(mended.control) >= self.off:
+            places.place(*before)
+            return found
         self.energy.barrier.activate(found.certificate.unproved)
         self.energy.give_way(found.certificate.unproved, config.giving_way)
-        self.energy.slide(mended.control)
         _log.info("moved back near %d spans", len(found.certificate.unproved))
         return mended
 
@@ -278,7 +288,7 @@ class _Rounds:
             "span_weights": torch.as_tensor(self.energy.barrier.weights),
         }
         counts = {name: getattr(self, name) for name in _COUNTS}
-        state = counts | {"certified": self.certified, "lost": self.lost, "history": history.rows}
+        state = counts | {"certified": self.certified, "lost": self.lost, "off": self.off, "history": history.rows}
         checkpoints.save(_CHECKPOINT, tensors, state)
 
     def restore(self, tensors: dict[str, Tensor], state: dict[str, Any], history: History) -> None:
@@ -293,7 +303,7 @@ class _Rounds:
         self.best_places = tensors["best_parameters"].numpy(), tensors["best_cube_faces"].numpy()
         for name in _COUNTS:
             setattr(self, name, int(state[name]))
-        self.certified, self.lost = bool(state["certified"]), bool(state["lost"])
+        self.certified, self.lost, self.off = bool(state["certified"]), bool(state["lost"]), float(state["off"])
         history.rows[:] = [tuple(row) for row in state["history"]]
 
 
