@@ -12,14 +12,15 @@ setup: $(RUN)
 setup-dev: $(DEV)
 
 # What running needs. An environment that is there is kept. torch first: it decides which numpy and which shared
-# libraries the rest meets. A small run at the end shows that all is there, and compiles what later runs then load.
+# libraries the rest meets. A small run at the end shows that all is there (3: not certified), and
+# compiles what later runs then load.
 $(RUN): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version) if sys.version_info < (3, 11) else None'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(INSTALL) torch==2.13.0
 	$(INSTALL) -e .
-	out=$$(mktemp -d) && $(BIN)/iga-nn run poisson cube --control-points 10 --steps-factor 0.02 --out $$out/cube; \
-		code=$$?; rm -r $$out; exit $$code
+	out=$$(mktemp -d); $(BIN)/iga-nn run poisson cube --control-points 10 --steps-factor 0.02 --out $$out/cube; \
+		code=$$?; rm -r $$out; test $$code -eq 0 -o $$code -eq 3
 	touch $@
 
 # The development tools and the extras on top of it: pip leaves alone what is there.

@@ -1,4 +1,8 @@
-"""The spline stage on two sets of knots: the first rounds on few control points, which is faster, the rest on all."""
+"""The spline stage on two sets of knots: its first rounds on few control points, the others on all.
+
+The first rounds move the map far, and need no fine spline for that; on fewer spans they take a fraction of the time.
+The map so found is then interpolated on the fine knots.
+"""
 
 import math
 from dataclasses import replace

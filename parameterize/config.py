@@ -127,8 +127,8 @@ class SplineConfig:
     coarse_rounds: int = 2
     polish: int = 6  # of them, after the map is certified for the first time, at most
     stalling: int = 8  # rounds in which the unproved spans are not halved; they then end without a certified map
-    far: float = 0.02  # from the surface, root mean square: such rounds end without a certified map, too
-    parting: int = 6  # before these, while the boundary of a certified map meets itself, at most
+    far: float = 0.02  # from the surface, root mean square; the rounds then end without a certified map, too
+    parting: int = 6  # rounds before the polish, while the boundary of a certified map meets itself, at most
     patient_rounds: int = 2  # after these the anchors let go, and the penalty grows at unproved spans
     span_growth: float = 5.0  # factor of the penalty's weight there, each round
     span_most: float = 125.0  # of these factors together
@@ -147,8 +147,8 @@ class SplineConfig:
     relaxations: int = 1  # sweeps over the triangles that these flipped
     last_slides: int = 20  # before the boundary map is made, and again after `last_sweeps`
     last_sweeps: int = 600  # over the triangles that the last slides flipped, at most
-    first_gain: float = 8e-3  # the first round ends once a step lowers the energy by less than this share of it
-    gain: float = 8e-4  # likewise the later ones, sliding included
+    first_gain: float = 8e-3  # share of the energy: where step and sliding lower it by less, the first round ends
+    gain: float = 8e-4  # likewise the later ones
     memory: int = 4  # differences of Newton steps from which the next place is guessed
     damping: float = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
     damping_growth: float = 3.0  # factor after each further one, and divisor after a full step

@@ -1,7 +1,8 @@
-"""Another map that does not need the network: the layout on the cube is extended into the solid (method.md, section 4).
+"""Another map that does not need the network: the surface's layout on the cube is extended into the solid.
 
-Differences at the surface are as in Shortley and Weller, J. Appl. Phys. 9, 1938, with weights that keep the system
-symmetric.
+The extension is harmonic, that is each place is the mean of those around it. Sheets that are close in space stay apart,
+because no line through the gap between them is followed. Differences at the surface are as in Shortley and Weller,
+J. Appl. Phys. 9, 1938, with weights that keep the system symmetric.
 """
 
 from dataclasses import dataclass, replace

@@ -1,6 +1,9 @@
-"""A map that does not need the network: the cube grows into the solid (docs/method.md, section 4).
+"""A map that does not need the network: the cube grows into the solid (for shapes that are hard to train).
 
-What is never folded need not be unfolded (compare Schueller, Kavan, Panozzo, Sorkine-Hornung, SGP 2013).
+The surface is laid on the cube one-to-one before anything else, so that the boundary never has to be untangled. The
+first map is a cube in the solid's middle. Round after round the surface's data draw it more strongly, while the
+penalties on det J act from the start: what is never folded need not be unfolded (compare Schueller, Kavan, Panozzo,
+Sorkine-Hornung, SGP 2013).
 """
 
 from dataclasses import replace

@@ -1,4 +1,8 @@
-"""Inserts knots where a map needs them and optimises further, while that is better (docs/method.md, section 5)."""
+"""Inserts knots where a map needs them and optimises further, until its boundary is close enough to the surface.
+
+Knots that are inserted leave a map as it is, so each further spline stage starts from what the one before has found.
+What it finds is kept where no less is proved of it; else the map before is the result, and that is said.
+"""
 
 import logging
 from dataclasses import dataclass, replace

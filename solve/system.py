@@ -178,8 +178,9 @@ class System:
         return LinearOperator((size, size), matvec=product, dtype=np.float64, **adjoint)
 
     def solve(self, **how: Any) -> Solution:
-        """Solve, and return the solution with its errors and notices. how: tolerance to strict, as in `iga_nn.solve`.
+        """Solve, and return the solution with its errors and notices.
 
+        how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`.
         Raises ConvergenceError where the linear solver fails and `strict` is asked for.
         """
         options = SolverOptions(**how)

@@ -38,7 +38,7 @@ class Picture(Figure):
 
 
 def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
-    """Return an empty figure and its axes."""
+    """Return an empty figure and its axes, outside pyplot: it asks for no window system."""
     figure = Picture(figsize=inches, dpi=110, layout="constrained")
     return figure, figure.subplots(rows, columns, **grid)
 

@@ -1,6 +1,6 @@
 """Certificate: a proof that det J of a trivariate spline is positive on the whole cube, or a point where it is not.
 
-The Bernstein coefficients of det J bound it on every span, those at its corners are values (docs/method.md, section 5;
+The Bernstein coefficients of det J bound it on every span, those at its corners are values (docs/method.md, section 6;
 Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys. 233, 2013, section
 3). "Positive" and "negative" mean by more than a bound of all rounding errors (determinant.py).
 """

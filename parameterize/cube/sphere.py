@@ -1,8 +1,9 @@
-"""A one-to-one layout of a closed surface without handles on the unit sphere (docs/method.md, section 4).
+"""A one-to-one layout of a closed surface without handles on the unit sphere, with little distortion.
 
-The lowest vibration of the net of edges (Fiedler, Czechoslovak Math. J. 25, 1975) cuts the surface in two discs, which
-go to the hemispheres (Tutte 1963), squeezed. The symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34,
-2015), infinite where a triangle has no area left, is then lowered.
+The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
+sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
+one-to-one but badly squeezed. From there Newton's method lowers the symmetric Dirichlet energy (Smith, Schaefer, ACM
+Trans. Graphics 34, 2015), which is infinite where a triangle has no area left: no step turns a triangle over.
 """
 
 import math

@@ -1,4 +1,8 @@
-"""How the cube is turned in a layout on the sphere, so that its edges keep out of hollows (method.md, section 4)."""
+"""How the cube is turned within a layout on the sphere, so that its edges keep out of hollows.
+
+det J > 0 needs the faces of the solid to meet at less than 180 degrees along the cube's edges, seen from inside. An
+edge in a hollow cannot lie on the surface; one along a ridge suits it best.
+"""
 
 import numba
 import numpy as np

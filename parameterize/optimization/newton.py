@@ -89,8 +89,9 @@ def optimize(
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the penalty on them and their neighbours grows further, and after
     `firm_rounds` the surface data near them loses weight. Where few of them stay for `smoothing_rounds`, F is smoothed
-    there. The rounds end without a certified map where more than `most_watched` spans are unproved, where `stalling`
-    rounds do not halve their number, and where F is farther than `far` from the surface, root mean square.
+    there. After `firm_rounds` the rounds end without a certified map where more than `most_watched` spans are unproved,
+    where `stalling` rounds have not halved their number, and where F is farther than `far` from the surface, root mean
+    square; the last two not while F grows.
 
     Where the boundary of a certified map meets itself, further rounds push it apart, and the surface data there lose
     weight. Once the map is certified, a few more rounds take back what the data has lost, step by step, as far as they

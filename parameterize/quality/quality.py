@@ -158,6 +158,7 @@ def measure(
     with the surface's vertices, in their order.
     scale: the factor that brings the model to volume 1 (Surface.scale).
     certificate, boundary_check: from `certify` and `check_boundary`.
+    Raises ValueError for a scale that is not positive or a boundary map of fewer vertices.
     """
     if not (isfinite(scale) and scale > 0.0):
         raise ValueError(f"scale must be positive, got {scale}; Surface.scale is the one meant")

@@ -18,13 +18,18 @@ from .problem import LawWithData, Natural
 class Elasticity(LawWithData):
     """Linear elasticity of an isotropic body: -div sigma = f, sigma = lambda div(u) I + mu (grad u + grad u^T).
 
-    Each vector is given as three entries of the kinds that `Poisson` takes.
+    Each vector is given as three entries: formulas in x, y, z and X, Y, Z (as in `Poisson`), functions of three arrays
+    x, y, z of equal shape, or fields on the same volume.
 
     Parameters
     ----------
-    exact, force, displacement : three entries, optional
-        The displacement u, where it is known, the force f per volume, and the values of u on the faces that are not in
-        `traction`; as `exact`, `source` and `boundary` of `Poisson`.
+    exact : three entries, optional
+        The displacement u, where it is known. As formulas it gives force and boundary data, and the report's errors;
+        functions need them beside it, and leave the H1 seminorm out.
+    force : three entries, optional
+        f, per volume; overrides what follows from `exact`.
+    displacement : three entries, optional
+        Values of u on the faces that are not in `traction`; default: `exact`, or zero.
     traction : dict of face name to three entries or None
         sigma n, n the outward unit normal; None: from `exact`. One face at least is left to displacement.
     young : float
@@ -34,8 +39,10 @@ class Elasticity(LawWithData):
 
     Raises
     ------
-    ExpressionError, ValueError
-        As `Poisson` does.
+    ExpressionError
+        For a formula that is refused.
+    ValueError
+        Where data cannot be known or do not fit.
 
     Examples
     --------
