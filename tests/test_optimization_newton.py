@@ -332,11 +332,12 @@ def test_a_map_whose_boundary_is_decided_is_kept(monkeypatch):
     assert kept is seen[2] and seen[-1].injective is None
 
 
-@pytest.mark.parametrize(("meets", "rounds"), [([True, True, False], 7), ([False], 2), ([True] * 9, 7)])
+@pytest.mark.parametrize(("meets", "rounds"), [([True, True, False], 7), ([False], 2), ([True] * 9, 3)])
 def test_a_boundary_that_meets_itself_is_pushed_apart_before_the_polish(monkeypatch, meets, rounds):
     """One round at least, one of polish; between them those that part the boundary, two at most.
 
-    These let the surface give way by 1/16 each, which four rounds of polish take back.
+    These let the surface give way by 1/16 each, which four rounds of polish take back. Where it still meets itself
+    then, there is nothing to polish.
     """
     config = replace(CONFIG, rounds=10, parting=2)
     contacts, taken_back = [], []
@@ -355,4 +356,4 @@ def test_a_boundary_that_meets_itself_is_pushed_apart_before_the_polish(monkeypa
     assert len(saved) == rounds
     assert len(taken_back) == rounds - 1 - min(sum(meets), config.parting)
     assert len(contacts) == (rounds - 1 if meets[0] else 0)  # of all rounds after the first: sheets must stay apart
-    assert np.all(fit.yielding == 1.0)
+    assert np.all(fit.yielding == 1.0) == (rounds != 3)

@@ -93,12 +93,13 @@ def optimize(
     where `stalling` rounds have not halved their number, and where F is farther than `far` from the surface, root mean
     square; the last two not while F grows.
 
-    Where the boundary of a certified map meets itself, further rounds push it apart, and the surface data there lose
-    weight. Once the map is certified, a few more rounds take back what the data has lost, step by step, as far as they
-    can. What these rounds fold again is moved back. Anchors along the cube's edges draw F to the surface in those last
-    rounds and, where it is close to begin with, in the first ones: not while what is folded comes apart. The result is
-    the last certified map whose boundary is proved not to meet itself, else the last one where that is not decided,
-    else the last certified one, else the one with the fewest unproved spans.
+    Where the boundary of a certified map meets itself, up to `parting` rounds push it apart, and the surface data there
+    lose weight; where it still does then, the rounds end. Once the map is certified, a few more rounds take back what
+    the data has lost, step by step, as far as they can. What these rounds fold again is moved back. Anchors along the
+    cube's edges draw F to the surface in those last rounds and, where it is close to begin with, in the first ones: not
+    while what is folded comes apart. The result is the last certified map whose boundary is proved not to meet itself,
+    else the last one where that is not decided, else the last certified one, else the one with the fewest unproved
+    spans.
 
     begun: of how many rounds `control` is the result, on other knots; watched (k, 3): spans that nearly fold there.
     A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
@@ -225,15 +226,19 @@ class _Rounds:
         if 2 * len(unproved) <= self.fewest or self.number <= len(self.shares):
             self.fewest, self.halved = len(unproved), self.number
         self.number += 1
-        self.lost = self.number >= config.firm_rounds and (many or self._hopeless)
+        self.lost = not self.growing and self._hopeless(many)
 
-    @property
-    def _hopeless(self) -> bool:
-        """Whether nothing is certified, and the last rounds unfold no more, or only by leaving the surface."""
-        if self.growing or self.certified:
-            return False
+    def _hopeless(self, many: bool) -> bool:
+        """Return whether further rounds would not part a boundary that meets itself, or not unfold F at the surface.
+
+        many: whether more than `most_watched` spans are unproved.
+        """
         config = self.energy.config
-        return self.number > self.halved + config.stalling or self._distance(self.control) > config.far**2
+        if self.certified:
+            return self.best.meets_itself and self.parting == config.parting
+        if self.number > self.halved + config.stalling:
+            return True
+        return self.number >= config.firm_rounds and (many or self._distance(self.control) > config.far**2)
 
     def _distance(self, control: Tensor) -> float:
         """Return the mean squared distance of a map from the surface at the parameters as they are."""
