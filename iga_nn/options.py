@@ -21,7 +21,6 @@ Formula = str  # one that starts with a minus is written --option=-x
 
 MAX_CONTROL_POINTS = 100  # per direction
 MAX_REFINE = 6
-MAX_DEGREE = 8
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
 MAX_WORKERS = 256  # on one machine
 _LOCAL = ("workers", "threads_per_worker", "memory_limit")  # mean nothing for the workers of another scheduler
@@ -364,8 +363,10 @@ def check_space(refine: Sequence[int], degree: int | None) -> None:
     if not refine or min(refine) < 0 or len(set(refine)) != len(refine):
         raise InputError(f"refine {refine}: give distinct levels, 0 or larger")
     _check_level(max(refine))
-    if degree is not None and not 1 <= degree <= MAX_DEGREE:
-        raise InputError(f"degree {degree}: must lie between 1 and {MAX_DEGREE}")
+    from solve.discretization.space import MOST_DEGREE
+
+    if degree is not None and not 1 <= degree <= MOST_DEGREE:
+        raise InputError(f"degree {degree}: must lie between 1 and {MOST_DEGREE}")
 
 
 def _check_level(level: int) -> None:

@@ -6,6 +6,7 @@ Lengths are in units of the domain scaled to volume 1. Loss weights are those of
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 from numbers import Integral, Real
 from typing import Literal
 
@@ -272,8 +273,8 @@ class Config:
 
         Raises ValueError for a tolerance that is not positive, and for fewer control points than there are already.
         """
-        if not tolerance > 0.0:
-            raise ValueError(f"tolerance must be positive, got {tolerance}")
+        if not 0.0 < tolerance < inf:
+            raise ValueError(f"tolerance must be positive and finite, got {tolerance}")
         if max_control_points < self.spline.control_points:
             fewest = self.spline.control_points
             raise ValueError(f"max_control_points must be at least {fewest}, got {max_control_points}")

@@ -46,8 +46,8 @@ def test_refined():
     assert config.spline.control_points == 12
     assert (config.refinement.tolerance, config.refinement.max_control_points) == (1e-3, 20)
     assert preset("fast").refinement is None
-    for tolerance in (0.0, -1.0, float("nan")):
-        with pytest.raises(ValueError, match="tolerance must be positive"):
+    for tolerance in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="tolerance must be positive and finite"):
             config.refined(tolerance, 20)
     with pytest.raises(ValueError, match="at least 12, got 11"):
         config.refined(1e-3, 11)

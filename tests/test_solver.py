@@ -13,6 +13,7 @@ from solve import (
     SplineField,
     benchmark_volume,
     check_problem,
+    discretize,
     solve_problem,
 )
 
@@ -268,3 +269,14 @@ def test_directions_of_one_span_may_have_natural_data_on_both_ends(rule, degree)
 def test_a_quadrature_that_is_unknown_is_refused():
     with pytest.raises(ValueError, match="quadrature must be one of spline, gauss"):
         solve_problem(benchmark_volume(2), Poisson(), quadrature="newton")
+
+
+def test_bytes_are_no_datum():
+    with pytest.raises(ValueError, match="source must be a number, a formula"):
+        Poisson(source=b"1", boundary=0)
+
+
+@pytest.mark.parametrize("degree", [0, 9, 99])
+def test_a_degree_out_of_range_is_refused_at_once(degree):
+    with pytest.raises(ValueError, match="at least 1 and at most 8"):
+        discretize(benchmark_volume(2), Poisson(), degree=degree)

@@ -437,3 +437,9 @@ def test_real_models_are_accepted_unchanged(path):
 def test_a_path_that_is_none_is_refused_with_the_remedy():
     with pytest.raises(TypeError, match=r"path .*None.*surface_from_arrays"):
         load_surface(None)
+
+
+def test_what_is_no_regular_file_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe.obj")
+    with pytest.raises(MeshError, match="no regular file"):
+        load_surface(tmp_path / "pipe.obj")

@@ -28,6 +28,7 @@ Message = tuple[int, Array]  # another process, and what goes to it or comes fro
 
 LAYERS = 8  # of elements that are measured at a time: what they take stays in the cache
 MOST_ELEMENTS = 1e12  # of a trial space: no computer solves on so many, and halving on and on would not end
+MOST_DEGREE = 8
 
 
 class Alone:
@@ -305,7 +306,7 @@ def trial_space(
 
     It is as smooth as the map at the map's own knots, and as its degree allows at the knots that halving adds.
     Raises ValueError for numbers that are not whole, a negative `refine`, one that gives more than MOST_ELEMENTS, or a
-    degree below 1.
+    degree below 1 or above MOST_DEGREE.
     """
     if not isinstance(refine, int | np.integer):
         raise ValueError(f"refine must be a whole number, 0 or more, got {refine!r:.80}")
@@ -316,8 +317,10 @@ def trial_space(
     elements = math.prod((len(breakpoints(knots)) - 1) << int(refine) for knots in volume.knots)
     if elements > MOST_ELEMENTS:
         raise ValueError(f"refine {refine} gives {elements:.1e} elements, more than {MOST_ELEMENTS:.0e}: lower it")
-    if degree is not None and degree < 1:
-        raise ValueError(f"degree must be at least 1, got {degree}; leave it out for the map's own degree")
+    if degree is not None and not 1 <= degree <= MOST_DEGREE:
+        raise ValueError(
+            f"degree must be at least 1 and at most {MOST_DEGREE}, got {degree}; leave it out for the map's own degree"
+        )
     degrees = volume.degrees if degree is None else (degree,) * 3
     rows = list(map(same_smoothness, volume.knots, volume.degrees, degrees))
     for _ in range(refine):

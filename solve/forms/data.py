@@ -80,7 +80,7 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
     of_coordinates: functions take three arrays x, y, z instead of one array (3, ...).
     Raises ExpressionError for a formula that is refused, ValueError for what is no datum; both name it.
     """
-    is_vector = isinstance(data, Sequence) and not isinstance(data, str)
+    is_vector = isinstance(data, Sequence) and not isinstance(data, str | bytes)
     given: list[Any] = list(data) if is_vector else [data]  # type: ignore[arg-type]
     entries = [repr(float(entry)) if isinstance(entry, int | float) else entry for entry in given]
     if len(entries) != components and (is_vector or isinstance(entries[0], str)):

@@ -50,6 +50,8 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (tetrahedra: their boundary), each also as .gz."""
     if path.is_dir():
         raise MeshError("is a directory: name the surface file in it")
+    if path.exists() and not path.is_file():
+        raise MeshError("is no regular file: save the surface as one")
     suffixes = [suffix.lower() for suffix in path.suffixes]
     packed = suffixes[-1:] == [".gz"]
     suffix = "".join((suffixes[:-1] if packed else suffixes)[-1:])
