@@ -89,9 +89,9 @@ def optimize(
     Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
     unfold what is left. Where spans stay unproved, the penalty on them and their neighbours grows further, and after
     `firm_rounds` the surface data near them loses weight. Where few of them stay for `smoothing_rounds`, F is smoothed
-    there. After `firm_rounds` the rounds end without a certified map where more than `most_watched` spans are unproved,
-    where `stalling` rounds have not halved their number, and where F is farther than `far` from the surface, root mean
-    square; the last two not while F grows.
+    there. Unless F still grows, the rounds end without a certified map where `stalling` of them have not halved the
+    number of unproved spans, and after `firm_rounds` where more than `most_watched` spans are unproved or F is farther
+    than `far` from the surface, root mean square.
 
     Where the boundary of a certified map meets itself, up to `parting` rounds push it apart, and the surface data there
     lose weight; where it still does then, the rounds end. Once the map is certified, a few more rounds take back what
