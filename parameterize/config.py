@@ -63,6 +63,9 @@ class TrainConfig:
     whiten: bool = True  # start from the affine map that makes the domain as wide in all directions, not the identity
     det_floor: float = 0.5  # share of `min_det` at which the distortion term holds smaller determinants
     edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
+    race: float = 0.45  # share of the first stage towards the cube that is trained twice: as G is, and turned
+    race_steps: int = 8  # the last ones of these, whose distortions are compared
+    race_gain: float = 0.05  # share by which that of the turned G must be lower, or it is no better than chance
 
 
 @dataclass(frozen=True)
@@ -317,6 +320,7 @@ PRESETS = {
             cell=0.04,
             triangles=1_000_000,
             whiten=False,
+            race=0.0,
         ),
         _stages((600, 400, 1000, 500, 1000)),
         SplineConfig(),

@@ -18,7 +18,7 @@ from .config import GrowthConfig, LayoutConfig, SplineConfig
 from .cube.cube import project_radially, snap
 from .cube.cutting import cut_along_rays, subdivide_finely
 from .cube.flips import Layout
-from .cube.turning import turned
+from .cube.turning import best_turn
 from .spline.bspline import greville
 from .surface.geometry import vertex_weights
 
@@ -47,8 +47,8 @@ def surface_on_cube(
     own: how many vertices are the mesh's; these stay first. seed: draws how the cube may be turned; turn: 0 takes the
     best of these ways, 1 the next, ...
     """
-    sphere = turned(sphere, options, np.random.default_rng(seed), turn)
-    columns = np.hstack([sphere.vertices, sphere.places])
+    rotation = best_turn(sphere, options, np.random.default_rng(seed), turn)
+    columns = np.hstack([sphere.vertices, sphere.places @ rotation.T])
     columns, faces = subdivide_finely(columns, sphere.faces, own, spline)
     points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])
     cut = cut_along_rays(places, faces, options.path_snap)

@@ -8,12 +8,17 @@ from shapes import ball, rounded_cube
 from parameterize.config import LAYOUT
 from parameterize.cube.cube import project_radially
 from parameterize.cube.flips import Layout
-from parameterize.cube.turning import _angle_between, _bends, _hollowness, turned
+from parameterize.cube.turning import _angle_between, _bends, _hollowness, best_turn
 
 
 def laid(vertices, faces):
     centred = vertices - vertices.mean(axis=0)
     return Layout(vertices, faces, centred / np.linalg.norm(centred, axis=1, keepdims=True))
+
+
+def turned(layout, seed, number=0):
+    rotation = best_turn(layout, LAYOUT, np.random.default_rng(seed), number)
+    return Layout(layout.vertices, layout.faces, layout.places @ rotation.T)
 
 
 def test_a_hollow_counts_positive_and_a_ridge_negative():
@@ -28,7 +33,7 @@ def test_the_edges_of_a_cube_are_found_again():
     """The chosen rotation leads the cube's edges close to those of a rounded cube."""
     points, faces = rounded_cube(4000, 30.0)
     layout = laid(points, faces)
-    found = turned(layout, LAYOUT, np.random.default_rng(0), 0)
+    found = turned(layout, 0)
     middles, along, bends = _bends(layout)
     best = _hollowness(middles, along, bends, LAYOUT)
     middles, along, bends = _bends(found)
@@ -49,9 +54,9 @@ def test_ridges_do_not_make_up_for_a_hollow_on_the_same_edge():
 
 def test_the_same_generator_gives_the_same_turn():
     layout = laid(*ball(200))
-    first, second = (turned(layout, LAYOUT, np.random.default_rng(7), 0).places for _ in range(2))
+    first, second = (turned(layout, 7).places for _ in range(2))
     assert np.array_equal(first, second)
-    assert not np.allclose(turned(layout, LAYOUT, np.random.default_rng(8), 0).places, first)
+    assert not np.allclose(turned(layout, 8).places, first)
     assert np.linalg.norm(first, axis=1) == pytest.approx(1.0)
 
 
@@ -59,7 +64,7 @@ def test_a_higher_number_gives_another_turn_that_is_no_better():
     points, faces = ball(600)
     layout = laid(points * (1.0 + 0.3 * np.sin(5.0 * points[:, :1]) * points[:, 1:2]), faces)
     middles, along, bends = _bends(layout)
-    found = [turned(layout, LAYOUT, np.random.default_rng(1), number).places for number in (0, 1, 100)]
+    found = [turned(layout, 1, number).places for number in (0, 1, 100)]
     turns = [Rotation.align_vectors(directions, layout.places)[0] for directions in found]
     costs = [_hollowness(middles @ turn.as_matrix().T, along @ turn.as_matrix().T, bends, LAYOUT) for turn in turns]
     assert _angle_between(turns[1], turns[0]) > LAYOUT.other_turn
@@ -69,7 +74,7 @@ def test_a_higher_number_gives_another_turn_that_is_no_better():
 def test_where_the_best_rotations_lead_to_one_turn_others_follow():
     """All rotations that are turned further find the edges of a rounded cube."""
     layout = laid(*rounded_cube(2000, 30.0))
-    first, second = (turned(layout, LAYOUT, np.random.default_rng(0), number).places for number in range(2))
+    first, second = (turned(layout, 0, number).places for number in range(2))
     away = Rotation.align_vectors(first, second)[0]
     assert _angle_between(away, Rotation.identity()) > LAYOUT.other_turn
 

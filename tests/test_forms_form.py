@@ -141,6 +141,7 @@ def refused(**members):
         (refused(flux=lambda s, u, grad, x: x[0] * grad, constant=True), "Own is not constant"),
         (refused(flux=lambda s, u, grad, x: grad, react=lambda s, u, grad, x: u, constant=True), "is not constant"),
         (refused(flux=lambda s, u, grad, x: grad / (0.0 * x[0])), "must return finite real numbers"),
+        (refused(flux=lambda s, u, grad, x: grad * None), r"Own\.flux fails: TypeError: unsupported operand"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:divide by zero")

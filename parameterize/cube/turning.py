@@ -16,8 +16,8 @@ from ..threads import in_parallel
 from .flips import Layout
 
 
-def turned(layout: Layout, options: LayoutConfig, generator: np.random.Generator, number: int) -> Layout:
-    """Return the layout, turned so that the cube's edges lie least in hollows: 0 is the best turn, 1 the next, ...
+def best_turn(layout: Layout, options: LayoutConfig, generator: np.random.Generator, number: int = 0) -> Array:
+    """Return the rotation (3, 3) of a layout by which the cube's edges lie least in hollows; 1 is the next best, ...
 
     The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
     nearly are the same count as one. Where that leaves too few, the next best rotations that differ from all follow.
@@ -50,8 +50,7 @@ def turned(layout: Layout, options: LayoutConfig, generator: np.random.Generator
             _, rotation = turned_further(rotations[i])
             if _is_other(rotation, turns, options):
                 turns.append(rotation)
-    best = turns[min(number, len(turns) - 1)].as_matrix()
-    return Layout(layout.vertices, layout.faces, layout.places @ best.T)
+    return np.asarray(turns[min(number, len(turns) - 1)].as_matrix())
 
 
 def _is_other(rotation: Rotation, turns: list[Rotation], options: LayoutConfig) -> bool:

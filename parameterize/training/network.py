@@ -50,6 +50,12 @@ class InverseMap(nn.Module):
         nn.init.zeros_(self.last.weight)
         nn.init.zeros_(self.last.bias)
 
+    @torch.no_grad()
+    def turn(self, rotation: Tensor) -> None:
+        """Turn what G maps to about the middle of the cube, in place: rotation (3, 3)."""
+        for part in (self.affine, self.last.weight, self.last.bias):
+            part.copy_(rotation.to(part) @ part)
+
     def encode(self, x: Tensor) -> Tensor:
         """Return x, sin(n k x) / (n k), cos(n k x) / (n k) for n = 1..N: (m, 3) -> (m, 6 N + 3)."""
         nk = self.multiples * self.scale  # (N,)

@@ -6,6 +6,7 @@ The loss that the first stage ends with tells whether the network suits the shap
 import logging
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,8 @@ from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
+from ..cube.flips import Layout
+from ..cube.turning import best_turn
 from ..progress import History, Progress, ProgressCallback
 from .losses import BoundarySamples, EdgePaths, Objective
 from .network import InverseMap
@@ -95,6 +98,8 @@ class Trainer:
             optimizer = TrainingOptimizer(self.network, self.config.train)
             if saved:
                 self._load_progress(saved[0], optimizer)
+            elif number == self._race_stage:
+                run, optimizer = self._race(number, boundary)
             self._train(run, boundary, optimizer)
             _, loss = run.best_key
             if give_up and number == 0 and limit is not None and loss > limit:
@@ -133,24 +138,67 @@ class Trainer:
     def _tensor(self, values: Array) -> Tensor:
         return torch.as_tensor(values, dtype=self.dtype, device=self.device)
 
+    @property
+    def _race_stage(self) -> int | None:
+        """The first stage towards the cube, where G may be turned; None where corners are given or no race is set."""
+        if self.corners is not None or self.config.train.race == 0.0:
+            return None
+        return next((number for number, stage in enumerate(self.config.stages) if stage.target == "cube"), None)
+
+    def _race(self, number: int, boundary: BoundarySamples) -> tuple[_Run, TrainingOptimizer]:
+        """Begin a stage twice, with G as it is and turned; return the one that goes on, the network left as it is then.
+
+        The domain is a ball by now. Which turn of it leaves the cube's edges out of hollows can be told beforehand;
+        whether that lowers the distortion cannot: other corners are then harder to reach.
+        """
+        train, begun, start = self.config.train, len(self.history.rows), self._state()
+        away = self.mapped() - 0.5
+        ball = Layout(self.vertices, self.faces, away / np.linalg.norm(away, axis=1, keepdims=True))
+        turn = best_turn(ball, self.config.layout, np.random.default_rng(self.seed))
+        least, winner = math.inf, None
+        for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - train.race_gain)):
+            self.network.load_state_dict(start)
+            self.network.turn(self._tensor(rotation))
+            run, optimizer = _Run(number, 0, self._state(), self._state()), TrainingOptimizer(self.network, train)
+            for _ in self._steps(run, boundary, optimizer, math.ceil(train.race * self.config.stages[number].steps)):
+                pass
+            rows = self.history.rows[begun:]
+            del self.history.rows[begun:]
+            distortion = float(np.mean([terms["arap"] for *_, terms in rows[-train.race_steps :]]))
+            if distortion < share * least:
+                least, winner = distortion, (run, optimizer, self._state(), rows)
+        assert winner is not None
+        run, optimizer, state, rows = winner
+        self.network.load_state_dict(state)
+        self.history.rows += rows
+        return run, optimizer
+
     def _train(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
         """Train one stage, and leave the network at its best state: fewest folded samples, then lowest loss."""
-        stage, steps = self.config.stages[run.number], self.config.stages[run.number].steps
-        later = sum(stage.steps for stage in self.config.stages[run.number + 1 :])
-        started, begun = time.perf_counter(), run.step
+        steps = self.config.stages[run.number].steps
         try:
-            while run.step < steps:
-                self._step(run, stage, boundary, optimizer)
-                pace = (time.perf_counter() - started) / (run.step - begun)
-                _, _, loss, folded, _ = self.history.rows[-1]
-                left = pace * (steps - run.step + later)
-                self.progress(Progress(stage.name, run.step, steps, loss, folded, left, self.mapped))
+            for _ in self._steps(run, boundary, optimizer, steps):
                 if run.step % _CHECKPOINT_STEPS == 0 or run.step == steps:
                     self._save(run, optimizer)
         except KeyboardInterrupt:
             self._save(run, optimizer)
             raise
         self.network.load_state_dict(run.best)
+
+    def _steps(
+        self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer, until: int
+    ) -> Iterator[None]:
+        """Take the steps of a stage that are left until one of them, and report each."""
+        stage = self.config.stages[run.number]
+        later = sum(stage.steps for stage in self.config.stages[run.number + 1 :])
+        started, begun = time.perf_counter(), run.step
+        while run.step < until:
+            self._step(run, stage, boundary, optimizer)
+            pace = (time.perf_counter() - started) / (run.step - begun)
+            _, _, loss, folded, _ = self.history.rows[-1]
+            left = pace * (stage.steps - run.step + later)
+            self.progress(Progress(stage.name, run.step, stage.steps, loss, folded, left, self.mapped))
+            yield
 
     def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
         """Take one step of the optimiser; nothing of the state changes before the loss is known."""

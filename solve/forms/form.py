@@ -143,7 +143,7 @@ class LawError(ValueError):
 def _results(form: Form, u: Array, grad: Array, x: Array) -> tuple[Array, Array]:
     """Return flux (c, 3, m) and reaction (c, m) of a law.
 
-    Raises LawError where their shapes are others, ValueError where they are not finite real numbers.
+    Raises LawError where their shapes are others, ValueError where the law fails or they are not finite real numbers.
     """
     name, results = type(form).__name__, []
     for part, shape in (("flux", grad.shape), ("react", u.shape)):
@@ -151,6 +151,8 @@ def _results(form: Form, u: Array, grad: Array, x: Array) -> tuple[Array, Array]
             found = np.asarray(getattr(form, part)(u, grad, x))
         except NotImplementedError as error:
             raise LawError(str(error)) from None
+        except Exception as error:  # whatever a user's law does with arrays
+            raise ValueError(f"{name}.{part} fails: {type(error).__name__}: {error}") from error
         if found.shape != shape and (part == "flux" or found.shape != ()):
             raise LawError(f"{name}.{part} must return shape {shape} for u of shape {u.shape}, got {found.shape}")
         if found.dtype.kind not in "iuf" or not np.all(np.isfinite(found)):
