@@ -65,7 +65,7 @@ class TrainConfig:
     edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
     race: float = 0.45  # share of the first stage towards the cube that is trained twice: as G is, and turned
     race_steps: int = 8  # the last ones of these, whose distortions are compared
-    race_gain: float = 0.05  # share by which that of the turned G must be lower, or it is no better than chance
+    race_gain: float = 0.05  # share by which the turned G must be better, in hollows and then in distortion
 
 
 @dataclass(frozen=True)
@@ -151,8 +151,9 @@ class SplineConfig:
     relaxations: int = 1  # sweeps over the triangles that these flipped
     last_slides: int = 20  # before the boundary map is made, and again after `last_sweeps`
     last_sweeps: int = 600  # over the triangles that the last slides flipped, at most
-    first_gain: float = 8e-3  # share of the energy: where step and sliding lower it by less, the first round ends
-    gain: float = 8e-4  # likewise the later ones
+    first_gain: float = 8e-3  # share of the energy: where steps with sliding lower it by less, the first round ends
+    gain: float = 1e-3  # likewise the later ones
+    small_gains: int = 2  # of these in a row: a step may gain little by chance
     memory: int = 4  # differences of Newton steps from which the next place is guessed
     damping: float = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
     damping_growth: float = 3.0  # factor after each further one, and divisor after a full step

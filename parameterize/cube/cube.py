@@ -6,6 +6,7 @@ the order of their numbers the faces are called u0, u1, v0, v1, w0, w1.
 
 from typing import Any
 
+import numba
 import numpy as np
 
 from ..arrays import Array, IntArray
@@ -61,6 +62,13 @@ def damped_fit(first: Array, second: Array, right: Array, damping: float) -> tup
     first, second, right = (np.ldexp(vectors, exponent) for vectors in (first, second, right))
     aa, bb, ab = (first * first).sum(1), (second * second).sum(1), (first * second).sum(1)
     ra, rb = (first * right).sum(1), (second * right).sum(1)
+    a, b = damped_solution(aa, bb, ab, ra, rb, damping)
+    return np.asarray(a), np.asarray(b)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def damped_solution(aa: Any, bb: Any, ab: Any, ra: Any, rb: Any, damping: float) -> tuple[Any, Any]:
+    """Return the coefficients of `damped_fit` from the products of two vectors with each other and the right side."""
     lift = damping * (aa + bb) + 1e-150  # no more than keeps the determinant of two zero vectors positive
     aa, bb = aa + lift, bb + lift
     determinant = aa * bb - ab * ab

@@ -53,6 +53,11 @@ def best_turn(layout: Layout, options: LayoutConfig, generator: np.random.Genera
     return np.asarray(turns[min(number, len(turns) - 1)].as_matrix())
 
 
+def hollowness(layout: Layout, options: LayoutConfig) -> float:
+    """Return how much the cube's edges lie in hollows of a layout, which `best_turn` makes small: below 0 on ridges."""
+    return _hollowness(*_bends(layout), options)
+
+
 def _is_other(rotation: Rotation, turns: list[Rotation], options: LayoutConfig) -> bool:
     return all(_angle_between(rotation, turn) > options.other_turn for turn in turns)
 
@@ -94,15 +99,15 @@ def _hollowness(middles: Array, along: Array, bends: Array, options: LayoutConfi
 def _bends_of_pieces(middles: Array, along: Array, bends: Array, width: float, count: int) -> Array:
     """Return the weighed sums (3, 2, 2, count): by the cube edge's axis, its sides along the others, and the piece."""
     sums = np.zeros((3, 2, 2, count))
-    for point, direction, bend in zip(middles, along, bends):  # noqa: B905 - numba knows no strict
+    for n in range(len(bends)):
         axis = 0  # of the nearest edge of the cube
         for other in range(1, 3):
-            if abs(point[other]) < abs(point[axis]):
+            if abs(middles[n, other]) < abs(middles[n, axis]):
                 axis = other
-        first, second = point[(axis + 1) % 3], point[(axis + 2) % 3]
+        first, second = middles[n, (axis + 1) % 3], middles[n, (axis + 2) % 3]
         size = 2.0 * max(abs(first), abs(second))  # projects radially onto the cube
         away = 0.5 - min(abs(first), abs(second)) / size
-        weight = np.exp(-0.5 * (away / width) ** 2) * direction[axis] ** 2
-        piece = min(int(count * (0.5 + point[axis] / size)), count - 1)
-        sums[axis, int(first > 0.0), int(second > 0.0), piece] += weight * bend
+        weight = np.exp(-0.5 * (away / width) ** 2) * along[n, axis] ** 2
+        piece = min(int(count * (0.5 + middles[n, axis] / size)), count - 1)
+        sums[axis, int(first > 0.0), int(second > 0.0), piece] += weight * bends[n]
     return sums

@@ -394,7 +394,7 @@ def _descend(rounds: _Rounds, history: History, progress: ProgressCallback) -> T
     most = config.growth.steps if config.growth and rounds.growing else steps
     energy.watch_facing(rounds.control)
     point = _evaluate(rounds.control, energy)
-    lowest, waited, damping, acceleration = point.total, 0, 0.0, Acceleration(config.memory)
+    lowest, waited, small, damping, acceleration = point.total, 0, 0, 0.0, Acceleration(config.memory)
     for step in range(most):
         begun = time.perf_counter()
         direction = energy.newton_direction(point.control, -point.gradient, damping)
@@ -423,6 +423,7 @@ def _descend(rounds: _Rounds, history: History, progress: ProgressCallback) -> T
         enough = config.gain if number else config.first_gain
         waited = 0 if point.total < (1.0 - enough) * lowest else waited + 1
         lowest = min(lowest, point.total)
-        if step + 1 >= config.least_steps and (gain < enough * point.total or waited >= config.least_steps):
+        small = small + 1 if gain < enough * point.total else 0
+        if step + 1 >= config.least_steps and (small >= config.small_gains or waited >= config.least_steps):
             break
     return point.control

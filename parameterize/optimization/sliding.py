@@ -15,9 +15,9 @@ from torch import Tensor
 
 from ..arrays import Array, IntArray, Knots, Mask
 from ..config import LAYOUT, LayoutConfig
-from ..cube.cube import axis_and_side, damped_fit, face_number, nearest_faces, tangent_axes
+from ..cube.cube import damped_solution, nearest_faces
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
-from ..spline.bspline import breakpoints, fill_basis
+from ..spline.bspline import basis_derivatives, breakpoints
 from ..threads import in_parallel
 from .determinant_penalty import with_neighbours
 from .operators import ControlRows, pieces
@@ -25,6 +25,23 @@ from .operators import ControlRows, pieces
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3
 _NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
+
+
+Polynomials = tuple[IntArray, Array, IntArray, Array]
+
+
+def _polynomials(knots: Knots, degree: int) -> Polynomials:
+    """Return the functions that are not zero on a span as polynomials: nothing evaluates them faster.
+
+    That is, for the spans of all directions one after the other, where those of each direction begin (4,), where a
+    span begins (s,), its first function (s,), and the Taylor coefficients there, power by power (s, p + 1, p + 1).
+    """
+    begins = [breakpoints(row)[:-1] for row in knots]
+    found = [basis_derivatives(row, degree, begin, degree) for row, begin in zip(knots, begins, strict=True)]
+    factorials = np.cumprod(np.maximum(np.arange(degree + 1), 1))
+    coefficients = np.concatenate([derivatives.swapaxes(0, 1) for _, derivatives in found]) / factorials[:, None]
+    starts = np.cumsum([0, *(len(begin) for begin in begins)])
+    return starts, np.concatenate(begins), np.concatenate([first for first, _ in found]), coefficients
 
 
 class SlidingParameters:
@@ -81,22 +98,20 @@ class SlidingParameters:
         that would end up farther away, and those farther away than `reach`, stay where they are; with `keep_layout`
         steps that would flip a triangle are shortened.
         """
-        values, ta, tb = self.window.derivatives(control)
-        residual = values - points
-        step = -np.stack(damped_fit(ta, tb, residual, _DAMPING), axis=1)
-        step *= np.minimum(1.0, max_step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
-        a, b = tangent_axes(axis_and_side(self.cube_faces)[0])
-        moved = self.parameters.copy()
-        rows = np.arange(len(moved))
-        moved[rows, a] += step[:, 0]
-        moved[rows, b] += step[:, 1]
-        before = self.parameters, self.cube_faces
-        self.place(*fold_over_edges(moved, self.cube_faces))
-        squares = (residual**2).sum(axis=1)
-        stay = (((self.values(control) - points) ** 2).sum(axis=1) > squares) | (squares > reach**2)
-        self._keep(*before, stay)
+        window, field = self.window, control.reshape(3, -1).numpy()
+        polynomials, before = self._polynomials, (self.parameters, self.cube_faces)
+
+        def part(rows: slice) -> tuple[Array, ...]:
+            known = (window.indices[rows], window.in_a[rows], window.in_b[rows])
+            at = (self.parameters[rows], self.cube_faces[rows])
+            return _slid(polynomials, *at, *known, field, points[rows], max_step, reach)
+
+        found = in_parallel(part, pieces(len(points)))
+        goal, parameters, cube_faces, *arrays = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        self.place(parameters, cube_faces)
+        self.window = FaceWindow(*arrays)
         if keep_layout:
-            self._hold_back(*before, moved)
+            self._hold_back(*before, goal)
 
     def _hold_back(self, parameters: Array, cube_faces: IntArray, goal: Array) -> None:
         """Shorten steps from `parameters` towards `goal` until no further triangle flips."""
@@ -150,11 +165,15 @@ class SlidingParameters:
         return self._window(self.parameters, self.cube_faces)
 
     def _window(self, parameters: Array, faces: IntArray) -> "FaceWindow":
-        knots = tuple(self.knots)
+        polynomials = self._polynomials
         found = in_parallel(
-            lambda piece: _face_windows(knots, self.degree, parameters[piece], faces[piece]), pieces(len(faces))
+            lambda piece: _face_windows(polynomials, parameters[piece], faces[piece]), pieces(len(faces))
         )
         return FaceWindow(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+    @cached_property
+    def _polynomials(self) -> Polynomials:
+        return _polynomials(self.knots, self.degree)
 
     @cached_property
     def rows(self) -> ControlRows:
@@ -178,7 +197,7 @@ class FaceWindow:
         """Return F and its tangents t_a and t_b at the points: (N, 3) each."""
         flat, windows = control.reshape(3, -1).numpy(), (self.indices, self.in_a, self.in_b)
         found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), pieces(len(self.indices)))
-        value, along_a, along_b = np.concatenate(found, axis=1)
+        value, along_a, along_b = np.concatenate(found).swapaxes(0, 1)
         return value, along_a, along_b
 
     def with_points(self, chosen: Mask, other: "FaceWindow") -> "FaceWindow":
@@ -189,60 +208,161 @@ class FaceWindow:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _face_windows(knots: Knots, degree: int, parameters: Array, cube_faces: IntArray) -> tuple[IntArray, Array, Array]:
+def _face_windows(polynomials: Polynomials, parameters: Array, cube_faces: IntArray) -> tuple[IntArray, Array, Array]:
     """Return what a FaceWindow holds, for points (N, 3) on cube faces (N,)."""
-    count, width = len(parameters), degree + 1
-    sizes, stride = np.empty(3, np.int64), np.ones(3, np.int64)
-    for d in range(3):
-        sizes[d] = len(knots[d]) - degree - 1
-    stride[1], stride[0] = sizes[2], sizes[1] * sizes[2]
+    count, width = len(parameters), polynomials[3].shape[1]
     indices = np.empty((count, width * width), np.int64)
-    in_a, in_b = np.empty((count, 2, 1, width)), np.empty((count, 2, 1, width))
-    first, span = np.empty(2, np.int64), np.empty(1, np.int64)
+    in_a, in_b = np.empty((count, 2, width)), np.empty((count, 2, width))
     for n in range(count):
-        axis, side = cube_faces[n] // 2, cube_faces[n] % 2
-        for d in range(2):
-            along = (axis + 1 + d) % 3
-            row, x = knots[along], parameters[n, along : along + 1]
-            span[0] = min(max(np.searchsorted(row, x[0], side="right") - 1, degree), len(row) - degree - 2)
-            fill_basis(row, degree, x, span, in_b[n] if d else in_a[n])
-            first[d] = span[0] - degree
-        base = side * (sizes[axis] - 1) * stride[axis]
-        step_a, step_b = stride[(axis + 1) % 3], stride[(axis + 2) % 3]
-        for i in range(width):
-            for j in range(width):
-                indices[n, i * width + j] = base + (first[0] + i) * step_a + (first[1] + j) * step_b
-    return indices, in_a[:, :, 0], in_b[:, :, 0]
+        _fill_window(polynomials, parameters, cube_faces, n, indices, in_a, in_b)
+    return indices, in_a, in_b
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _fill_window(
+    polynomials: Polynomials,
+    parameters: Array,
+    cube_faces: IntArray,
+    n: int,
+    indices: IntArray,
+    in_a: Array,
+    in_b: Array,
+) -> None:
+    """Write row n of what a FaceWindow holds."""
+    starts, _, first, _ = polynomials
+    axis, width = cube_faces[n] // 2, in_a.shape[2]
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    size_v, size_w = first[starts[2] - 1] + width, first[starts[3] - 1] + width
+    strides = (size_v * size_w, size_w, 1)
+    first_a = _fill_values(polynomials, a, parameters[n, a], n, in_a)
+    first_b = _fill_values(polynomials, b, parameters[n, b], n, in_b)
+    base = (first[starts[axis + 1] - 1] + width - 1) * strides[axis] if cube_faces[n] % 2 else 0
+    for i in range(width):
+        for j in range(width):
+            indices[n, i * width + j] = base + (first_a + i) * strides[a] + (first_b + j) * strides[b]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _fill_values(polynomials: Polynomials, direction: int, x: float, n: int, out: Array) -> int:
+    """Write row n of values and derivatives (N, 2, p + 1); return the index of the first function that is not zero."""
+    starts, begins, first, coefficients = polynomials
+    low, high = starts[direction], starts[direction + 1]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if begins[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    step, width = x - begins[low], out.shape[2]
+    for i in range(width):
+        value, slope = coefficients[low, width - 1, i], 0.0
+        for power in range(width - 2, -1, -1):
+            slope = slope * step + value
+            value = value * step + coefficients[low, power, i]
+        out[n, 0, i], out[n, 1, i] = value, slope
+    return first[low]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _slid(
+    polynomials: Polynomials,
+    parameters: Array,
+    cube_faces: IntArray,
+    indices: IntArray,
+    in_a: Array,
+    in_b: Array,
+    control: Array,
+    points: Array,
+    max_step: float,
+    reach: float,
+) -> tuple[Array, Array, IntArray, IntArray, Array, Array]:
+    """Take the step of `SlidingParameters.slide` at points (N, 3), whose FaceWindow is given.
+
+    Returns where the steps lead within the faces' planes (N, 3), the parameters, their cube faces and their FaceWindow.
+    """
+    goal, parameters, cube_faces = parameters.copy(), parameters.copy(), cube_faces.copy()
+    old, before = (indices, in_a, in_b), parameters.copy()
+    indices, in_a, in_b = indices.copy(), in_a.copy(), in_b.copy()
+    found = np.empty((len(points), 3, 3))
+    for n in range(len(points)):
+        _fill_tangents(indices, in_a, in_b, control, n, found)
+        square = aa = bb = ab = ra = rb = 0.0
+        for c in range(3):
+            off, along_a, along_b = found[n, 0, c] - points[n, c], found[n, 1, c], found[n, 2, c]
+            square += off * off
+            aa, bb, ab = aa + along_a * along_a, bb + along_b * along_b, ab + along_a * along_b
+            ra, rb = ra + along_a * off, rb + along_b * off
+        step_a, step_b = damped_solution(aa, bb, ab, ra, rb, _DAMPING)
+        share = min(1.0, max_step / max(np.sqrt(step_a**2 + step_b**2), 1e-300))
+        face = cube_faces[n]
+        goal[n, (face // 2 + 1) % 3] -= share * step_a
+        goal[n, (face // 2 + 2) % 3] -= share * step_b
+        if square > reach**2:
+            continue
+        for c in range(3):
+            parameters[n, c] = goal[n, c]
+        _fold(parameters, cube_faces, n)
+        _fill_window(polynomials, parameters, cube_faces, n, indices, in_a, in_b)
+        _fill_tangents(indices, in_a, in_b, control, n, found)
+        after = 0.0
+        for c in range(3):
+            after += (found[n, 0, c] - points[n, c]) ** 2
+        if after > square:
+            parameters[n], cube_faces[n] = before[n], face
+            indices[n], in_a[n], in_b[n] = old[0][n], old[1][n], old[2][n]
+    return goal, parameters, cube_faces, indices, in_a, in_b
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _tangents(indices: IntArray, in_a: Array, in_b: Array, control: Array) -> Array:
-    """Return F, t_a and t_b of control points (3, n) at the points of a FaceWindow: (3, N, 3)."""
-    width = in_a.shape[2]
-    out = np.zeros((3, len(indices), 3))
+    """Return F, t_a and t_b of control points (3, n) at the points of a FaceWindow: (N, 3, 3)."""
+    out = np.empty((len(indices), 3, 3))
     for n in range(len(indices)):
-        for i in range(width):
-            for j in range(width):
-                column = indices[n, i * width + j]
-                for c in range(3):
-                    point = control[c, column]
-                    out[0, n, c] += in_a[n, 0, i] * in_b[n, 0, j] * point
-                    out[1, n, c] += in_a[n, 1, i] * in_b[n, 0, j] * point
-                    out[2, n, c] += in_a[n, 0, i] * in_b[n, 1, j] * point
+        _fill_tangents(indices, in_a, in_b, control, n, out)
     return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _fill_tangents(indices: IntArray, in_a: Array, in_b: Array, control: Array, n: int, out: Array) -> None:
+    """Write row n of F, t_a and t_b (N, 3, 3)."""
+    width = in_a.shape[2]
+    out[n] = 0.0
+    for i in range(width):
+        for j in range(width):
+            column = indices[n, i * width + j]
+            plain = in_a[n, 0, i] * in_b[n, 0, j]
+            along_a, along_b = in_a[n, 1, i] * in_b[n, 0, j], in_a[n, 0, i] * in_b[n, 1, j]
+            for c in range(3):
+                point = control[c, column]
+                out[n, 0, c] += plain * point
+                out[n, 1, c] += along_a * point
+                out[n, 2, c] += along_b * point
 
 
 def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:
     """Continue steps that left their face on the neighbouring one: what overshot goes inwards there."""
     parameters, cube_faces = parameters.copy(), cube_faces.copy()
-    rows = np.arange(len(parameters))
-    outside = np.maximum(-parameters, parameters - 1.0)  # (N, 3), positive beyond a side
-    constant, side = axis_and_side(cube_faces)
-    outside[rows, constant] = -1.0
-    axis = outside.argmax(axis=1)
-    overshoot = outside[rows, axis]
-    crossed = rows[overshoot > 0.0]
-    inwards = np.where(side[crossed] == 1, 1.0 - overshoot[crossed], overshoot[crossed])
-    parameters[crossed, constant[crossed]] = inwards
-    cube_faces[crossed] = face_number(axis[crossed], parameters[crossed, axis[crossed]] > 0.5)
-    return np.clip(parameters, 0.0, 1.0), cube_faces
+    _fold_all(parameters, cube_faces)
+    return parameters, cube_faces
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _fold_all(parameters: Array, cube_faces: IntArray) -> None:
+    for n in range(len(parameters)):
+        _fold(parameters, cube_faces, n)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _fold(parameters: Array, cube_faces: IntArray, n: int) -> None:
+    """Continue the step of one point, in place."""
+    constant, side = cube_faces[n] // 2, cube_faces[n] % 2
+    axis, overshoot = constant, 0.0
+    for d in range(3):
+        outside = max(-parameters[n, d], parameters[n, d] - 1.0)
+        if d != constant and outside > overshoot:
+            axis, overshoot = d, outside
+    if overshoot > 0.0:
+        parameters[n, constant] = 1.0 - overshoot if side == 1 else overshoot
+        cube_faces[n] = 2 * axis + int(parameters[n, axis] > 0.5)
+    for d in range(3):
+        parameters[n, d] = min(max(parameters[n, d], 0.0), 1.0)

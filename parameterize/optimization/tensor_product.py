@@ -15,7 +15,6 @@ from torch import Tensor
 
 from ..arrays import Array, IntArray
 from ..spline.bspline import collocation, gauss_points
-from ..threads import in_parallel
 from .operators import PiecewiseOperator
 
 _END_SPANS = 1
@@ -267,10 +266,6 @@ class FastDiagonalization:
 
     def __call__(self, residual: Tensor) -> Tensor:
         """Apply the inverse: (3, n_u, n_v, n_w) -> the same shape."""
-        return torch.cat(in_parallel(self._solve, torch.split(residual, 1)))
-
-    def _solve(self, residual: Tensor) -> Tensor:
-        """Apply it to one component (1, n_u, n_v, n_w)."""
         for axis, vectors in enumerate(self._vectors, start=1):
             residual = along(vectors.T, residual, axis)
         residual = residual * self._inverse

@@ -7,7 +7,7 @@ import logging
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
 from ..cube.flips import Layout
-from ..cube.turning import best_turn
+from ..cube.turning import best_turn, hollowness
 from ..progress import History, Progress, ProgressCallback
 from .losses import BoundarySamples, EdgePaths, Objective
 from .network import InverseMap
@@ -146,15 +146,19 @@ class Trainer:
         return next((number for number, stage in enumerate(self.config.stages) if stage.target == "cube"), None)
 
     def _race(self, number: int, boundary: BoundarySamples) -> tuple[_Run, TrainingOptimizer]:
-        """Begin a stage twice, with G as it is and turned; return the one that goes on, the network left as it is then.
+        """Begin a stage with G as it is and, where its edges then lie less in hollows, with G turned.
 
-        The domain is a ball by now. Which turn of it leaves the cube's edges out of hollows can be told beforehand;
-        whether that lowers the distortion cannot: other corners are then harder to reach.
+        Returns what goes on, the network left as it is then. The domain is a ball by now. Which turn of it suits the
+        cube's edges can be told beforehand; whether that lowers the distortion cannot: corners may be harder to reach.
         """
-        train, begun, start = self.config.train, len(self.history.rows), self._state()
-        away = self.mapped() - 0.5
-        ball = Layout(self.vertices, self.faces, away / np.linalg.norm(away, axis=1, keepdims=True))
-        turn = best_turn(ball, self.config.layout, np.random.default_rng(self.seed))
+        train, layout, begun = self.config.train, self.config.layout, len(self.history.rows)
+        away, start = self.mapped() - 0.5, self._state()
+        directions = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
+        ball = Layout(self.vertices, self.faces, directions)
+        turn = best_turn(ball, layout, np.random.default_rng(self.seed))
+        as_it_is = hollowness(ball, layout)
+        if hollowness(replace(ball, places=ball.places @ turn.T), layout) > as_it_is - train.race_gain * abs(as_it_is):
+            return _Run(number, 0, start, start), TrainingOptimizer(self.network, train)
         least, winner = math.inf, None
         for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - train.race_gain)):
             self.network.load_state_dict(start)
@@ -185,9 +189,7 @@ class Trainer:
             raise
         self.network.load_state_dict(run.best)
 
-    def _steps(
-        self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer, until: int
-    ) -> Iterator[None]:
+    def _steps(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer, until: int) -> Iterator[None]:
         """Take the steps of a stage that are left until one of them, and report each."""
         stage = self.config.stages[run.number]
         later = sum(stage.steps for stage in self.config.stages[run.number + 1 :])
