@@ -144,6 +144,15 @@ def test_the_steps_left_are_those_of_a_usual_run():
     assert newton._expected_steps(replace(config, steps=20), 0, 0) == 19 + 20 + 10
 
 
+def test_a_round_does_not_end_on_one_small_gain():
+    steps = []
+    for small_gains in (1, 2):
+        history, config = History(), replace(CONFIG, rounds=1, steps=12, least_steps=3, first_gain=0.5)
+        optimize(wavy_control(0.0), KNOTS, surface_fit(), replace(config, small_gains=small_gains), history=history)
+        steps.append(len(history.rows))
+    assert steps[0] < steps[1]
+
+
 def test_a_polish_that_folds_is_mended_before_more_is_taken_back(monkeypatch):
     certified = certify(as_volume(wavy_control(0.0)))
     folded = replace(certified, verdict="folded", unproved=np.array([[1, 1, 1]]))
