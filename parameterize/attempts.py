@@ -19,7 +19,7 @@ from .cube.sphere import lay_on_sphere
 from .extension import extended, extending
 from .growth import first_cube, growing, surface_on_cube
 from .optimization.least_squares import fit_pairs
-from .optimization.newton import Optimized, one_thread_an_operation
+from .optimization.rounds import Optimized, one_thread_an_operation
 from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
 from .progress import timed

@@ -15,7 +15,7 @@ from torch import Tensor
 from .arrays import Knots
 from .checkpoint import Checkpoints
 from .config import SplineConfig
-from .optimization.newton import Optimized, optimize
+from .optimization.rounds import Optimized, optimize
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback
 from .spline.bspline import evaluate_grid, greville, interpolate_grid, open_uniform_knots

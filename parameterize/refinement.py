@@ -16,7 +16,7 @@ from .arrays import Array, IntArray, Knots
 from .certificate.determinant import DeterminantForm
 from .checkpoint import Checkpoints
 from .config import RefinementConfig, SplineConfig
-from .optimization.newton import Optimized, optimize
+from .optimization.rounds import Optimized, optimize
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback
 from .quality.distances import Distances

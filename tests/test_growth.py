@@ -12,7 +12,7 @@ from parameterize.config import LAYOUT, preset
 from parameterize.cube.flips import flipped
 from parameterize.cube.sphere import lay_on_sphere
 from parameterize.growth import first_cube, growing, surface_on_cube
-from parameterize.optimization.newton import Optimized
+from parameterize.optimization.rounds import Optimized
 from parameterize.progress import Progress
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.surface.surface import surface_from_arrays

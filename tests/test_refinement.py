@@ -9,7 +9,7 @@ from parameterize import refinement
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import RefinementConfig, SplineConfig
 from parameterize.cube.cube import project_radially
-from parameterize.optimization.newton import Optimized, optimize
+from parameterize.optimization.rounds import Optimized, optimize
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
 from parameterize.progress import History, ignore

@@ -56,7 +56,7 @@ def test_measuring_leaves_one_thread_an_operation_to_the_threads_that_help():
 import threading, torch, iga_nn
 from iga_nn.workflow.cost_estimate import forecast
 from parameterize.config import preset
-from parameterize.optimization.newton import one_thread_an_operation
+from parameterize.optimization.rounds import one_thread_an_operation
 from parameterize.threads import in_parallel
 forecast(iga_nn.sample("cube"), preset("fast").with_control_points(8), device=torch.device("cpu"))
 barrier = threading.Barrier(2, timeout=10.0)

@@ -90,7 +90,7 @@ def forecast(
     unknowns: of the largest problem that is solved afterwards. A second start, where the first is not certified, takes
     as long again.
     """
-    from parameterize.optimization.newton import one_thread_an_operation
+    from parameterize.optimization.rounds import one_thread_an_operation
 
     spline, vertices = config.spline, len(surface.vertices)
     points = _training_points(surface, config)
