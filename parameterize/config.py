@@ -55,7 +55,7 @@ class TrainConfig:
     learning_rate: float = 1e-3  # of Adam
     matrix_rate: float = 0.015  # of Muon, for the hidden layers' matrices; Adam trains these, too, where it is 0
     final_share: float = 0.02  # of the rates, reached by cosine decay at the end of each stage
-    easy_loss: float | None = 4.5  # where the first stage ends with a larger loss, the map is grown instead
+    easy_loss: float | None = 3.5  # where the first stage ends with more, distortion left out, the map is grown instead
     cell: float = 0.12  # edge h of the interior cells (section 4.4.2)
     triangles: int = 700  # surface triangles sampled a step; all of them where there are fewer
     min_det: float = 0.1  # alpha of the bijectivity term

@@ -194,6 +194,23 @@ def test_rounds_end_where_what_is_folded_is_far_from_the_surface(monkeypatch, fa
     assert len(ended) == rounds
 
 
+def test_rounds_go_on_where_smoothing_alone_leads_away(monkeypatch):
+    """What the steps have reached counts: the rounds after it lead back to the surface."""
+    certificate = replace(certify(as_volume(wavy_control(0.0))), verdict="folded", unproved=np.ones((2, 3), dtype=int))
+    monkeypatch.setattr(Optimized, "of", lambda control, *_: Optimized(control, certificate, None))
+    monkeypatch.setattr(
+        "parameterize.optimization.rounds._Rounds._smoothed",
+        lambda _, found: replace(found, control=found.control + 10.0),
+    )
+    monkeypatch.setattr(DESCEND, lambda energy, control, number, **_: wavy_control(0.0))
+    ended = []
+    monkeypatch.setattr(SplineEnergy, "start_round", lambda *_: ended.append(1))
+    optimize(
+        wavy_control(0.0), KNOTS, surface_fit(), replace(CONFIG, rounds=4, firm_rounds=1, far=0.5), history=History()
+    )
+    assert len(ended) == 4
+
+
 def test_the_number_of_threads_changes_no_bit(monkeypatch):
     control, found = wavy_control(0.1, seed=3), []
     monkeypatch.delenv("NUMBA_NUM_THREADS", raising=False)

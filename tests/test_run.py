@@ -192,6 +192,16 @@ def test_a_shape_that_is_hard_to_train_is_grown_after_the_first_stage(surface, u
     assert (result.origin, alone.origin) == ("growth", "network")
 
 
+def test_a_shape_is_judged_without_its_distortion(surface, undisturbed):
+    first = undisturbed.history["stage"] == "S(2)"
+    columns = [undisturbed.history[name][first] for name in ("folded", "loss", "arap")]
+    _, loss, arap = min(zip(*columns, strict=True))
+    for limit, trained in ((loss - 0.9 * arap, True), (loss - 1.1 * arap, False)):
+        config = hard_config(starts=2)
+        config = replace(config, train=replace(config.train, easy_loss=limit))
+        assert ("S(1)" in parameterize(surface, config, seed=3, device="cpu").history["stage"]) == trained
+
+
 def test_a_run_killed_after_the_look_at_a_hard_shape_resumes(surface, tmp_path):
     def interrupt(state):
         if state.stage == "spline":

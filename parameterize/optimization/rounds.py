@@ -203,7 +203,7 @@ class _Rounds:
     def conclude(self, control: Tensor) -> None:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
         config = self.energy.config
-        found = Optimized.of(control, self.knots, config)
+        found, distance = Optimized.of(control, self.knots, config), self._distance(control)
         if self.polished:
             found = self._mended(found)
         elif not self.certified:
@@ -226,19 +226,20 @@ class _Rounds:
         if 2 * len(unproved) <= self.fewest or self.number <= len(self.shares):
             self.fewest, self.halved = len(unproved), self.number
         self.number += 1
-        self.lost = not self.growing and self._hopeless(many)
+        self.lost = not self.growing and self._hopeless(many, distance)
 
-    def _hopeless(self, many: bool) -> bool:
+    def _hopeless(self, many: bool, distance: float) -> bool:
         """Return whether further rounds would not part a boundary that meets itself, or not unfold F at the surface.
 
-        many: whether more than `most_watched` spans are unproved.
+        many: whether more than `most_watched` spans are unproved. distance: of what the steps have led to, as
+        `_distance` says; where F is smoothed after them, it is farther for a while.
         """
         config = self.energy.config
         if self.certified:
             return self.best.meets_itself and self.parting == config.parting
         if self.number > self.halved + config.stalling:
             return True
-        return self.number >= config.firm_rounds and (many or self._distance(self.control) > config.far**2)
+        return self.number >= config.firm_rounds and (many or distance > config.far**2)
 
     def _distance(self, control: Tensor) -> float:
         """Return the mean squared distance of a map from the surface at the parameters as they are."""

@@ -78,7 +78,7 @@ class Trainer:
     def run(self, *, give_up: bool = False) -> InverseMap | None:
         """Train all stages, or those that a checkpoint leaves; return the network at the best state of the last one.
 
-        With `give_up`, return None where the first stage ends with a loss above `easy_loss`.
+        With `give_up`, return None where the first stage ends with a loss above `easy_loss`, see `_misfit`.
         Where the mapped surface is still too far from a cube for its edges to be traced, the stages that fix them are
         left out and a warning says so: the spline stage moves edges anyway. Raises PathError where the user gave the
         corners.
@@ -101,8 +101,7 @@ class Trainer:
             elif number == self._race_stage:
                 run, optimizer = self._race(number, boundary)
             self._train(run, boundary, optimizer)
-            _, loss = run.best_key
-            if give_up and number == 0 and limit is not None and loss > limit:
+            if give_up and number == 0 and limit is not None and self._misfit(stage) > limit:
                 return None
             saved = None
         return self.network
@@ -137,6 +136,15 @@ class Trainer:
 
     def _tensor(self, values: Array) -> Tensor:
         return torch.as_tensor(values, dtype=self.dtype, device=self.device)
+
+    def _misfit(self, stage: StageConfig) -> float:
+        """Return the loss of a stage at its best state without the distortion: what keeps G from reaching the target.
+
+        A straight rod has a large distortion on any ball, and yet suits the network.
+        """
+        rows = [row for row in self.history.rows if row[0] == stage.name]
+        _, _, loss, _, terms = min(rows, key=lambda row: (row[3], row[2]))
+        return loss - stage.weights.arap * terms["arap"]
 
     @property
     def _race_stage(self) -> int | None:
