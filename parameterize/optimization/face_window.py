@@ -15,7 +15,7 @@ Polynomials = tuple[IntArray, Array, IntArray, Array]
 
 
 def polynomials_of(knots: Knots, degree: int) -> Polynomials:
-    """Return the functions that are not zero on a span as polynomials: nothing evaluates them faster.
+    """Return the functions that are not zero on a span as polynomials, which are cheap to evaluate.
 
     That is, for the spans of all directions one after the other, where those of each direction begin (4,), where a
     span begins (s,), its first function (s,), and the Taylor coefficients there, power by power (s, p + 1, p + 1).
