@@ -241,12 +241,15 @@ class ElasticityOptions(ProblemOptions):
         from solve import Elasticity
 
         check_space(self.refine, self.degree)
+        if self.exact is None and self.body_force is None:
+            raise InputError("no force is given: --body-force '0;0;-1', '0;0;0' for none, or the solution as --exact")
+        traction = _faces("traction", self.traction)
         with input_errors():
             return Elasticity(
-                exact=_vector(self.exact),
-                force=_vector(self.body_force),
-                displacement=_vector(self.displacement),
-                traction={face: _vector(text) for face, text in _faces("traction", self.traction).items()},
+                exact=_vector("--exact", self.exact),
+                force=_vector("--body-force", self.body_force),
+                displacement=_vector("--displacement", self.displacement),
+                traction={face: _vector(f"--traction {face}", text) for face, text in traction.items()},
                 young=self.young,
                 poisson_ratio=self.poisson_ratio,
             )
@@ -406,5 +409,11 @@ def _faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
     return found
 
 
-def _vector(text: str | None) -> list[str] | None:
-    return None if text is None else text.split(";")
+def _vector(flag: str, text: str | None) -> list[str] | None:
+    """Return the formulas of a vector. Raises InputError where they are not three."""
+    if text is None:
+        return None
+    entries = text.split(";")
+    if len(entries) != 3:
+        raise InputError(f"{flag} {text!r:.80}: write three formulas with semicolons between them, such as '0;0;-1'")
+    return entries

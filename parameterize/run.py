@@ -17,6 +17,7 @@ from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
+from .display import Brief
 from .optimization.rounds import Optimized
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback, ignore, timed
@@ -26,8 +27,8 @@ from .spline.volume import BSplineVolume
 from .surface.surface import Surface
 
 
-@dataclass(frozen=True, eq=False)
-class Parameterization:
+@dataclass(frozen=True, eq=False, repr=False)
+class Parameterization(Brief):
     """What `parameterize` returns; lengths in the user's units.
 
     Attributes

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, Knots
+from parameterize.display import Brief
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
@@ -36,8 +37,8 @@ class Points(np.ndarray[Any, Any]):
         return cls.of(np.moveaxis(volume.grid(u, v, w), -1, 0), (u, v, w))
 
 
-@dataclass(frozen=True, eq=False)
-class SplineField:
+@dataclass(frozen=True, eq=False, repr=False)
+class SplineField(Brief):
     """A function of the parameters.
 
     Parameters

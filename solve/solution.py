@@ -108,7 +108,7 @@ class SolveReport:
         return "\n".join([", ".join([*parts, f"{self.iterations} iterations{state}"]), *self.notices])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution(SplineField, Shown):
     """The discrete solution: a spline of the parameters, the map it lives on, the report, and the problem it solves.
 

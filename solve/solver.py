@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume, demand_volume
 from parameterize.threads import default_threads
 
 from .discretization.quadrature import gauss_rule, map_planes
@@ -119,8 +119,7 @@ def discretize(
     >>> system.operator.shape, system.load.shape
     ((125, 125), (125,))
     """
-    if not isinstance(volume, BSplineVolume):
-        raise TypeError(f"volume must be a BSplineVolume, got {type(volume).__name__}")
+    demand_volume(volume)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
     if threads is not None and threads < 1:

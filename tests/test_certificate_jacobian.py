@@ -143,6 +143,8 @@ def test_cutting_proves_what_the_first_bound_cannot():
     volume = squeezed(0.05)
     assert bernstein_coefficients(volume, [[0, 0, 0]]).min() < 0.0
     assert certify(volume, max_depth=0).verdict == "undecided"
+    with pytest.raises(TypeError, match="volume must be a BSplineVolume, got str"):
+        certify("volume.npz")
     certificate = certify(volume)
     assert certificate.verdict == "certified"
     mean = 1.0 - 0.95 * 4.0 / 6.0

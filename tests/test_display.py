@@ -77,6 +77,16 @@ def test_a_study_shows_its_rates_and_notices_once(solution):
     assert notices and len(re.findall("<li>", folded._repr_html_())) == len(notices)
 
 
+def test_python_prints_the_shapes_of_arrays(solution):
+    knots = "(array(9,), array(9,), array(9,))"
+    volume = f"BSplineVolume(degrees=(3, 3, 3), knots={knots}, control_points=array(5, 5, 5, 3))"
+    assert repr(solution.geometry) == volume
+    assert repr(solution).startswith(
+        f"Solution(degrees=(3, 3, 3), knots={knots}, coefficients=array(5, 5, 5), geometry"
+    )
+    assert "'step': array" in repr(formula_parameterization())
+
+
 def test_other_objects_have_no_table():
     with pytest.raises(TypeError, match="no table of a int"):
         as_html(3)

@@ -56,6 +56,7 @@ def test_data_from_the_exact_solution_are_the_derivatives_by_hand():
 def test_nine_entries_are_the_six():
     nine = [TENSOR[i] for i in (0, 1, 2, 1, 3, 4, 2, 4, 5)]
     where = np.random.default_rng(0).random((3, 5))
+    assert np.array_equal(Poisson(exact=WAVE, kappa=np.eye(3)).tensor(where), Poisson(exact=WAVE).tensor(where))
     assert np.array_equal(Poisson(exact=WAVE, kappa=nine).tensor(where), PROBLEMS["tensor kappa"].tensor(where))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Array, IntArray, Mask
 from ..display import Shown
 from ..spline.bernstein import split
-from ..spline.volume import BSplineVolume
+from ..spline.volume import BSplineVolume, demand_volume
 from .determinant import CHUNK, DeterminantForm, corners_of
 
 _PIECES = 64  # pieces at a time
@@ -68,6 +68,8 @@ def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
 
     Raises
     ------
+    TypeError
+        For what is not a volume.
     ValueError
         For a negative depth, or where derivatives overflow.
 
@@ -79,6 +81,7 @@ def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
     >>> certificate.verdict, certificate.lower_bound > 0, certificate.witness
     ('certified', True, None)
     """
+    demand_volume(volume)
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
     form = DeterminantForm(volume)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray, Mask
 from ..config import LAYOUT, LayoutConfig
+from ..display import Brief
 from ..files import load_arrays, save_arrays
 from ..spline.bspline import real_array
 from ..spline.volume import FACE_NAMES, BSplineVolume
@@ -16,8 +17,8 @@ from .cutting import CutMesh, cut_along_rays
 from .flips import orientation, untangle_whole
 
 
-@dataclass(frozen=True, eq=False)
-class BoundaryMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class BoundaryMap(Brief):
     """Every vertex of a closed surface with its place on the boundary of the unit cube.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, Knots
-from ..display import Shown, above
+from ..display import Brief, Shown, above
 from ..files import load_arrays, save_arrays
 from .bspline import (
     apply_along,
@@ -65,8 +65,8 @@ def load_spline(path: str | Path, content: str) -> tuple[tuple[int, int, int], K
     return (p_u, p_v, p_w), (data["knots_u"], data["knots_v"], data["knots_w"]), data[content]
 
 
-@dataclass(frozen=True, eq=False)
-class BSplineVolume(Shown):
+@dataclass(frozen=True, eq=False, repr=False)
+class BSplineVolume(Brief, Shown):
     """A trivariate B-spline.
 
     Parameters
@@ -251,3 +251,9 @@ class BSplineVolume(Shown):
             return cls(degrees, knots, points)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: {error}") from None
+
+
+def demand_volume(volume: object) -> None:
+    """Raise TypeError for what is not a BSplineVolume."""
+    if not isinstance(volume, BSplineVolume):
+        raise TypeError(f"volume must be a BSplineVolume, got {type(volume).__name__}")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, in_brackets
-from ..display import Shown
+from ..display import Brief, Shown
 from . import topology
 from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
 from .geometry import deepest_point, signed_volume
@@ -30,8 +30,8 @@ USUAL_SIZES = (1e-6, 1e6)
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
-class Surface(Shown):
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface(Brief, Shown):
     """A closed surface of genus 0, one component, wound outward, with its placement in the unit cube's space.
 
     `load_surface`, `surface_from_arrays` and `sample` make surfaces.

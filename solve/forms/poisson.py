@@ -37,7 +37,7 @@ class Poisson(LawWithData):
         f; overrides the one that follows from `exact`.
     boundary : entry, optional
         Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
-    kappa : entry, or six or nine of them, optional
+    kappa : entry, six or nine of them, or a 3 x 3 array, optional
         A scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz or nine by rows; default 1. Positive
         definite.
     reaction : entry, optional
@@ -124,6 +124,8 @@ class Poisson(LawWithData):
 
 def _six(kappa: Data | None) -> Data | None:
     """Return the six entries of a symmetric tensor in place of its nine. Raises ValueError for any other number."""
+    if isinstance(kappa, np.ndarray):
+        kappa = kappa.ravel().tolist()
     if kappa is None or not isinstance(kappa, Sequence) or isinstance(kappa, str):
         return kappa
     entries = list(kappa)
