@@ -1,7 +1,7 @@
 """The ways to a map, one after the other: the trained network, a cube that grows, a layout extended into the solid."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -11,13 +11,13 @@ import torch
 from .arrays import Array, IntArray
 from .checkpoint import Checkpoints
 from .coarse import coarse_knots, optimize_coarse_first
-from .config import Config, SplineConfig
+from .config import Config, GrowthConfig, SplineConfig
 from .cube.cutting import subdivide_finely
 from .cube.edge_paths import PathError, choose_corners, lay_out
 from .cube.flips import Layout, flipped, untangle
 from .cube.sphere import lay_on_sphere
 from .extension import extended, extending
-from .growth import first_cube, growing, surface_on_cube
+from .growth import first_cube, growing, stiffened, surface_on_cube
 from .optimization.least_squares import fit_pairs
 from .optimization.rounds import Optimized, one_thread_an_operation
 from .optimization.sliding import SlidingParameters
@@ -65,11 +65,12 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A map, the surface data that belong to it, and where it comes from."""
+    """A map, the surface data that belong to it, where it comes from, and the options by which it may be refined."""
 
     found: Optimized
     fit: SurfaceFit
     origin: Origin
+    spline: SplineConfig
 
 
 def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
@@ -77,23 +78,33 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
 
     Where all have faults, return the best.
     """
-    starts = task.config.starts if task.given_corners is None else 1
+    config, grown = task.config, None
+    starts = config.starts if task.given_corners is None else 1
     best = _trained(task, checkpoints, give_up=starts > 1)
     for start in range(1, starts):
         if best is not None and not any(best.found.faults):
             break
-        grows = start % 2 == 1
-        way = "growing a map from a cube" if grows else "extending the surface's layout into the solid"
-        if best is None:
-            _log.info("the shape is hard for the network: %s instead", way)
+        kept = checkpoints.of_part(start)
+        if grown is None:
+            _tell(best, "growing a map from a cube")
+            other = grown = _grown(task, config.growth, 0, kept)
+        elif (start % 2 == 0) == grown.found.meets_itself:
+            _tell(best, "growing a stiffer map")
+            other = _grown(task, config.stiff_growth, start // 2, kept)  # begins with another turn of the cube
         else:
-            _log.warning("%s; %s instead", _fault(best.found), way)
-        turn = (start - 1) // 2  # a way that comes again begins with another turn of the cube
-        other = _grown_or_extended(task, turn, checkpoints.of_part(start), grows=grows)
+            _tell(best, "extending the surface's layout into the solid")
+            other = _extended(task, start // 2 - 1, kept)
         if best is None or other.found.rank < best.found.rank:
             best = other
     assert best is not None
     return best
+
+
+def _tell(best: Attempt | None, way: str) -> None:
+    if best is None:
+        _log.info("the shape is hard for the network: %s instead", way)
+    else:
+        _log.warning("%s; %s instead", _fault(best.found), way)
 
 
 def _trained(task: Task, checkpoints: Checkpoints, *, give_up: bool) -> Attempt | None:
@@ -123,18 +134,31 @@ def _trained(task: Task, checkpoints: Checkpoints, *, give_up: bool) -> Attempt 
     return _optimized(control, fit, spline, task, checkpoints, "network")
 
 
-def _grown_or_extended(task: Task, turn: int, checkpoints: Checkpoints, *, grows: bool) -> Attempt:
-    """Lay the surface on the cube; let F grow towards it, or fit F to the layout extended into the solid."""
-    config = task.config
-    spline = growing(config.spline, config.growth) if grows else extending(config.spline, config.extension)
+def _grown(task: Task, growth: GrowthConfig, turn: int, checkpoints: Checkpoints) -> Attempt:
+    """Lay the surface on the cube and let F grow towards it."""
+    spline = growing(task.config.spline, growth)
     with timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = surface_on_cube(task.sphere, task.own, config.spline, config.layout, seed=task.seed, turn=turn)
+        layout = _on_cube(task, turn)
         fit = _surface_fit(layout, spline, task)
-        if grows:
-            control = first_cube(layout, task.own, fit.places.knots, spline.degree)
-        else:
-            control = _first_spline(*extended(layout, config.extension), fit, spline)
-    return _optimized(control, fit, spline, task, checkpoints, "growth" if grows else "extension")
+        control = first_cube(layout, task.own, fit.places.knots, spline.degree)
+    attempt = _optimized(control, fit, spline, task, checkpoints, "growth")
+    return replace(attempt, spline=stiffened(task.config.spline, growth))
+
+
+def _extended(task: Task, turn: int, checkpoints: Checkpoints) -> Attempt:
+    """Lay the surface on the cube and fit F to that layout, extended into the solid."""
+    config = task.config
+    spline = extending(config.spline, config.extension)
+    with timed(task.seconds, "fit"), one_thread_an_operation():
+        layout = _on_cube(task, turn)
+        fit = _surface_fit(layout, spline, task)
+        control = _first_spline(*extended(layout, config.extension), fit, spline)
+    return _optimized(control, fit, spline, task, checkpoints, "extension")
+
+
+def _on_cube(task: Task, turn: int) -> Layout:
+    config = task.config
+    return surface_on_cube(task.sphere, task.own, config.spline, config.layout, seed=task.seed, turn=turn)
 
 
 def _optimized(
@@ -147,7 +171,7 @@ def _optimized(
 ) -> Attempt:
     with timed(task.seconds, "optimize"):
         found, fit = optimize_coarse_first(control, fit, spline, checkpoints=checkpoints, **task.report)
-    return Attempt(found, fit, origin)
+    return Attempt(found, fit, origin, task.config.spline)
 
 
 def _fault(found: Optimized) -> str:

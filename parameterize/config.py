@@ -82,6 +82,12 @@ class GrowthConfig:
     patient_rounds: int = 2  # in place of the spline stage's
     firm_rounds: int = 6  # likewise
     usual_steps: tuple[int, ...] = (40, 12, 8, 8, 8, 7, 6, 6, 6)  # of the rounds after these
+    stiffness: float = 1.0  # times the spline stage's `fairness`
+    least_floor: float = 1.0  # in place of the spline stage's
+
+
+# Where the first growth fails: far thinner parts keep their small det J, and what is squeezed does not buckle.
+STIFF = GrowthConfig(firm_rounds=12, stiffness=10.0, least_floor=0.05)
 
 
 @dataclass(frozen=True)
@@ -120,6 +126,7 @@ class SplineConfig:
     min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
     min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
     most_watched: int = 1000  # spans: where more are not proved, the Gauss points have to unfold most of them first
+    least_floor: float = 1.0  # share to which these two are lowered, at most, where det J is small all around
     min_facing: float = 0.1  # likewise (t_a x t_b) . n of the boundary's tangents and the mesh's normals
     facing_margin: float = 3.0  # times `min_facing`: points below may fall under it in the next step and are watched
     gap: float = 1e-3  # sheets of a boundary that meets itself are pushed so far apart
@@ -234,12 +241,14 @@ class Config:
         Fit and optimisation, `control_points` a direction and `degree` among them.
     layout : LayoutConfig
     growth : GrowthConfig
+    stiff_growth : GrowthConfig
+        Of the growths after the first.
     extension : ExtensionConfig
     refinement : RefinementConfig or None
         Where knots are inserted after the spline stage; None: the control points of `spline` are all there are.
     starts : int
-        The tries in all: where a shape is hard to train, or the trained map is not certified, others follow, which
-        are grown and extended by turns.
+        The tries in all: where a shape is hard to train, or the trained map is not certified, one is grown. Where that
+        is not certified or meets itself, a layout is extended and a stiffer map grown, by turns.
 
     Examples
     --------
@@ -255,6 +264,7 @@ class Config:
     spline: SplineConfig
     layout: LayoutConfig = LAYOUT
     growth: GrowthConfig = GrowthConfig()
+    stiff_growth: GrowthConfig = STIFF
     extension: ExtensionConfig = ExtensionConfig()
     starts: int = 4
     refinement: RefinementConfig | None = None
@@ -269,8 +279,8 @@ class Config:
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
         train = self.train if factor >= 1.0 or not self.train.easy_loss else replace(self.train, easy_loss=None)
-        growth = replace(self.growth, steps=max(1, round(factor * self.growth.steps)))
-        return replace(self, train=train, stages=stages, spline=spline, growth=growth)
+        growth, stiff = (replace(g, steps=max(1, round(factor * g.steps))) for g in (self.growth, self.stiff_growth))
+        return replace(self, train=train, stages=stages, spline=spline, growth=growth, stiff_growth=stiff)
 
     def refined(self, tolerance: float, max_control_points: int) -> Config:
         """Return the same options with knots inserted until a tolerance is met, see RefinementConfig.

@@ -27,7 +27,7 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
     """Return the options of a spline stage that begins with the rounds in which F grows."""
     rounds = len(growth.shares)
     return replace(
-        spline,
+        stiffened(spline, growth),
         growth=growth,
         penalties=(growth.penalty,),
         rounds=rounds + growth.rounds,
@@ -37,6 +37,11 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
         patient_rounds=growth.patient_rounds,
         firm_rounds=growth.firm_rounds,
     )
+
+
+def stiffened(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
+    """Return the options of a spline stage with what such a growth keeps to the end."""
+    return replace(spline, fairness=growth.stiffness * spline.fairness, least_floor=growth.least_floor)
 
 
 def surface_on_cube(

@@ -157,7 +157,7 @@ def parameterize(
     found, fit, told = attempt.found, attempt.fit, None
     if config.refinement is not None:
         with timed(seconds, "refine"):
-            options = config.spline, config.refinement
+            options = attempt.spline, config.refinement
             found, fit, told = refine(found, fit, task.own, *options, checkpoints=checkpoints, **report)
     with timed(seconds, "optimize"):
         volume, boundary = _in_users_units(found, fit, task)

@@ -28,13 +28,15 @@ _BLOCK = 32  # spans at a time: what they need fits into the cache
 
 @dataclass(frozen=True, eq=False)
 class _Spans:
-    """k spans: their first control points (k, 3), parametric volumes (k,), and shares (k,): what a square costs there.
+    """k spans: their first control points (k, 3), parametric volumes (k,), floors (k,), and shares (k,).
 
-    weights (k, 3, p + 1, p + 1): from control points to Bezier points, a direction; back: their transposes.
+    shares: what a square costs there. weights (k, 3, p + 1, p + 1): from control points to Bezier points, a direction;
+    back: their transposes.
     """
 
     first: IntArray
     volumes: Array
+    floors: Array
     shares: Array
     weights: Array
     back: Array
@@ -63,7 +65,8 @@ class SpanBarrier:
     """Mean over all spans of weight * (floor - coefficient)_+^2; coefficients of det J in Bernstein form.
 
     weights (n_u, n_v, n_w): of the spans, 0 to begin with; a span of positive weight is active.
-    knots: the same degree p in the three directions; floor in units of det J.
+    knots: the same degree p in the three directions; floor in units of det J. Where it is lowered by a share, the
+    weight grows by the inverse of its square.
     """
 
     def __init__(self, knots: Knots, degree: int, floor: float) -> None:
@@ -76,7 +79,8 @@ class SpanBarrier:
         ]
         self._unscale = np.einsum("i,j,k->ijk", *(1.0 / binomials(3 * degree - 1),) * 3)
         self._share = 1.0 / (self._unscale.size * np.prod([len(w) for w in self._widths]))
-        self.weigh(np.zeros([len(w) for w in self._widths]))
+        self._lowered = np.ones([len(w) for w in self._widths])
+        self.weigh(np.zeros_like(self._lowered))
 
     def activate(self, spans: IntArray) -> None:
         """Give spans (k, 3) at least the weight 1."""
@@ -92,6 +96,11 @@ class SpanBarrier:
         grown = np.minimum(factor * np.maximum(self.weights, 1.0), most)
         self.weigh(np.where(with_neighbours(spans, self.weights.shape), np.maximum(grown, self.weights), self.weights))
 
+    def lower_floors(self, shares: Array) -> None:
+        """Ask for these shares (n_u, n_v, n_w) of the floor alone."""
+        self._lowered = shares
+        self.weigh(self.weights)
+
     def weigh(self, weights: Array) -> None:
         """Take the weights of all spans (n_u, n_v, n_w)."""
         self.weights = weights
@@ -99,10 +108,11 @@ class SpanBarrier:
         first = np.stack([e[0][s] for e, s in zip(self._extractions, active.T, strict=True)], axis=1)
         bezier = np.stack([e[1][s] for e, s in zip(self._extractions, active.T, strict=True)], axis=1)
         volumes = np.prod([w[s] for w, s in zip(self._widths, active.T, strict=True)], axis=0)
-        shares = self._share * weights[tuple(active.T)]
+        lowered = self._lowered[tuple(active.T)]
+        floors, shares = self.floor * lowered, self._share * weights[tuple(active.T)] / lowered**2
         blocks = [slice(start, start + _BLOCK) for start in range(0, len(first), _BLOCK)]
         back = np.ascontiguousarray(np.swapaxes(bezier, 2, 3))
-        self._pieces = [_Spans(first[b], volumes[b], shares[b], bezier[b], back[b]) for b in blocks]
+        self._pieces = [_Spans(first[b], volumes[b], floors[b], shares[b], bezier[b], back[b]) for b in blocks]
 
     def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
@@ -144,7 +154,7 @@ class SpanBarrier:
         for component in range(3):
             add_products(nets[0][component], crosses[0][component], 1.0, determinant)
         unscaled = self._unscale[..., None] / spans.volumes
-        short = np.moveaxis(self.floor - determinant * unscaled, -1, 0)
+        short = np.moveaxis(spans.floors - determinant * unscaled, -1, 0)
         place = np.argwhere(short > 0.0)  # (r, 4): span and coefficient, span by span
         rows = np.zeros((len(place), *np.roll(bezier.shape, 1)[1:]), dtype=dtype)
         for direction, (cross, scale) in enumerate(zip(crosses, self._scales, strict=True)):

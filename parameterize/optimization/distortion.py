@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numba
 import numpy as np
 import torch
+from scipy.ndimage import uniform_filter
 from torch import Tensor
 
 from ..arrays import Array, Knots
@@ -21,13 +22,14 @@ class DistortionEnergy:
     """int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over the cube with a = |J - R|^2, R the closest rotation.
 
     a is the ARAP energy of F; the second part keeps its maximum down; the third, like the paper's bijectivity term,
-    holds against folds. Gauss quadrature.
+    holds against folds. Gauss quadrature. Where alpha is lowered by a share, w grows by the inverse of its square.
     """
 
     def __init__(self, knots: Knots, config: SplineConfig) -> None:
         self._grid = GaussGrid(knots, (config.degree,) * 3, config.gauss, inner=config.inner_gauss)
         self._config = config
         self._limit = config.arap_limit
+        self._shares = np.ones_like(self._grid.weights)  # of config.min_det, which det J shall have at the points
 
     def set_limit(self, control: Tensor) -> None:
         """Put the limit l above which distortion costs more in proportion to 1 + the mean distortion at `control`."""
@@ -38,6 +40,25 @@ class DistortionEnergy:
 
         self._limit = self._config.arap_limit * (1.0 + sum(in_parallel(part, self._grid.planes())))
 
+    def lower_floors(self, control: Tensor) -> Array:
+        """Ask for less where det J is small all around at `control`; return the shares (n_u, n_v, n_w) of the spans.
+
+        In a stalk that is far thinner than the rest all of det J is small. A penalty that asks for the usual one would
+        blow the stalk up, against the surface's data. So half the mean around is enough, a ninth of the cube wide.
+        """
+
+        def part(planes: slice) -> Array:
+            return np.asarray(cofactor_and_determinant(self._grid.jacobian(control, planes))[1].numpy())
+
+        weights = self._grid.weights
+        det = np.concatenate(in_parallel(part, self._grid.planes())).reshape(weights.shape)
+        mass, volume = (self._grid.sum_on_spans(values) for values in (det * weights, weights))
+        around = [2 * (count // 18) + 1 for count in mass.shape]
+        mean = uniform_filter(mass, around, mode="nearest") / uniform_filter(volume, around, mode="nearest")
+        shares = np.clip(0.5 * mean / self._config.min_det, self._config.least_floor, 1.0)
+        self._shares = self._grid.at_points(shares)
+        return np.asarray(shares)
+
     def energy_and_gradient(self, control: Tensor, penalty: float) -> tuple[float, Tensor, int]:
         """Energy, gradient (3, n_u, n_v, n_w), and the number of quadrature points with det J <= 0."""
         config = self._config
@@ -45,12 +66,14 @@ class DistortionEnergy:
         def part(planes: slice) -> tuple[float, int, tuple[int, Array]]:
             jacobian, weights = self._grid.jacobian(control, planes), self._weights(planes)
             cofactors, det = cofactor_and_determinant(jacobian)
-            shortfall = weights * (config.min_det - det).clamp_min(0.0)
+            share = self._shares_on(planes)
+            short = (share * config.min_det - det).clamp_min(0.0)
+            shortfall = weights / share.square() * short
             gap = jacobian - closest_rotation(jacobian)
             density = gap.square().sum(dim=(0, 1))
             excess = (density - self._limit).clamp_min(0.0)
             energy = weights @ (density + config.stiffening * excess.square())
-            energy += penalty * (shortfall @ (config.min_det - det))
+            energy += penalty * (shortfall @ short)
             dual = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess) * gap
             dual -= 2.0 * penalty * shortfall * cofactors
             return float(energy), int((det <= 0.0).sum()), self._grid.adjoint(dual, planes)
@@ -73,7 +96,8 @@ class DistortionEnergy:
             jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).float()
             rotation = closest_rotation(jacobian)
             cofactors, det = cofactor_and_determinant(jacobian)
-            push = (2.0 * penalty * weights * (det < config.min_det)).sqrt() * cofactors
+            share = self._shares_on(planes).float()
+            push = (2.0 * penalty * weights * (det < share * config.min_det)).sqrt() / share * cofactors
             gap = jacobian - rotation
             excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
             pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
@@ -88,6 +112,9 @@ class DistortionEnergy:
 
     def _weights(self, planes: slice) -> Tensor:
         return torch.from_numpy(self._grid.weights[planes].ravel())
+
+    def _shares_on(self, planes: slice) -> Tensor:
+        return torch.from_numpy(self._shares[planes].ravel())
 
 
 def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:

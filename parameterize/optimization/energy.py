@@ -50,12 +50,14 @@ class SplineEnergy:
         return FastDiagonalization(rough, mass).to(_ROUGH)
 
     def start_round(self, control: Tensor, penalty: float, share: float | None = None) -> None:
-        """Take a penalty weight, and the limit of the distortion that suits the control points.
+        """Take a penalty weight, and the limit of the distortion and the floors of det J that suit the control points.
 
         share: while F grows into the solid, that of the weight of the surface's data.
         """
         self.penalty = penalty
         self._distortion.set_limit(control)
+        if self.config.least_floor < 1.0:
+            self.barrier.lower_floors(self._distortion.lower_floors(control))
         if share is None and self._grows is None:
             return
         self._grows = None if share is None else self.config.growth

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from ..arrays import Array, IntArray
-from ..spline.bspline import collocation, gauss_points
+from ..spline.bspline import breakpoints, collocation, gauss_points
 from .operators import PiecewiseOperator
 
 _END_SPANS = 1
@@ -53,6 +53,7 @@ class GaussGrid:
             *(_graded_points(k, n_gauss, n_gauss if inner is None else inner) for k in knots), strict=True
         )
         self.weights = u[:, None] * (w[:, None] * v).ravel()
+        self._spans = [np.searchsorted(breakpoints(k), x) - 1 for k, x in zip(knots, points, strict=True)]
         tables = [
             [np.asarray(collocation(k, p, x, d).toarray()) for d in range(2)]
             for k, p, x in zip(knots, degrees, points, strict=True)
@@ -66,6 +67,19 @@ class GaussGrid:
     def planes(self) -> list[slice]:
         """Return the planes of each piece of work."""
         return [slice(begin, begin + _PLANES) for begin in range(0, len(self.weights), _PLANES)]
+
+    def sum_on_spans(self, values: Array) -> Array:
+        """Add the values at the points of each span: (planes, points) -> (n_u, n_v, n_w)."""
+        u, v, w = self._spans
+        found = np.swapaxes(values.reshape(len(u), len(w), len(v)), 1, 2)
+        for axis, spans in enumerate((u, v, w)):
+            found = np.add.reduceat(found, np.flatnonzero(np.diff(spans, prepend=-1)), axis=axis)
+        return found
+
+    def at_points(self, values: Array) -> Array:
+        """Give each point the value of its span: (n_u, n_v, n_w) -> (planes, points)."""
+        u, v, w = self._spans
+        return np.ascontiguousarray(np.swapaxes(values[np.ix_(u, v, w)], 1, 2)).reshape(self.weights.shape)
 
     def jacobian(self, control: Tensor, planes: slice) -> Tensor:
         """Return J (component, direction, point) on some planes: (3, n_u, n_v, n_w) -> (3, 3, m)."""
