@@ -34,6 +34,19 @@ def test_energy_is_the_shortfall_of_the_certificates_coefficients(degree):
     assert energy == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_shortfall_counts_in_shares_of_a_lowered_floor():
+    knots, control, volume = setting(3, 0.1)
+    barrier, spans = SpanBarrier(knots, 3, 0.8), all_spans(volume)
+    shares = np.random.default_rng(1).uniform(0.2, 1.0, barrier.weights.shape)
+    barrier.lower_floors(shares)
+    barrier.activate(spans)
+    floors = shares[tuple(spans.T)][:, None, None, None]
+    short = np.maximum(0.8 * floors - bernstein_coefficients(volume, spans), 0.0) / floors
+    expected = (short**2).mean()
+    assert expected > 1e-4
+    assert barrier.energy_and_gradient(control)[0] == pytest.approx(expected, rel=1e-9)
+
+
 def test_gradient_against_finite_differences():
     knots, control, volume = setting(3, 0.08)
     barrier = SpanBarrier(knots, 3, 0.8)

@@ -10,6 +10,7 @@ from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
 from parameterize.cube.cube import project_radially
+from parameterize.optimization.determinant_penalty import SpanBarrier
 from parameterize.optimization.distortion import DistortionEnergy
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.rounds import Optimized, optimize
@@ -71,6 +72,49 @@ def test_folded_points_are_counted():
     control[0] *= -1.0
     _, _, folded = DistortionEnergy(KNOTS, CONFIG).energy_and_gradient(control, penalty=1.0)
     assert folded == (2 * CONFIG.gauss + 2 * CONFIG.inner_gauss) ** 3  # four spans a direction
+
+
+def dumbbell():
+    """Control points of a map on 20 spans a direction, 5 times thinner where w is near 1/2, and its knots."""
+    knots = (open_uniform_knots(23, 3),) * 3
+    points = np.stack(np.meshgrid(*(greville(row, 3) for row in knots), indexing="ij"))
+    points[:2] *= np.where(np.abs(points[2] - 0.5) < 0.3, 0.2, 1.0)
+    return torch.as_tensor(points), knots
+
+
+def test_less_det_is_asked_for_where_a_part_is_far_thinner():
+    control, knots = dumbbell()
+    config = replace(CONFIG, least_floor=0.05, gauss=1, inner_gauss=1)
+    distortion = DistortionEnergy(knots, config)
+    before = [distortion.energy_and_gradient(control, penalty)[0] for penalty in (0.0, 1.0)]
+    shares = distortion.lower_floors(control)
+    assert shares[..., [0, -1]] == pytest.approx(1.0)
+    assert shares[..., 8:12] == pytest.approx(0.5 * 0.2**2 / config.min_det)
+    volume = BSplineVolume((3,) * 3, knots, control.permute(1, 2, 3, 0).numpy())
+    det = np.linalg.det(volume.grid_jacobian(*[0.025 + 0.05 * np.arange(20)] * 3))
+    after = [distortion.energy_and_gradient(control, penalty)[0] for penalty in (0.0, 1.0)]
+    assert before[0] == after[0]
+    for share, (plain, penalised) in ((1.0, before), (shares, after)):
+        short = np.maximum(share * config.min_det - det, 0.0) / share
+        assert penalised - plain == pytest.approx(float((short**2).mean()), rel=1e-9)
+    assert after[1] - after[0] < 0.3 * (before[1] - before[0])
+
+
+def test_floors_that_are_lowered_keep_the_gradient_true():
+    control, knots = dumbbell()
+    control = 0.7 * control + 0.01 * torch.randn(control.shape, generator=torch.Generator().manual_seed(0)).double()
+    distortion = DistortionEnergy(knots, replace(CONFIG, least_floor=0.05))
+    barrier = SpanBarrier(knots, 3, 0.1)
+    barrier.activate(np.argwhere(np.ones((20, 20, 20))))
+    barrier.lower_floors(distortion.lower_floors(control))
+    direction = torch.randn(control.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+
+    def energies(c):
+        return np.array([distortion.energy_and_gradient(c, 1e3)[0], barrier.energy_and_gradient(c)[0]])
+
+    found = (energies(control + 1e-7 * direction) - energies(control - 1e-7 * direction)) / 2e-7
+    gradients = distortion.energy_and_gradient(control, 1e3)[1], barrier.energy_and_gradient(control)[1]
+    assert [float((g * direction).sum()) for g in gradients] == pytest.approx(found.tolist(), rel=1e-4)
 
 
 @pytest.mark.parametrize("amplitude", [0.02, 0.12])

@@ -64,6 +64,14 @@ def test_jacobian_agrees_with_the_volume():
     assert grid.weights.sum() == pytest.approx(1.0)
 
 
+def test_values_of_points_and_spans():
+    grid = GaussGrid(KNOTS, DEGREES, 3, inner=1)
+    volumes = grid.sum_on_spans(grid.weights)
+    assert np.allclose(volumes, np.einsum("i,j,k->ijk", *(np.diff(np.unique(k)) for k in KNOTS)), atol=1e-15)
+    numbers = np.arange(volumes.size, dtype=np.float64).reshape(volumes.shape)
+    assert np.allclose(grid.sum_on_spans(grid.at_points(numbers) * grid.weights), numbers * volumes, atol=1e-12)
+
+
 def test_adjoint_identity():
     grid = GaussGrid(KNOTS, DEGREES, 2)
     x = random_field(2)

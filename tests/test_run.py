@@ -352,6 +352,43 @@ def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monk
     assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
 
 
+@pytest.mark.parametrize("meets", [True, False])
+def test_after_a_growth_that_meets_itself_the_stiffer_one_comes_first(surface, monkeypatch, meets):
+    optimize, seen = attempts.optimize_coarse_first, []
+
+    def spoiled(control, fit, config, **options):
+        found, fit = optimize(control, fit, config, **options)
+        seen.append((config.growth, config.fairness, config.least_floor))
+        unproved = np.zeros((0 if meets else 1, 3), dtype=np.int64)
+        verdict = "certified" if meets else "undecided"
+        proved = replace(found.certificate, verdict=verdict, unproved=unproved)
+        return replace(found, certificate=proved, injective=not meets), fit
+
+    monkeypatch.setattr(attempts, "optimize_coarse_first", spoiled)
+    config = replace(tiny_config(), starts=4)
+    parameterize(surface, config, seed=3, device="cpu")
+    usual, growth = (config.spline.fairness, 1.0), config.growth
+    stiff = (config.stiff_growth, pytest.approx(10.0 * usual[0]), 0.05)
+    later = [stiff, (None, *usual)] if meets else [(None, *usual), stiff]
+    assert seen == [(None, *usual), (growth, *usual), *later]
+
+
+def test_a_map_grown_stiff_is_refined_stiff(surface, monkeypatch):
+    told = []
+
+    def refine(found, fit, own, spline, *args, **options):
+        told.append((spline.fairness, spline.least_floor, spline.growth))
+        return found, fit, None
+
+    monkeypatch.setattr("parameterize.run.refine", refine)
+    config = replace(tiny_config(), starts=2).refined(1e-3, 20)
+    config = replace(config, train=replace(config.train, easy_loss=0.0))
+    for growth in (config.growth, config.stiff_growth):
+        parameterize(surface, replace(config, growth=growth), seed=3, device="cpu")
+    usual = config.spline.fairness
+    assert told == [(usual, 1.0, None), (pytest.approx(10.0 * usual), 0.05, None)]
+
+
 def test_the_start_map_makes_a_cloud_round():
     cloud = np.random.default_rng(0).normal(size=(500, 3)) * [4.0, 1.0, 0.5]
     matrix = start_map(cloud)
