@@ -72,6 +72,11 @@ class Attempt:
     origin: Origin
     spline: SplineConfig
 
+    @property
+    def distance(self) -> float:
+        """The root mean square distance of the map from the surface, at volume 1."""
+        return float(np.sqrt(np.square(self.fit.residuals(self.found.control)).sum(axis=1).mean()))
+
 
 def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
     """Train a map; where that is hard or not certified, grow and extend others. Return the first without faults.
@@ -88,7 +93,7 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
         if grown is None:
             _tell(best, "growing a map from a cube")
             other = grown = _grown(task, config.growth, 0, kept)
-        elif (start % 2 == 0) == grown.found.meets_itself:
+        elif (start % 2 == 0) == (grown.found.meets_itself or grown.distance > config.growth.far):
             _tell(best, "growing a stiffer map")
             other = _grown(task, config.stiff_growth, start // 2, kept)  # begins with another turn of the cube
         else:

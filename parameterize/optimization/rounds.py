@@ -88,7 +88,7 @@ def optimize(
     `firm_rounds` the surface data near them loses weight. Where few of them stay for `smoothing_rounds`, F is smoothed
     there. Unless F still grows, the rounds end without a certified map where `stalling` of them have not halved the
     number of unproved spans, and after `firm_rounds` where more than `most_watched` spans are unproved or F is farther
-    than `far` from the surface, root mean square.
+    than `far` from the surface, root mean square: that of growth after the first round in which F no longer grows.
 
     Where the boundary of a certified map meets itself, up to `parting` rounds push it apart, and the surface data there
     lose weight; where it still does then, the rounds end. Once the map is certified, a few more rounds take back what
@@ -239,7 +239,9 @@ class _Rounds:
             return self.best.meets_itself and self.parting == config.parting
         if self.number > self.halved + config.stalling:
             return True
-        return self.number >= config.firm_rounds and (many or distance > config.far**2)
+        grown = config.growth is not None and self.number == len(self.shares) + 1
+        far = config.growth.far if config.growth and grown else config.far
+        return self.number >= config.firm_rounds and (many or distance > far**2)
 
     def _distance(self, control: Tensor) -> float:
         """Return the mean squared distance of a map from the surface at the parameters as they are."""
