@@ -76,14 +76,15 @@ def sheet_folded_once(count=900):
 
 
 def test_where_growth_fails_the_layout_is_extended(caplog, few_distances):
-    """The growth gets no round that counts, so its map has faults; that of the third try is the result."""
-    config = tiny_config()
+    """The growths get no round that counts, so their maps have faults; that of the extension is the result."""
+    config, spoiled = tiny_config(), replace(preset("fast").growth, shares=(1.0,), steps=1, rounds=0)
     config = replace(
         config,
-        starts=3,
+        starts=4,
         train=replace(config.train, easy_loss=0.0),
         spline=replace(preset("fast").spline, control_points=8),
-        growth=replace(preset("fast").growth, shares=(1.0,), steps=1, rounds=0),
+        growth=spoiled,
+        stiff_growth=spoiled,
         extension=replace(preset("fast").extension, cell=0.07),
     )
     with caplog.at_level("INFO"):
