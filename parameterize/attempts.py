@@ -83,17 +83,18 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
 
     Where all have faults, return the best.
     """
-    config, grown = task.config, None
+    config, stiffer_first = task.config, False
     starts = config.starts if task.given_corners is None else 1
     best = _trained(task, checkpoints, give_up=starts > 1)
     for start in range(1, starts):
         if best is not None and not any(best.found.faults):
             break
         kept = checkpoints.of_part(start)
-        if grown is None:
+        if start == 1:
             _tell(best, "growing a map from a cube")
-            other = grown = _grown(task, config.growth, 0, kept)
-        elif (start % 2 == 0) == (grown.found.meets_itself or grown.distance > config.growth.far):
+            other = _grown(task, config.growth, 0, kept)
+            stiffer_first = other.found.meets_itself or other.distance > config.growth.far
+        elif stiffer_first == (start % 2 == 0):  # the two later ways take turns
             _tell(best, "growing a stiffer map")
             other = _grown(task, config.stiff_growth, start // 2, kept)  # begins with another turn of the cube
         else:
