@@ -72,11 +72,6 @@ class Attempt:
     origin: Origin
     spline: SplineConfig
 
-    @property
-    def distance(self) -> float:
-        """The root mean square distance of the map from the surface, at volume 1."""
-        return float(np.sqrt(np.square(self.fit.residuals(self.found.control)).sum(axis=1).mean()))
-
 
 def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
     """Train a map; where that is hard or not certified, grow and extend others. Return the first without faults.
@@ -93,7 +88,8 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
         if start == 1:
             _tell(best, "growing a map from a cube")
             other = _grown(task, config.growth, 0, kept)
-            stiffer_first = other.found.meets_itself or other.distance > config.growth.far
+            is_far = other.fit.mean_square(other.found.control) > config.growth.far**2
+            stiffer_first = other.found.meets_itself or is_far
         elif stiffer_first == (start % 2 == 0):  # the two later ways take turns
             _tell(best, "growing a stiffer map")
             other = _grown(task, config.stiff_growth, start // 2, kept)  # begins with another turn of the cube

@@ -203,7 +203,7 @@ class _Rounds:
     def conclude(self, control: Tensor) -> None:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
         config = self.energy.config
-        found, distance = Optimized.of(control, self.knots, config), self._distance(control)
+        found, distance = Optimized.of(control, self.knots, config), self.energy.surface.mean_square(control)
         if self.polished:
             found = self._mended(found)
         elif not self.certified:
@@ -215,7 +215,7 @@ class _Rounds:
         if self.number == 0 or self.growing or found.rank <= self.best.rank:
             places = self.energy.surface.places
             self.best, self.best_places = found, (places.parameters, places.cube_faces)
-            self.off = self._distance(found.control)
+            self.off = self.energy.surface.mean_square(found.control)
         many = len(unproved) > config.most_watched
         if not many:
             self.energy.barrier.activate(unproved)
@@ -231,21 +231,17 @@ class _Rounds:
     def _hopeless(self, many: bool, distance: float) -> bool:
         """Return whether further rounds would not part a boundary that meets itself, or not unfold F at the surface.
 
-        many: whether more than `most_watched` spans are unproved. distance: of what the steps have led to, as
-        `_distance` says; where F is smoothed after them, it is farther for a while.
+        many: whether more than `most_watched` spans are unproved. distance: mean squared, of what the steps have led
+        to; where F is smoothed after them, it is farther for a while.
         """
         config = self.energy.config
         if self.certified:
             return self.best.meets_itself and self.parting == config.parting
         if self.number > self.halved + config.stalling:
             return True
-        grown = config.growth is not None and self.number == len(self.shares) + 1
-        far = config.growth.far if config.growth and grown else config.far
+        just_grown = self.number == len(self.shares) + 1
+        far = config.growth.far if config.growth and just_grown else config.far
         return self.number >= config.firm_rounds and (many or distance > far**2)
-
-    def _distance(self, control: Tensor) -> float:
-        """Return the mean squared distance of a map from the surface at the parameters as they are."""
-        return float(np.square(self.energy.surface.residuals(control)).sum(axis=1).mean())
 
     def _smoothed(self, found: Optimized) -> Optimized:
         """Smooth the map near spans that the last rounds have not unfolded; return it where fewer are unproved then."""
@@ -273,7 +269,7 @@ class _Rounds:
         places = self.energy.surface.places
         before = places.parameters, places.cube_faces
         self.energy.slide(mended.control)
-        if self._distance(mended.control) >= self.off:
+        if self.energy.surface.mean_square(mended.control) >= self.off:
             places.place(*before)
             return found
         self.energy.barrier.activate(found.certificate.unproved)

@@ -77,3 +77,7 @@ class SurfaceFit:
     def residuals(self, control: Tensor) -> Array:
         """Return F(p) - v: (N, 3)."""
         return self.places.values(control) - self.points
+
+    def mean_square(self, control: Tensor) -> float:
+        """Return the mean of |F(p) - v|^2 at the present parameters."""
+        return float(np.square(self.residuals(control)).sum(axis=1).mean())
