@@ -128,6 +128,9 @@ def test_values_that_are_not_finite_are_refused_with_their_range_and_the_way_out
     with np.errstate(all="ignore"), pytest.raises(ExpressionError, match="not finite") as refused:
         solve_problem(UNIT, Poisson(source=lambda x, y, z: np.log(x - 1e6)))
     assert "try" not in str(refused.value)
+    with pytest.raises(ExpressionError, match="not finite at x=0, y=0, z=0") as refused:
+        solve_problem(UNIT, Poisson(exact="log(x)"))  # the size of the domain is not at fault
+    assert "try" not in str(refused.value)
 
 
 VOLUME = benchmark_volume(4)

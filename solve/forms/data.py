@@ -130,7 +130,7 @@ def in_scaled(entry: Entry | None, x: Array) -> str:
     if not isinstance(entry, Expression) or entry.scaled_text is None:
         return ""
     size, away = max(float(np.ptp(c)) for c in x), float(np.abs(x).max())
-    if away < USUAL_SIZE and size > 1.0 / USUAL_SIZE:
+    if away < USUAL_SIZE and (size == 0.0 or size > 1.0 / USUAL_SIZE):  # one point has no size
         return ""
     return f"; X, Y, Z are x, y, z scaled to volume 1 about the middle of the domain: try {entry.scaled_text!r}"
 
