@@ -78,7 +78,7 @@ class GrowthConfig:
     slides: int = 1  # likewise
     penalty: float = 2500.0  # on det J, in these rounds and all later ones
     reach: float = 0.03  # surface points farther from F than this do not slide, and draw F in all directions
-    far: float = 0.005  # in place of the spline stage's, after the first round that follows
+    far: float = 0.005  # in place of the spline stage's, after the first round that follows; where it is more, always
     rounds: int = 20  # of the spline stage, after these, at most
     patient_rounds: int = 2  # in place of the spline stage's
     firm_rounds: int = 6  # likewise
@@ -88,7 +88,7 @@ class GrowthConfig:
 
 
 # Where the first growth fails: far thinner parts keep their small det J, and what is squeezed does not buckle.
-STIFF = GrowthConfig(far=0.01, firm_rounds=12, stiffness=10.0, least_floor=0.05)
+STIFF = GrowthConfig(far=0.05, firm_rounds=12, stiffness=10.0, least_floor=0.05)
 
 
 @dataclass(frozen=True)
@@ -211,6 +211,7 @@ class LayoutConfig:
     settle_margin: float = 1e-2  # share that a cut keeps from the ends of its edge
     undo_rounds: int = 10  # in which such steps are undone at flipped triangles, at most
     least_share: float = 0.25  # that the line which halves a surface keeps from the ends of the edges it divides
+    along: float = 10.0  # weight of edges that lead away from that line, in addition, in one of two first layouts
     sphere_steps: int = 300  # of Newton's method for the layout on the sphere, at most
     sphere_damping: float = 1e-8  # of these, as a share of the mean diagonal entry
     sphere_gain: float = 1e-3  # the steps end once one lowers the energy by less than this share

@@ -2,8 +2,10 @@
 
 The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
 sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
-one-to-one but badly squeezed. From there Newton's method lowers the symmetric Dirichlet energy (Smith, Schaefer, ACM
-Trans. Graphics 34, 2015), which is infinite where a triangle has no area left: no step turns a triangle over.
+one-to-one but badly squeezed: a long arm shrinks exponentially with its length, less so where the mesh edges along it
+weigh more, but that squeezes others. From the better of both, Newton's method lowers the symmetric Dirichlet energy
+(Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has no area left: no step turns a
+triangle over.
 """
 
 import math
@@ -11,6 +13,7 @@ import math
 import igl
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array
+from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import eigsh, splu
 
 from ..arrays import Array, IntArray, Mask
@@ -30,13 +33,9 @@ def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> Lay
     Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh.
     """
     vertices, faces, upper = _halves(vertices, faces, layout.least_share)
-    directions = _hemispheres(vertices, faces, upper)
-    return Layout(vertices, faces, _relaxed(directions, vertices, faces, layout))
-
-
-def turned_over(directions: Array, faces: IntArray) -> Mask:
-    """Return which triangles (m, 3) of a layout (n, 3) do not face outwards, seen from the sphere's centre: (m,)."""
-    return np.asarray(_volumes(directions[faces]) <= 0.0)
+    triangles = _Triangles(vertices, faces)
+    tries = [_hemispheres(vertices, faces, upper, along) for along in (0.0, layout.along)]
+    return Layout(vertices, faces, _relaxed(min(tries, key=triangles.energy), triangles, layout))
 
 
 def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntArray, Mask]:
@@ -45,8 +44,7 @@ def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntA
     Only how the mesh hangs together counts: new vertices keep the share `least` of an edge from its ends.
     """
     edges, _ = edge_table(faces)
-    length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
-    links = _links(edges, 1.0 / np.maximum(length, _THIN * length.mean()), len(vertices))
+    links = _links(edges, 1.0 / _lengths(vertices, edges), len(vertices))
     begin = np.cos(np.arange(len(vertices)))  # else the library begins with random numbers
     _, modes = eigsh(_laplacian(links), k=2, sigma=_SHIFT, v0=begin)
     height = np.where(modes[:, 1] == 0.0, np.finfo(np.float64).tiny, modes[:, 1])
@@ -58,10 +56,11 @@ def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntA
     return points, faces, np.concatenate([height, np.zeros(len(cut))])[faces].sum(axis=1) > 0.0
 
 
-def _hemispheres(vertices: Array, faces: IntArray, upper: Mask) -> Array:
+def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, along: float) -> Array:
     """Return directions (n, 3) of points (n, 3) whose triangles above and below go to the two hemispheres.
 
-    The common rim goes to the equator by its length. Every other point is the mean of its neighbours in the disc.
+    The common rim goes to the equator by its length. Every other point is a mean of its neighbours in the disc, in
+    which one that lies straight towards the rim, or away from it, counts 1 + `along` times.
     """
     rim = np.asarray(igl.boundary_loop(faces[upper]), dtype=np.int64)
     length = np.linalg.norm(vertices[np.roll(rim, -1)] - vertices[rim], axis=1)
@@ -73,12 +72,20 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask) -> Array:
         used = np.unique(faces[half])
         inner = np.setdiff1d(used, rim)
         edges, _ = edge_table(faces[half])
-        links = _links(edges, np.ones(len(edges)), len(vertices))
+        length = _lengths(vertices, edges)
+        away = dijkstra(_links(edges, length, len(vertices)), indices=rim, min_only=True)[edges]
+        links = _links(edges, 1.0 + along * ((away[:, 1] - away[:, 0]) / length) ** 2, len(vertices))
         matrix = csc_array(_laplacian(links)[inner][:, inner])
         flat[inner] = _solved(matrix, links[inner][:, rim] @ flat[rim])
         square = (flat[used] ** 2).sum(axis=1, keepdims=True)  # stereographic
         directions[used] = np.hstack([2.0 * flat[used], side * (1.0 - square)]) / (1.0 + square)
     return directions
+
+
+def _lengths(vertices: Array, edges: IntArray) -> Array:
+    """Return the lengths (e,) of edges (e, 2), none of them too short to divide by."""
+    length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
+    return np.asarray(np.maximum(length, _THIN * length.mean()))
 
 
 def _links(edges: IntArray, weights: Array, count: int) -> csr_array:
@@ -119,17 +126,25 @@ class _Triangles:
         self._stiffness = sides @ np.swapaxes(sides, 1, 2) / (4.0 * self._area[:, None, None])
 
     def energies(self, directions: Array) -> Array:
-        """Return the energy of each triangle (m,)."""
+        """Return the energy of each triangle (m,); infinity where it is turned over, seen from the sphere's centre."""
         corners = directions[self.faces]
-        ratio = self._area / (0.5 * _volumes(corners))
-        return np.einsum("mij,mic,mjc->m", self._stiffness, corners, corners) * (1.0 + ratio**2)
+        area = 0.5 * _volumes(corners)
+        sides = corners - corners[:, :1]  # tiny triangles would be lost in the rounding of their corners
+        dirichlet = np.einsum("mij,mic,mjc->m", self._stiffness, sides, sides)
+        squeezed = np.divide(self._area, area, out=np.full(len(area), np.inf), where=area > 0.0)
+        return np.asarray(dirichlet * (1.0 + squeezed**2))
+
+    def energy(self, directions: Array) -> float:
+        """Return the energy of all triangles."""
+        return float(self.energies(directions).sum())
 
     def derivatives(self, directions: Array, tangents: Array) -> tuple[Array, Array]:
         """Return gradient (m, 6) and second derivative (m, 6, 6), made positive, in steps along tangents (n, 3, 2)."""
         corners, count = directions[self.faces], len(self.faces)
         area = 0.5 * _volumes(corners)[:, None, None]
-        towards = 2.0 * self._stiffness @ corners  # of the Dirichlet energy (m, 3, 3)
-        dirichlet = 0.5 * (towards * corners).sum(axis=(1, 2))[:, None, None]
+        sides = corners - corners[:, :1]
+        towards = 2.0 * self._stiffness @ sides  # of the Dirichlet energy (m, 3, 3)
+        dirichlet = 0.5 * (towards * sides).sum(axis=(1, 2))[:, None, None]
         wider = 0.5 * np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])  # of the area (m, 3, 3)
         square = self._area[:, None, None] ** 2
         factor, slope, bend = 1.0 + square / area**2, -2.0 * square / area**3, 6.0 * square / area**4
@@ -161,16 +176,15 @@ def _area_bends(corners: Array) -> Array:
     return bends
 
 
-def _relaxed(directions: Array, vertices: Array, faces: IntArray, layout: LayoutConfig) -> Array:
+def _relaxed(directions: Array, triangles: _Triangles, layout: LayoutConfig) -> Array:
     """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls.
 
     Where the hemispheres squeeze triangles to less than the numbers can tell, the directions are returned as they are.
     """
-    triangles = _Triangles(vertices, faces)
-    energy = float(triangles.energies(directions).sum()) if not turned_over(directions, faces).any() else np.inf
-    unknowns = (2 * faces[:, :, None] + np.arange(2)).reshape(-1, 6)
+    energy = triangles.energy(directions)
+    unknowns = (2 * triangles.faces[:, :, None] + np.arange(2)).reshape(-1, 6)
     rows, columns = np.repeat(unknowns, 6, axis=1).ravel(), np.tile(unknowns, (1, 6)).ravel()
-    size = 2 * len(vertices)
+    size = 2 * len(directions)
     for _ in range(layout.sphere_steps if math.isfinite(energy) else 0):
         tangents = _tangents(directions)
         slopes, hessians = triangles.derivatives(directions, tangents)
@@ -182,10 +196,9 @@ def _relaxed(directions: Array, vertices: Array, faces: IntArray, layout: Layout
         while length > _SHORTEST_STEP:
             trial = directions + length * move
             trial /= np.linalg.norm(trial, axis=1, keepdims=True)
-            if not turned_over(trial, faces).any():
-                lower = float(triangles.energies(trial).sum())
-                if lower <= energy + 1e-4 * length * float(slope @ step):
-                    break
+            lower = triangles.energy(trial)
+            if lower <= energy + 1e-4 * length * float(slope @ step):
+                break
             length *= 0.5
         else:
             break
