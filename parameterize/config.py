@@ -211,7 +211,8 @@ class LayoutConfig:
     settle_margin: float = 1e-2  # share that a cut keeps from the ends of its edge
     undo_rounds: int = 10  # in which such steps are undone at flipped triangles, at most
     least_share: float = 0.25  # that the line which halves a surface keeps from the ends of the edges it divides
-    along: float = 10.0  # weight of edges that lead away from that line, in addition, in one of two first layouts
+    squeezed: float = 1e8  # energy of the first layout on the sphere (at rest some 50) above which another is tried
+    along: float = 10.0  # weight of edges that lead away from that line, in addition, in the other one
     sphere_steps: int = 300  # of Newton's method for the layout on the sphere, at most
     sphere_damping: float = 1e-8  # of these, as a share of the mean diagonal entry
     sphere_gain: float = 1e-3  # the steps end once one lowers the energy by less than this share

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import RLock
 
 from parameterize.files import save_text
 
@@ -155,16 +156,19 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
         raise InputError(f"a batch needs {package}, which is not installed: {INSTALL}") from None
     waiting = [number for number, row in enumerate(batch.rows) if row.state == "waiting"]
     running: dict[int, Running] = {}
+    one_at_a_time = RLock()  # surfaces end in this thread, and dask tells of their progress in another
 
     def show() -> None:
-        present = [known for number, known in sorted(running.items()) if batch.rows[number].state == "waiting"]
-        progress(batch, present)
+        with one_at_a_time:
+            present = [known for number, known in sorted(running.items()) if batch.rows[number].state == "waiting"]
+            progress(batch, present)
 
     def tell(at: int, stage: str, share: float) -> None:
         number = waiting[at]
-        before = running[number].share if number in running else 0.0  # a surface may start anew with another cube
-        running[number] = Running(batch.rows[number].entry.name, stage, max(share, before))
-        show()
+        with one_at_a_time:
+            before = running[number].share if number in running else 0.0  # a surface may start anew with another cube
+            running[number] = Running(batch.rows[number].entry.name, stage, max(share, before))
+            show()
 
     try:
         if workers.scheduler is None:

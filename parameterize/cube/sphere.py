@@ -2,10 +2,9 @@
 
 The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
 sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
-one-to-one but badly squeezed: a long arm shrinks exponentially with its length, less so where the mesh edges along it
-weigh more, but that squeezes others. From the better of both, Newton's method lowers the symmetric Dirichlet energy
-(Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has no area left: no step turns a
-triangle over.
+one-to-one but badly squeezed: a long arm shrinks exponentially with its length. Where it does, the mesh edges along it
+get more weight. From there Newton's method lowers the symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics
+34, 2015), which is infinite where a triangle has no area left: no step turns a triangle over.
 """
 
 import math
@@ -34,8 +33,11 @@ def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> Lay
     """
     vertices, faces, upper = _halves(vertices, faces, layout.least_share)
     triangles = _Triangles(vertices, faces)
-    tries = [_hemispheres(vertices, faces, upper, along) for along in (0.0, layout.along)]
-    return Layout(vertices, faces, _relaxed(min(tries, key=triangles.energy), triangles, layout))
+    directions = _hemispheres(vertices, faces, upper, 0.0)
+    if triangles.energy(directions) > layout.squeezed:
+        other = _hemispheres(vertices, faces, upper, layout.along)
+        directions = min(directions, other, key=triangles.energy)
+    return Layout(vertices, faces, _relaxed(directions, triangles, layout))
 
 
 def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntArray, Mask]:
