@@ -79,7 +79,7 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
     Where all have faults, return the best.
     """
     config, stiffer_first = task.config, False
-    starts = config.starts if task.given_corners is None else 1
+    starts = min(config.starts, 5) if task.given_corners is None else 1
     best = _trained(task, checkpoints, give_up=starts > 1)
     for start in range(1, starts):
         if best is not None and not any(best.found.faults):
@@ -90,12 +90,15 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
             other = _grown(task, config.growth, 0, kept)
             is_far = other.fit.mean_square(other.found.control) > config.growth.far**2
             stiffer_first = other.found.meets_itself or is_far
-        elif stiffer_first == (start % 2 == 0):  # the two later ways take turns
+        elif start == 4:
+            _tell(best, "growing a stiffer map, farther from the surface,")
+            other = _grown(task, config.last_growth, 2, kept)
+        elif stiffer_first == (start == 2):
             _tell(best, "growing a stiffer map")
-            other = _grown(task, config.stiff_growth, start // 2, kept)  # begins with another turn of the cube
+            other = _grown(task, config.stiff_growth, 1, kept)  # begins with another turn of the cube
         else:
             _tell(best, "extending the surface's layout into the solid")
-            other = _extended(task, start // 2 - 1, kept)
+            other = _extended(task, kept)
         if best is None or other.found.rank < best.found.rank:
             best = other
     assert best is not None
@@ -147,12 +150,12 @@ def _grown(task: Task, growth: GrowthConfig, turn: int, checkpoints: Checkpoints
     return replace(attempt, spline=stiffened(task.config.spline, growth))
 
 
-def _extended(task: Task, turn: int, checkpoints: Checkpoints) -> Attempt:
+def _extended(task: Task, checkpoints: Checkpoints) -> Attempt:
     """Lay the surface on the cube and fit F to that layout, extended into the solid."""
     config = task.config
     spline = extending(config.spline, config.extension)
     with timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = _on_cube(task, turn)
+        layout = _on_cube(task, 0)
         fit = _surface_fit(layout, spline, task)
         control = _first_spline(*extended(layout, config.extension), fit, spline)
     return _optimized(control, fit, spline, task, checkpoints, "extension")

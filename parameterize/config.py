@@ -88,7 +88,9 @@ class GrowthConfig:
 
 
 # Where the first growth fails: far thinner parts keep their small det J, and what is squeezed does not buckle.
-STIFF = GrowthConfig(far=0.05, firm_rounds=12, stiffness=10.0, least_floor=0.05)
+STIFF = GrowthConfig(far=0.01, firm_rounds=12, stiffness=10.0, least_floor=0.05)
+# Where all else fails: a certified map that is far from the surface is worth more than none.
+LAST = replace(STIFF, far=0.05)
 
 
 @dataclass(frozen=True)
@@ -245,13 +247,16 @@ class Config:
     layout : LayoutConfig
     growth : GrowthConfig
     stiff_growth : GrowthConfig
-        Of the growths after the first.
+        Of the second growth.
+    last_growth : GrowthConfig
+        Of the last one.
     extension : ExtensionConfig
     refinement : RefinementConfig or None
         Where knots are inserted after the spline stage; None: the control points of `spline` are all there are.
     starts : int
-        The tries in all: where a shape is hard to train, or the trained map is not certified, one is grown. Where that
-        is not certified or meets itself, a layout is extended and a stiffer map grown, by turns.
+        The tries in all, at most 5: where a shape is hard to train, or the trained map is not certified, one is grown.
+        Where that is not certified or meets itself, a layout is extended and a stiffer map grown; in the end one that
+        may be farther from the surface.
 
     Examples
     --------
@@ -268,8 +273,9 @@ class Config:
     layout: LayoutConfig = LAYOUT
     growth: GrowthConfig = GrowthConfig()
     stiff_growth: GrowthConfig = STIFF
+    last_growth: GrowthConfig = LAST
     extension: ExtensionConfig = ExtensionConfig()
-    starts: int = 4
+    starts: int = 5
     refinement: RefinementConfig | None = None
 
     def scaled(self, factor: float) -> Config:
@@ -282,8 +288,11 @@ class Config:
         stages = tuple(replace(s, steps=max(1, round(factor * s.steps))) for s in self.stages)
         spline = replace(self.spline, steps=max(1, round(factor * self.spline.steps)))
         train = self.train if factor >= 1.0 or not self.train.easy_loss else replace(self.train, easy_loss=None)
-        growth, stiff = (replace(g, steps=max(1, round(factor * g.steps))) for g in (self.growth, self.stiff_growth))
-        return replace(self, train=train, stages=stages, spline=spline, growth=growth, stiff_growth=stiff)
+        growths = (self.growth, self.stiff_growth, self.last_growth)
+        growth, stiff, last = (replace(g, steps=max(1, round(factor * g.steps))) for g in growths)
+        return replace(
+            self, train=train, stages=stages, spline=spline, growth=growth, stiff_growth=stiff, last_growth=last
+        )
 
     def refined(self, tolerance: float, max_control_points: int) -> Config:
         """Return the same options with knots inserted until a tolerance is met, see RefinementConfig.

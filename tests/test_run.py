@@ -168,7 +168,10 @@ def test_checkpoint_of_another_run_is_refused(surface, tmp_path):
 
     with pytest.raises(CheckpointError, match=r"\(surface differ"):
         resume(replace(small_surface(3.0), sha256=surface.sha256))  # as another body of the same file
-    with pytest.raises(CheckpointError, match=r"\(config\.growth\.steps, config\.spline\.steps, config\.stages, "):
+    with pytest.raises(
+        CheckpointError,
+        match=r"\(config\.growth\.steps, config\.last_growth\.steps, config\.spline\.steps, config\.stages, ",
+    ):
         resume(options=config.scaled(2.0))
     with pytest.raises(CheckpointError, match=r"\(seed differ"):
         resume(seed=1)
@@ -369,12 +372,12 @@ def test_after_a_growth_that_meets_itself_or_ends_far_away_the_stiffer_one_comes
         return replace(found, certificate=proved, injective=not meets), fit
 
     monkeypatch.setattr(attempts, "optimize_coarse_first", spoiled)
-    config = replace(tiny_config(), starts=4, growth=replace(NOT_FAR, far=1e-9) if far else NOT_FAR)
+    config = replace(tiny_config(), starts=5, growth=replace(NOT_FAR, far=1e-9) if far else NOT_FAR)
     parameterize(surface, config, seed=3, device="cpu")
     usual, growth = (config.spline.fairness, 1.0), config.growth
     stiff = (config.stiff_growth, pytest.approx(10.0 * usual[0]), 0.05)
     later = [stiff, (None, *usual)] if meets or far else [(None, *usual), stiff]
-    assert seen == [(None, *usual), (growth, *usual), *later]
+    assert seen == [(None, *usual), (growth, *usual), *later, (config.last_growth, *stiff[1:])]
 
 
 def test_a_map_grown_stiff_is_refined_stiff(surface, monkeypatch):
