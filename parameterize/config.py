@@ -78,7 +78,7 @@ class GrowthConfig:
     slides: int = 1  # likewise
     penalty: float = 2500.0  # on det J, in these rounds and all later ones
     reach: float = 0.03  # surface points farther from F than this do not slide, and draw F in all directions
-    far: float = 0.005  # in place of the spline stage's, after the first round that follows; where it is more, always
+    far: float = 0.005  # in place of the spline stage's: after the first round that follows, and in all where larger
     rounds: int = 20  # of the spline stage, after these, at most
     patient_rounds: int = 2  # in place of the spline stage's
     firm_rounds: int = 6  # likewise
