@@ -11,7 +11,7 @@ import torch
 from .arrays import Array, IntArray
 from .checkpoint import Checkpoints
 from .coarse import coarse_knots, optimize_coarse_first
-from .config import Config, GrowthConfig, SplineConfig
+from .config import Config, ExtensionConfig, GrowthConfig, SplineConfig
 from .cube.cutting import subdivide_finely
 from .cube.edge_paths import PathError, choose_corners, lay_out
 from .cube.flips import Layout, flipped, untangle
@@ -78,31 +78,32 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
 
     Where all have faults, return the best.
     """
-    config, stiffer_first = task.config, False
-    starts = min(config.starts, 5) if task.given_corners is None else 1
-    best = _trained(task, checkpoints, give_up=starts > 1)
-    for start in range(1, starts):
+    config = task.config
+    ways: list[tuple[str, GrowthConfig | ExtensionConfig]] = [
+        ("growing a map from a cube", config.growth),
+        ("extending the surface's layout into the solid", config.extension),
+        ("growing a stiffer map", config.stiff_growth),
+        ("growing a stiffer map, farther from the surface,", config.last_growth),
+    ]
+    tries = min(config.starts - 1, len(ways)) if task.given_corners is None else 0
+    best = _trained(task, checkpoints, give_up=tries > 0)
+    for i in range(tries):
         if best is not None and not any(best.found.faults):
             break
-        kept = checkpoints.of_part(start)
-        if start == 1:
-            _tell(best, "growing a map from a cube")
-            other = _grown(task, config.growth, 0, kept)
-            is_far = other.fit.mean_square(other.found.control) > config.growth.far**2
-            stiffer_first = other.found.meets_itself or is_far
-        elif start == 4:
-            _tell(best, "growing a stiffer map, farther from the surface,")
-            other = _grown(task, config.last_growth, 2, kept)
-        elif stiffer_first == (start == 2):
-            _tell(best, "growing a stiffer map")
-            other = _grown(task, config.stiff_growth, 1, kept)  # begins with another turn of the cube
-        else:
-            _tell(best, "extending the surface's layout into the solid")
-            other = _extended(task, kept)
+        told, options = ways[i]
+        _tell(best, told)
+        kept = checkpoints.of_part(i + 1)
+        other = _grown(task, options, kept) if isinstance(options, GrowthConfig) else _extended(task, options, kept)
+        if i == 0 and (other.found.meets_itself or _is_far(other, config.growth)):
+            ways[1], ways[2] = ways[2], ways[1]
         if best is None or other.found.rank < best.found.rank:
             best = other
     assert best is not None
     return best
+
+
+def _is_far(grown: Attempt, growth: GrowthConfig) -> bool:
+    return grown.fit.mean_square(grown.found.control) > growth.far**2
 
 
 def _tell(best: Attempt | None, way: str) -> None:
@@ -139,25 +140,24 @@ def _trained(task: Task, checkpoints: Checkpoints, *, give_up: bool) -> Attempt 
     return _optimized(control, fit, spline, task, checkpoints, "network")
 
 
-def _grown(task: Task, growth: GrowthConfig, turn: int, checkpoints: Checkpoints) -> Attempt:
+def _grown(task: Task, growth: GrowthConfig, checkpoints: Checkpoints) -> Attempt:
     """Lay the surface on the cube and let F grow towards it."""
     spline = growing(task.config.spline, growth)
     with timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = _on_cube(task, turn)
+        layout = _on_cube(task, growth.turn)
         fit = _surface_fit(layout, spline, task)
         control = first_cube(layout, task.own, fit.places.knots, spline.degree)
     attempt = _optimized(control, fit, spline, task, checkpoints, "growth")
     return replace(attempt, spline=stiffened(task.config.spline, growth))
 
 
-def _extended(task: Task, checkpoints: Checkpoints) -> Attempt:
+def _extended(task: Task, extension: ExtensionConfig, checkpoints: Checkpoints) -> Attempt:
     """Lay the surface on the cube and fit F to that layout, extended into the solid."""
-    config = task.config
-    spline = extending(config.spline, config.extension)
+    spline = extending(task.config.spline, extension)
     with timed(task.seconds, "fit"), one_thread_an_operation():
         layout = _on_cube(task, 0)
         fit = _surface_fit(layout, spline, task)
-        control = _first_spline(*extended(layout, config.extension), fit, spline)
+        control = _first_spline(*extended(layout, extension), fit, spline)
     return _optimized(control, fit, spline, task, checkpoints, "extension")
 
 

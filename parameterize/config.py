@@ -72,6 +72,7 @@ class TrainConfig:
 class GrowthConfig:
     """How F grows from a cube into a solid that is hard for the network: rounds before those of the spline stage."""
 
+    turn: int = 0  # of the cube: 0 is the best found, 1 the next, and so on
     shares: tuple[float, ...] = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)  # of `vertex`
     steps: int = 12  # a round, at most
     coarse: float = 1 / 3  # in these rounds, in place of the spline stage's
@@ -88,9 +89,9 @@ class GrowthConfig:
 
 
 # Where the first growth fails: far thinner parts keep their small det J, and what is squeezed does not buckle.
-STIFF = GrowthConfig(far=0.01, firm_rounds=12, stiffness=10.0, least_floor=0.05)
+STIFF = GrowthConfig(turn=1, far=0.01, firm_rounds=12, stiffness=10.0, least_floor=0.05)
 # Where all else fails: a certified map that is far from the surface is worth more than none.
-LAST = replace(STIFF, far=0.05)
+LAST = replace(STIFF, turn=2, far=0.05)
 
 
 @dataclass(frozen=True)
