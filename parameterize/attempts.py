@@ -1,6 +1,7 @@
 """The ways to a map, one after the other: the trained network, a cube that grows, a layout extended into the solid."""
 
 import logging
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -72,11 +73,22 @@ class Attempt:
     origin: Origin
     spline: SplineConfig
 
+    @cached_property
+    def distance(self) -> float:
+        """Root mean square distance of the surface's points from the map, at volume 1."""
+        return math.sqrt(self.fit.mean_square(self.found.control))
+
+    @property
+    def rank(self) -> tuple[int, bool, bool, float]:
+        """What is not proved, then the distance: of two attempts the one with the lower rank is better."""
+        return *self.found.rank, self.distance
+
 
 def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
     """Train a map; where that is hard or not certified, grow and extend others. Return the first without faults.
 
-    Where all have faults, return the best.
+    Where the first growth is far from the surface, a stiffer one follows, and the nearer of the two is kept. Where all
+    have faults, return the best.
     """
     config = task.config
     ways: list[tuple[str, GrowthConfig | ExtensionConfig]] = [
@@ -87,23 +99,21 @@ def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
     ]
     tries = min(config.starts - 1, len(ways)) if task.given_corners is None else 0
     best = _trained(task, checkpoints, give_up=tries > 0)
+    far = False
     for i in range(tries):
-        if best is not None and not any(best.found.faults):
+        if best is not None and not any(best.found.faults) and not far:
             break
         told, options = ways[i]
         _tell(best, told)
         kept = checkpoints.of_part(i + 1)
         other = _grown(task, options, kept) if isinstance(options, GrowthConfig) else _extended(task, options, kept)
-        if i == 0 and (other.found.meets_itself or _is_far(other, config.growth)):
+        far = i == 0 and other.distance > config.growth.far
+        if i == 0 and (other.found.meets_itself or far):
             ways[1], ways[2] = ways[2], ways[1]
-        if best is None or other.found.rank < best.found.rank:
+        if best is None or other.rank < best.rank:
             best = other
     assert best is not None
     return best
-
-
-def _is_far(grown: Attempt, growth: GrowthConfig) -> bool:
-    return grown.fit.mean_square(grown.found.control) > growth.far**2
 
 
 def _tell(best: Attempt | None, way: str) -> None:
@@ -180,6 +190,8 @@ def _optimized(
 
 
 def _fault(found: Optimized) -> str:
+    if not any(found.faults):
+        return "far from the surface"
     return "the boundary meets itself" if found.meets_itself else "not certified"
 
 

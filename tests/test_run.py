@@ -380,6 +380,30 @@ def test_after_a_growth_that_meets_itself_or_ends_far_away_the_stiffer_one_comes
     assert seen == [(None, *usual), (growth, *usual), *later, (config.last_growth, *stiff[1:])]
 
 
+def test_after_a_certified_growth_far_from_the_surface_a_stiffer_one_is_tried_and_the_nearer_kept(
+    surface, monkeypatch, caplog
+):
+    optimize, seen = attempts.optimize_coarse_first, []
+
+    def proved(control, *args, **options):
+        found, fit = optimize(control, *args, **options)
+        none = np.zeros((0, 3), dtype=np.int64)
+        certificate = replace(found.certificate, verdict="certified", unproved=none)
+        seen.append((fit.mean_square(found.control), found.control))
+        return replace(found, certificate=certificate, injective=True), fit
+
+    monkeypatch.setattr(attempts, "optimize_coarse_first", proved)
+    config = hard_config(starts=5)
+    for growth, tries in ((NOT_FAR, 1), (replace(NOT_FAR, far=1e-9), 2)):
+        seen.clear()
+        caplog.clear()
+        result = parameterize(surface, replace(config, growth=growth), seed=3, device="cpu")
+        assert len(seen) == tries
+        kept = np.moveaxis(min(seen, key=lambda one: one[0])[1].numpy(), 0, -1)
+        assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
+        assert ("far from the surface; growing a stiffer map instead" in caplog.text) == (tries == 2)
+
+
 def test_a_map_grown_stiff_is_refined_stiff(surface, monkeypatch):
     told = []
 
