@@ -55,7 +55,7 @@ class BoundaryCheck:
         return {"boundary_injective": self.injective, "boundary_meeting": place}
 
 
-def check_boundary(volume: BSplineVolume, *, max_depth: int = 12) -> BoundaryCheck:
+def check_boundary(volume: BSplineVolume, *, max_depth: int = 24) -> BoundaryCheck:
     """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four."""
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
