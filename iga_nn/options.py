@@ -101,7 +101,8 @@ class MapOptions(SurfaceOptions):
 
     def _check_kinds(self) -> None:
         """Raise InputError for values of another kind, which the command line refuses before."""
-        counts = ["seed", "max_control_points", *(["control_points"] if self.control_points != "auto" else [])]
+        counts = ["seed", "max_control_points", "max_faces"]
+        counts += ["control_points"] * (self.control_points != "auto") + ["component"] * (self.component is not None)
         for names, kind, words in (
             (counts, Integral, "a whole number"),
             (["steps_factor", "tolerance"], Real, "a number"),
@@ -109,6 +110,8 @@ class MapOptions(SurfaceOptions):
             for name in names:
                 if not isinstance(value := getattr(self, name), kind) or isinstance(value, bool):
                     raise InputError(f"{name.replace('_', ' ')}: must be {words}, got {value!r:.80}")
+        if not isinstance(self.corners, str | Path | None):
+            raise InputError(f"corners: must be the path of a JSON file, got {self.corners!r:.80}")
 
     @property
     def most_control_points(self) -> int:

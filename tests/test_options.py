@@ -55,6 +55,9 @@ def test_auto_takes_its_limits_to_the_map():
         ({"control_points": "many"}, "control points: must be a whole number, got 'many'"),
         ({"seed": True}, "seed: must be a whole number, got True"),
         ({"steps_factor": None}, "steps factor: must be a number, got None"),
+        ({"component": "x"}, "component: must be a whole number, got 'x'"),
+        ({"max_faces": "x"}, "max faces: must be a whole number, got 'x'"),
+        ({"corners": [1, 2]}, "corners: must be the path of a JSON file, got .1, 2."),
         ({"max_control_points": 40}, "max control points: has a meaning with --control-points auto alone"),
     ],
 )

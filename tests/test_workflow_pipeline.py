@@ -65,6 +65,38 @@ def test_broken_input_leaves_an_earlier_result_alone(formula_training, in_folder
     assert (in_folder / "out" / "report.json").read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("volume.npz", b"my own", "holds volume.npz without a report of its run"),
+        ("solution.npz", b"my own", "holds solution.npz without a report of its run"),
+        ("report.json", b'{"x":', "report.json is damaged"),
+        ("report.json", b"[]", "report.json is damaged"),
+    ],
+)
+@pytest.mark.parametrize("resume", [False, True])
+def test_files_that_no_report_tells_of_are_kept(formula_training, in_folder, name, content, says, resume):
+    formula_training()
+    held = in_folder / "out" / name
+    held.parent.mkdir()
+    held.write_bytes(content)
+    with pytest.raises(InputError, match=f"out: {says}; --force replaces"):
+        pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=resume))
+    assert held.read_bytes() == content
+    pipeline.parameterize_to("cube", "out", force=True)
+    assert held.exists() == (name != "solution.npz") and (in_folder / "out" / "report.json").exists()
+
+
+def test_a_solve_keeps_a_solution_that_no_report_tells_of(in_folder):
+    benchmark_volume(3).save(in_folder / "mine.npz")
+    held = in_folder / "out" / "solution.npz"
+    held.parent.mkdir()
+    held.write_bytes(b"my own")
+    with pytest.raises(InputError, match="holds solution.npz without a report"):
+        pipeline.solve_to("mine.npz", "out", problem=PoissonOptions(refine=(0,)))
+    assert held.read_bytes() == b"my own"
+
+
 def test_the_checkpoint_stays_until_all_is_solved(formula_training, in_folder, monkeypatch):
     formula_training()
     checkpoint = in_folder / "out" / "checkpoint" / "spline.safetensors"

@@ -91,7 +91,7 @@ def _prepare(
         config, device = options.config(), choose_device(options.device)
     with state.timed("load"):
         surface = resolve(str(mesh), **options.reading())
-        corners = read_corners(options.corners, _frame(surface)) if options.corners else None
+        corners = read_corners(Path(options.corners), _frame(surface)) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
         log.warning("%s: %s", surface.name, notice)

@@ -36,11 +36,13 @@ class RunFolder:
     """Fill one output folder: its report so far, and the clock.
 
     vector: write plots of curves as PDF, too. finished: the result that a resumed run found; nothing is left to do.
+    guarded: files of which no report tells are the user's own, and not replaced.
     """
 
     folder: Path
     vector: bool = False
     finished: Outcome | None = None
+    guarded: bool = False
     report: reports.Report = field(default_factory=lambda: {"schema": reports.SCHEMA})
     seconds: dict[str, float] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
@@ -78,9 +80,16 @@ class RunFolder:
         self.report.setdefault("not_drawn", {})[what] = reason
 
     def begin(self, *parts: Part) -> None:
-        """Remove the report and the files of these parts that an older run left; call it once the input is accepted."""
-        for name in files_of("report", *parts):
-            target = self.folder / name
+        """Remove the report and the files of these parts that an older run left; call it once the input is accepted.
+
+        Raises InputError where such a file is there but no readable report of the run that made it.
+        """
+        targets = [self.folder / name for name in files_of("report", *parts)]
+        kept = [target.name for target in targets if target.exists()]
+        if self.guarded and kept:
+            what = f"{REPORT} is damaged" if REPORT in kept else f"holds {kept[0]} without a report of its run"
+            raise InputError(f"{self.folder}: {what}; --force replaces the files there, --out names another folder")
+        for target in targets:
             for old in (target, *unfinished(target)):
                 old.unlink(missing_ok=True)
 
@@ -125,7 +134,8 @@ def open_folder(
             if not finished:
                 with writable(folder):
                     TemporaryFile(dir=folder).close()
-            yield RunFolder(folder, vector, finished)
+            guarded = not force and not has_checkpoint(folder) and reports.read(folder) is None
+            yield RunFolder(folder, vector, finished, guarded)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {_way_on(folder)}") from None
     finally:
@@ -181,13 +191,13 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def forget(folder: Path) -> None:
-    """Let the next run start anew: remove the report that marks a result as finished, and the checkpoint.
+    """Let the next run start anew: write a report that marks no result as finished, and remove the checkpoint.
 
     Raises InputError where another run uses the folder, or where it cannot be written.
     """
     if folder.is_dir():
         with locked(folder), writable(folder):
-            (folder / REPORT).unlink(missing_ok=True)
+            reports.write(folder, {"schema": reports.SCHEMA})
             shutil.rmtree(folder / CHECKPOINT, ignore_errors=True)
 
 
