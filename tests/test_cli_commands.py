@@ -320,6 +320,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--neumann", "u0", "u0=x"], "u0 is given twice"),
         (["run", "poisson", "cube", "--source", "1", "--neumann", "u0"], "neumann u0 has no data"),
         (["run", "poisson", "cube", "--robin", "u0"], "write u0=ALPHA"),
+        (["run", "poisson", "cube", "--neumann"], "--neumann requires at least 1 element"),
         (["run", "poisson", "cube", "--robin", "u0=1", "--neumann", "u0"], "face u0 has both"),
         (["study", "good.npz", "--refine", "0..9"], "at most 6"),
         (["study", "good.npz", "--refine", "2..0"], "distinct levels"),

@@ -48,7 +48,7 @@ app = App(
     help="From a closed surface mesh to a solved PDE on a certified trivariate B-spline.",
     version=f"iga-nn {__version__}",
     suppress_keyboard_interrupt=False,
-    default_parameter=Parameter(negative=(), consume_multiple=True, converter=_converted),
+    default_parameter=Parameter(negative=(), consume_multiple=1, converter=_converted),
 )
 run_app = App(name="run", help="Parameterize a surface and solve a problem on its volume.")
 solve_app = App(name="solve", help="Solve a problem on a volume.")

@@ -205,11 +205,11 @@ def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None
 
 
 def _write(state: RunFolder, given: _Given, result: Parameterization, command: str, options: MapOptions) -> None:
+    state.write(command=command)  # first, so that files which a full disk or a kill leaves belong to a run
     result.volume.save(state.folder / "volume.npz")
     result.boundary.save(state.folder / "boundary.npz")
     save_arrays(state.folder / "history.npz", **result.history)
     state.write(
-        command=command,
         input=given.surface.summary(),
         config=asdict(result.config),
         estimate=asdict(given.expected),
