@@ -2,14 +2,9 @@ import numpy as np
 import pytest
 import torch
 
+from parameterize.optimization.bending import bending_operator, grams
 from parameterize.optimization.operators import ControlRows, conjugate_gradients
-from parameterize.optimization.tensor_product import (
-    FastDiagonalization,
-    GaussGrid,
-    along,
-    bending_operator,
-    grams,
-)
+from parameterize.optimization.tensor_product import FastDiagonalization, GaussGrid, along
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 

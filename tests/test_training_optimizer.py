@@ -1,5 +1,7 @@
 """Muon for the hidden matrices, Adam for the rest, one schedule, and moments that a checkpoint brings back."""
 
+import subprocess
+import sys
 from copy import deepcopy
 from dataclasses import replace
 
@@ -87,3 +89,20 @@ def test_restored_moments_go_on_bit_for_bit():
     stepped(network, optimizer, 3)
     stepped(other, fresh, 3)
     assert all(torch.equal(a, b) for a, b in zip(network.parameters(), other.parameters(), strict=True))
+
+
+def test_training_steps_do_not_load_torchs_compiler():
+    """To load it takes as long as 50 steps; `torch.optim.Adam` and given gradients of autograd do."""
+    code = """
+import sys, torch
+from parameterize.config import NetworkConfig, TrainConfig
+from parameterize.training.network import InverseMap, map_in_pieces
+from parameterize.training.optimizer import TrainingOptimizer
+network = InverseMap(NetworkConfig(width=8, modules=1, frequencies=2))
+optimizer = TrainingOptimizer(network, TrainConfig())
+map_in_pieces(network, torch.rand(9, 3)).square().sum().backward()
+optimizer.step(1.0)
+print([name for name in ("torch._dynamo", "sympy") if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

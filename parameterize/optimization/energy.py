@@ -11,6 +11,7 @@ from torch import Tensor
 
 from ..arrays import IntArray, Knots
 from ..config import GrowthConfig, SplineConfig
+from .bending import bending_operator, grams
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import SpanBarrier, acting_on, with_neighbours
 from .distortion import DistortionEnergy
@@ -18,7 +19,7 @@ from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
 from .operators import conjugate_gradients, weighted_sum
 from .surface_distance import SurfaceFit
-from .tensor_product import FastDiagonalization, bending_operator, grams
+from .tensor_product import FastDiagonalization
 
 _ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
 

@@ -6,8 +6,9 @@ from torch import Tensor
 
 from ..arrays import Array, Knots
 from ..spline.bspline import basis_derivatives
+from .bending import bending_operator, grams
 from .operators import ControlRows, conjugate_gradients, weighted_sum
-from .tensor_product import FastDiagonalization, bending_operator, grams
+from .tensor_product import FastDiagonalization
 
 
 def fit_pairs(

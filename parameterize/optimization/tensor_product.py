@@ -1,11 +1,10 @@
-"""Tensor-product splines: Jacobians on a grid by banded matrices, 1-D matrices, the bending operator, fast inverses.
+"""Tensor-product splines: Jacobians on a grid by banded matrices, and fast inverses.
 
 See operators.py for how control points are held, and how pieces of work are added.
 """
 
 from collections.abc import Callable
 from copy import copy
-from functools import partial
 from typing import Any
 
 import numba
@@ -15,7 +14,6 @@ from torch import Tensor
 
 from ..arrays import Array, IntArray
 from ..spline.bspline import breakpoints, collocation, gauss_points
-from .operators import PiecewiseOperator
 
 _END_SPANS = 1
 _PLANES = 4  # of quadrature points in one
@@ -32,7 +30,7 @@ def along(matrix: Tensor, field: Tensor, axis: int) -> Tensor:
     return (matrix @ field.reshape(-1, field.shape[axis], after.numel())).view(*before, len(matrix), *after)
 
 
-Band = tuple[IntArray, Array, Array]  # of two matrices: first columns (m,), entries from there on (m, k) each
+Band = tuple[Any, ...]  # of matrices: first columns (m,), entries from there on (m, k) each
 
 
 class GaussGrid:
@@ -61,7 +59,7 @@ class GaussGrid:
         self._bands: dict[Any, tuple[tuple[Band, ...], tuple[Band, ...]]] = {}
         for dtype in (np.float32, np.float64):
             pairs: list[list[Array]] = [[m.astype(dtype) for m in pair] for pair in tables]
-            bands = [(_band(values, slopes), _band(values.T, slopes.T)) for values, slopes in pairs]
+            bands = [(band(values, slopes), band(values.T, slopes.T)) for values, slopes in pairs]
             self._bands[np.dtype(dtype)] = tuple(f for f, _ in bands), tuple(t for _, t in bands)
 
     def planes(self) -> list[slice]:
@@ -114,18 +112,18 @@ class GaussGrid:
         return total
 
 
-def _band(values: Array, slopes: Array) -> Band:
-    """Store two matrices (m, n) with few entries a row from the first of these on."""
-    used = (values != 0.0) | (slopes != 0.0)
+def band(*matrices: Array) -> Band:
+    """Store matrices (m, n) with few entries a row from the first of these on."""
+    used = np.any([matrix != 0.0 for matrix in matrices], axis=0)
     low, high = used.argmax(axis=1), used.shape[1] - used[:, ::-1].argmax(axis=1)
     width = int((high - low).max())
     first = np.minimum(low, used.shape[1] - width)
     columns = first[:, None] + np.arange(width)
-    return first, np.take_along_axis(values, columns, axis=1), np.take_along_axis(slopes, columns, axis=1)
+    return first, *(np.take_along_axis(matrix, columns, axis=1) for matrix in matrices)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _apply(first: IntArray, entries: Array, field: Array, out: Array) -> None:
+def apply_band(first: IntArray, entries: Array, field: Array, out: Array) -> None:
     """Add a banded matrix times a field (n, r) to out (m, r)."""
     for m in range(len(first)):
         for k in range(entries.shape[1]):
@@ -144,17 +142,17 @@ def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
     for c in range(3):
         field = control[c].reshape(n_u, n_v * n_w)
         plain, steep = np.zeros((planes, n_v * n_w), control.dtype), np.zeros((planes, n_v * n_w), control.dtype)
-        _apply(first_u, values_u, field, plain)
-        _apply(first_u, slopes_u, field, steep)
+        apply_band(first_u, values_u, field, plain)
+        apply_band(first_u, slopes_u, field, steep)
         for m in range(planes):
             flat, upright = plain[m].reshape(n_v, n_w), steep[m].reshape(n_v, n_w)
             part = np.zeros((3, m_v, n_w), control.dtype)
-            _apply(first_v, values_v, upright, part[0])
-            _apply(first_v, slopes_v, flat, part[1])
-            _apply(first_v, values_v, flat, part[2])
+            apply_band(first_v, values_v, upright, part[0])
+            apply_band(first_v, slopes_v, flat, part[1])
+            apply_band(first_v, values_v, flat, part[2])
             for direction in range(3):
                 entries = slopes_w if direction == 2 else values_w
-                _apply(first_w, entries, np.ascontiguousarray(part[direction].T), out[c, direction, m])
+                apply_band(first_w, entries, np.ascontiguousarray(part[direction].T), out[c, direction, m])
     return out.reshape(3, 3, planes * m_w * m_v)
 
 
@@ -172,11 +170,11 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
             part = np.zeros((3, n_w, m_v), dual.dtype)
             for direction in range(3):
                 entries = slopes_w if direction == 2 else values_w
-                _apply(first_w, entries, field[c, direction, m], part[direction])
+                apply_band(first_w, entries, field[c, direction, m], part[direction])
             plain, steep = np.zeros((n_v, n_w), dual.dtype), np.zeros((n_v, n_w), dual.dtype)
-            _apply(first_v, values_v, np.ascontiguousarray(part[0].T), steep)
-            _apply(first_v, slopes_v, np.ascontiguousarray(part[1].T), plain)
-            _apply(first_v, values_v, np.ascontiguousarray(part[2].T), plain)
+            apply_band(first_v, values_v, np.ascontiguousarray(part[0].T), steep)
+            apply_band(first_v, slopes_v, np.ascontiguousarray(part[1].T), plain)
+            apply_band(first_v, values_v, np.ascontiguousarray(part[2].T), plain)
             for k in range(width):
                 for i in range(n_v):
                     for j in range(n_w):
@@ -219,39 +217,6 @@ def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
         for f, c in zip(fine, coarse, strict=True)
     )
     return points, weights
-
-
-Grams = list[tuple[Tensor, ...]]  # mass, stiffness and bending matrices (n, n), each for the three directions
-
-
-def grams(knots: tuple[Array, ...], degrees: tuple[int, ...]) -> Grams:
-    """Return the matrices of integrals of products of basis functions, of their first and of their second derivatives.
-
-    Gauss quadrature, exact.
-    """
-
-    def of(row: Array, degree: int, derivative: int) -> Tensor:
-        points, weights = gauss_points(row, degree + 1)
-        table = collocation(row, degree, points.ravel(), derivative).toarray()
-        return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
-
-    return [tuple(of(row, p, d) for row, p in zip(knots, degrees, strict=True)) for d in range(3)]
-
-
-def bending_operator(matrices: Grams, weight: float, dtype: torch.dtype = torch.float64) -> PiecewiseOperator:
-    """Return x -> weight * H x with x^T H x = int |Hessian F|^2 (exact); a piece of work is one component of F."""
-    (m0, m1, m2), (k0, k1, k2), (h0, h1, h2) = ([m.to(dtype) for m in row] for row in matrices)
-
-    def bend(component: int, control: Tensor) -> Tensor:
-        x = control[component : component + 1]
-        xm, xk, xh = along(m2, x, 3), along(k2, x, 3), along(h2, x, 3)
-        mm = along(m1, xm, 2)
-        first = along(k1, xm, 2) + along(m1, xk, 2)
-        second = along(h1, xm, 2) + along(m1, xh, 2) + 2.0 * along(k1, xk, 2)
-        result = along(weight * h0, mm, 1) + along(m0, weight * second, 1)
-        return result + along(2.0 * weight * k0, first, 1)
-
-    return PiecewiseOperator([partial(bend, component) for component in range(3)], lambda parts, _: torch.cat(parts))
 
 
 class FastDiagonalization:

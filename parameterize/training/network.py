@@ -94,7 +94,17 @@ class _InPieces(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> Any:
-        """Return the gradients in the parameters."""
+        """Return the gradients in the parameters.
+
+        They are taken of sums: for others torch loads its symbolic shapes, which takes as long as many steps.
+        """
+
+        def part(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, ...]:
+            mapped, dual = pair
+            with torch.enable_grad():
+                total = (mapped * dual).sum()
+            return torch.autograd.grad(total, ctx.parameters)
+
         pairs = list(zip(ctx.pieces, torch.split(gradient, [len(piece) for piece in ctx.pieces]), strict=True))
-        parts = in_parallel(lambda pair: torch.autograd.grad(pair[0], ctx.parameters, pair[1]), pairs)
+        parts = in_parallel(part, pairs)
         return None, None, *(sum(of_one[1:], start=of_one[0]) for of_one in zip(*parts, strict=True))

@@ -6,18 +6,24 @@ processors without instructions for it; this one computes in the parameters' own
 """
 
 import math
-from typing import Any
 
 import torch
 from torch import Tensor
+from torch.optim.adam import adam
 
 from ..config import TrainConfig
+from ..threads import in_parallel
 from .network import InverseMap
 
 Tensors = dict[str, Tensor]
 
 
-class Muon(torch.optim.Optimizer):
+def _gradient(parameter: Tensor) -> Tensor:
+    assert parameter.grad is not None
+    return parameter.grad
+
+
+class Muon:
     """Takes steps along U V^T, where U S V^T is a matrix's gradient with Nesterov's momentum.
 
     lr: their singular values, about; of a matrix with more rows than columns, times the square root of the ratio.
@@ -28,18 +34,22 @@ class Muon(torch.optim.Optimizer):
     _ITERATIONS = 5
 
     def __init__(self, matrices: list[Tensor], lr: float) -> None:
-        super().__init__(matrices, {"lr": lr})
+        self.parameters, self._rate = matrices, lr
+        self.moments = [{"momentum_buffer": torch.zeros_like(matrix)} for matrix in matrices]
 
     @torch.no_grad()
-    def step(self, closure: Any = None) -> None:  # type: ignore[override]
-        """Take one step; `closure` is torch's, and not used."""
-        for group in self.param_groups:
-            for matrix in group["params"]:
-                momentum = self.state[matrix].setdefault("momentum_buffer", torch.zeros_like(matrix))
-                momentum.lerp_(matrix.grad, 1.0 - self._MOMENTUM)
-                direction = self._orthogonal(matrix.grad.lerp(momentum, self._MOMENTUM))
-                rows, columns = matrix.shape
-                matrix.sub_(direction, alpha=group["lr"] * math.sqrt(max(1.0, rows / columns)))
+    def step(self, share: float = 1.0) -> None:
+        """Take one step at a share of the rate."""
+        pairs = list(zip(self.parameters, self.moments, strict=True))
+        in_parallel(lambda pair: self._step(*pair, share * self._rate), pairs)
+
+    @torch.no_grad()
+    def _step(self, matrix: Tensor, moments: Tensors, rate: float) -> None:
+        gradient, momentum = _gradient(matrix), moments["momentum_buffer"]
+        momentum.lerp_(gradient, 1.0 - self._MOMENTUM)
+        direction = self._orthogonal(gradient.lerp(momentum, self._MOMENTUM))
+        rows, columns = matrix.shape
+        matrix.sub_(direction, alpha=rate * math.sqrt(max(1.0, rows / columns)))
 
     def _orthogonal(self, matrix: Tensor) -> Tensor:
         """Return U V^T of a matrix U S V^T, about.
@@ -56,6 +66,37 @@ class Muon(torch.optim.Optimizer):
         return x.T if tall else x
 
 
+class Adam:
+    """Adam as torch computes it; the class `torch.optim.Adam` would load torch's compiler, which takes seconds."""
+
+    def __init__(self, parameters: list[Tensor], lr: float) -> None:
+        self.parameters, self._rate = parameters, lr
+        self.moments = [
+            {"step": torch.zeros(()), "exp_avg": torch.zeros_like(p), "exp_avg_sq": torch.zeros_like(p)}
+            for p in parameters
+        ]
+
+    @torch.no_grad()
+    def step(self, share: float = 1.0) -> None:
+        """Take one step at a share of the rate."""
+        steps, means, squares = ([row[name] for row in self.moments] for name in ("step", "exp_avg", "exp_avg_sq"))
+        adam(
+            self.parameters,
+            [_gradient(p) for p in self.parameters],
+            means,
+            squares,
+            [],
+            steps,
+            amsgrad=False,
+            beta1=0.9,
+            beta2=0.999,
+            lr=share * self._rate,
+            weight_decay=0.0,
+            eps=1e-8,
+            maximize=False,
+        )
+
+
 class TrainingOptimizer:
     """Muon and Adam side by side, with one schedule."""
 
@@ -64,37 +105,31 @@ class TrainingOptimizer:
         for p in network.parameters():
             is_hidden = config.matrix_rate > 0.0 and p.ndim == 2 and p is not network.last.weight
             (hidden if is_hidden else others).append(p)
-        self._parts: dict[str, torch.optim.Optimizer] = {"adam": torch.optim.Adam(others, lr=config.learning_rate)}
+        self._parts: dict[str, Adam | Muon] = {"adam": Adam(others, config.learning_rate)}
         if hidden:
-            self._parts["muon"] = Muon(hidden, lr=config.matrix_rate)
-        self._rates = {name: part.param_groups[0]["lr"] for name, part in self._parts.items()}
+            self._parts["muon"] = Muon(hidden, config.matrix_rate)
 
     def clear(self) -> None:
         """Forget the gradients of the last step."""
         for part in self._parts.values():
-            part.zero_grad(set_to_none=True)
+            for parameter in part.parameters:
+                parameter.grad = None
 
     def step(self, share: float) -> None:
         """Take one step at a share of the learning rates."""
-        for name, part in self._parts.items():
-            part.param_groups[0]["lr"] = share * self._rates[name]
-            part.step()
+        for part in self._parts.values():
+            part.step(share)
 
     def tensors(self) -> Tensors:
         """Return the moments, to be kept in a checkpoint."""
         return {
             f"{name}.{index}.{moment}": value
             for name, part in self._parts.items()
-            for index, moments in part.state_dict()["state"].items()
+            for index, moments in enumerate(part.moments)
             for moment, value in moments.items()
         }
 
     def restore(self, tensors: Tensors) -> None:
         """Take moments that `tensors` has returned."""
-        for name, part in self._parts.items():
-            state: dict[int, Tensors] = {}
-            for key, value in tensors.items():
-                owner, index, moment = key.split(".")
-                if owner == name:
-                    state.setdefault(int(index), {})[moment] = value
-            part.load_state_dict({"state": state, "param_groups": part.state_dict()["param_groups"]})
+        for key, value in self.tensors().items():
+            value.copy_(tensors[key])

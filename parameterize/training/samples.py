@@ -70,7 +70,7 @@ def stencils(vertices: Array, faces: IntArray, cell: float, *, device: torch.dev
 def interior_points(vertices: Array, faces: IntArray, cell: float) -> Array:
     """Return the lattice points inside the surface: (k, 3)."""
     points, _ = lattice(vertices, cell, 0.0)
-    return points[signed_distance(points, vertices, faces) < 0.0]
+    return points[igl.fast_winding_number(vertices, faces, points) > 0.5]
 
 
 class TriangleSampler:

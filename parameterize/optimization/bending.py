@@ -1,0 +1,86 @@
+"""Fairness: the matrices of 1-D integrals, and the operator of the integral of the squared Hessians of F.
+
+See operators.py for how control points are held, and how pieces of work are added.
+"""
+
+import math
+from functools import partial
+
+import numba
+import numpy as np
+import torch
+from torch import Tensor
+
+from ..arrays import Array
+from ..spline.bspline import collocation, gauss_points
+from .operators import PiecewiseOperator
+from .tensor_product import Band, apply_band, band
+
+Grams = list[tuple[Tensor, ...]]  # mass, stiffness and bending matrices (n, n), each for the three directions
+
+
+def grams(knots: tuple[Array, ...], degrees: tuple[int, ...]) -> Grams:
+    """Return the matrices of integrals of products of basis functions, of their first and of their second derivatives.
+
+    Gauss quadrature, exact.
+    """
+
+    def of(row: Array, degree: int, derivative: int) -> Tensor:
+        points, weights = gauss_points(row, degree + 1)
+        table = collocation(row, degree, points.ravel(), derivative).toarray()
+        return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
+
+    return [tuple(of(row, p, d) for row, p in zip(knots, degrees, strict=True)) for d in range(3)]
+
+
+def bending_operator(matrices: Grams, weight: float, dtype: torch.dtype = torch.float64) -> PiecewiseOperator:
+    """Return x -> weight * H x with x^T H x = int |Hessian F|^2 (exact); a piece of work is one component of F.
+
+    H = h x m x m + m x h x m + m x m x h + 2 (k x k x m + k x m x k + m x k x k), with mass matrices m, stiffness
+    matrices k and bending matrices h of the three directions.
+    """
+    bands = tuple(
+        band(*((factor * matrix).to(dtype).numpy() for matrix in (mass, math.sqrt(2.0) * slope, curve)))
+        for factor, mass, slope, curve in zip((1.0, 1.0, weight), *matrices, strict=True)
+    )
+
+    def bend(component: int, control: Tensor) -> Tensor:
+        return torch.from_numpy(_bent(bands, np.ascontiguousarray(control[component].numpy())))
+
+    return PiecewiseOperator([partial(bend, component) for component in range(3)], lambda parts, _: torch.stack(parts))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _bent(bands: tuple[Band, Band, Band], field: Array) -> Array:
+    """Apply H to one component (n_u, n_v, n_w); a direction's bands are those of m, sqrt(2) k and h.
+
+    Every step applies matrices along the first axis, which then goes last.
+    """
+    first_u, mass_u, slope_u, curve_u = bands[0]
+    first_v, mass_v, slope_v, curve_v = bands[1]
+    first_w, mass_w, slope_w, curve_w = bands[2]
+    n_u, n_v, n_w = field.shape
+    x = field.reshape(n_u, n_v * n_w)
+    mass, slope, curve = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    apply_band(first_u, mass_u, x, mass)
+    apply_band(first_u, slope_u, x, slope)
+    apply_band(first_u, curve_u, x, curve)
+    m, k, h = _turned(mass, n_v), _turned(slope, n_v), _turned(curve, n_v)
+    for_mass, for_slope, for_curve = np.zeros_like(m), np.zeros_like(m), np.zeros_like(m)  # of w
+    apply_band(first_v, mass_v, h, for_mass)
+    apply_band(first_v, slope_v, k, for_mass)
+    apply_band(first_v, curve_v, m, for_mass)
+    apply_band(first_v, mass_v, k, for_slope)
+    apply_band(first_v, slope_v, m, for_slope)
+    apply_band(first_v, mass_v, m, for_curve)
+    out = np.zeros((n_w, n_u * n_v), field.dtype)
+    apply_band(first_w, mass_w, _turned(for_mass, n_w), out)
+    apply_band(first_w, slope_w, _turned(for_slope, n_w), out)
+    apply_band(first_w, curve_w, _turned(for_curve, n_w), out)
+    return _turned(out, n_u).reshape(n_u, n_v, n_w)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _turned(field: Array, size: int) -> Array:
+    """Put the first axis of a field last; the result (size, ...) has its former second axis, of that size, first."""
+    return np.ascontiguousarray(field.T).reshape(size, field.size // size)
