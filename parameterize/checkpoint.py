@@ -20,6 +20,7 @@ from .files import save_bytes
 FORMAT = 7
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
+_DAMAGED = "remove this file to go on from what was kept before it, or start anew with --force"
 
 
 class CheckpointError(ValueError):
@@ -70,14 +71,14 @@ class Checkpoints:
                 # copies lie aligned in memory as in the first run; sums over tensors within the file round differently
                 tensors = {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118 - not a mapping
         except (SafetensorError, OSError, ValueError) as error:
-            raise CheckpointError(f"{path}: not a readable checkpoint ({error}); {_ANEW}") from None
+            raise CheckpointError(f"{path}: not a readable checkpoint ({error}); {_DAMAGED}") from None
         if header.get("format") != str(FORMAT):
             raise CheckpointError(
                 f"{path}: written by another version of iga-nn (format {header.get('format', 'unknown')}, "
                 f"this one reads {FORMAT}); {_ANEW}"
             )
         if header.pop("sha256", None) != _digest(tensors, header):
-            raise CheckpointError(f"{path}: not a readable checkpoint (damaged); {_ANEW}")
+            raise CheckpointError(f"{path}: not a readable checkpoint (damaged); {_DAMAGED}")
         differing = _differing(json.loads(self._identity), json.loads(header["identity"]))
         if differing:
             raise CheckpointError(f"{path}: belongs to another run ({', '.join(differing)} differ); {_ANEW}")

@@ -102,6 +102,19 @@ def test_interrupted_and_resumed_is_undisturbed(surface, undisturbed, tmp_path, 
     assert ("S(2)", 1) not in steps  # it did go on, not start again
 
 
+def test_without_a_damaged_checkpoint_the_run_goes_on_from_the_one_before(surface, undisturbed, tmp_path):
+    options, steps = {"seed": 3, "device": "cpu", "checkpoint_dir": tmp_path}, []
+    parameterize(surface, tiny_config(), **options)
+    damaged = tmp_path / "spline.safetensors"
+    damaged.write_bytes(b"nonsense")
+    with pytest.raises(CheckpointError, match=r"spline\.safetensors: not a readable checkpoint .*; remove this file"):
+        parameterize(surface, tiny_config(), resume=True, **options)
+    damaged.unlink()
+    resumed = parameterize(surface, tiny_config(), progress=lambda s: steps.append(s.stage), resume=True, **options)
+    same_result(undisturbed, resumed)
+    assert set(steps) == {"spline"}
+
+
 def test_a_refinement_interrupted_and_resumed_is_undisturbed(surface, tmp_path):
     config = tiny_config().refined(tolerance=1e-9, max_control_points=7)
     undisturbed = parameterize(surface, config, seed=3, device="cpu")
