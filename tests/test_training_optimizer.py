@@ -45,12 +45,12 @@ def test_steps_are_those_of_torchs_muon_but_for_its_rounding(shape):
     generator = torch.Generator().manual_seed(1)
     start = torch.randn(shape, generator=generator)
     ours, theirs = start.clone().requires_grad_(), start.clone().requires_grad_()
-    optimizers = Muon([ours], lr=0.1), torch.optim.Muon([theirs], lr=0.1, weight_decay=0.0)
+    muon, torchs = Muon([ours], lr=0.1), torch.optim.Muon([theirs], lr=0.1, weight_decay=0.0)
     for _ in range(3):
         ours.grad = torch.randn(shape, generator=generator)
         theirs.grad = ours.grad.clone()
-        for optimizer in optimizers:
-            optimizer.step()
+        muon.step(1.0)
+        torchs.step()
     moved = (theirs - start).detach()
     assert float((ours - theirs).detach().norm()) < 0.02 * float(moved.norm())
 

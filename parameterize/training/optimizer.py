@@ -38,7 +38,7 @@ class Muon:
         self.moments = [{"momentum_buffer": torch.zeros_like(matrix)} for matrix in matrices]
 
     @torch.no_grad()
-    def step(self, share: float = 1.0) -> None:
+    def step(self, share: float) -> None:
         """Take one step at a share of the rate."""
         pairs = list(zip(self.parameters, self.moments, strict=True))
         in_parallel(lambda pair: self._step(*pair, share * self._rate), pairs)
@@ -77,7 +77,7 @@ class Adam:
         ]
 
     @torch.no_grad()
-    def step(self, share: float = 1.0) -> None:
+    def step(self, share: float) -> None:
         """Take one step at a share of the rate."""
         steps, means, squares = ([row[name] for row in self.moments] for name in ("step", "exp_avg", "exp_avg_sq"))
         adam(
