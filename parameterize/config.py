@@ -144,6 +144,7 @@ class SplineConfig:
     stalling: int = 8  # rounds in which the unproved spans are not halved; they then end without a certified map
     far: float = 0.02  # from the surface, root mean square; the rounds then end without a certified map, too
     parting: int = 6  # rounds before the polish, while the boundary of a certified map meets itself, at most
+    parted: float = 0.01  # from the surface, root mean square; these rounds then end with a boundary that meets itself
     patient_rounds: int = 2  # after these the anchors let go, and the penalty grows at unproved spans
     span_growth: float = 5.0  # factor of the penalty's weight there, each round
     span_most: float = 125.0  # of these factors together

@@ -35,6 +35,7 @@ def growing(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
         coarse_rounds=rounds,
         usual_steps=(growth.steps,) * rounds + growth.usual_steps,
         far=max(spline.far, growth.far),
+        parted=max(spline.parted, growth.far),
         patient_rounds=growth.patient_rounds,
         firm_rounds=growth.firm_rounds,
     )

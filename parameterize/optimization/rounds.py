@@ -236,7 +236,7 @@ class _Rounds:
         """
         config = self.energy.config
         if self.certified:
-            return self.best.meets_itself and self.parting == config.parting
+            return self.best.meets_itself and (self.parting == config.parting or distance > config.parted**2)
         if self.number > self.halved + config.stalling:
             return True
         just_grown = self.number == len(self.shares) + 1
