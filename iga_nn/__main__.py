@@ -4,11 +4,13 @@ import signal
 import sys
 from types import FrameType
 
+PAUSE = 0.1  # seconds after which an interruption is tried again
+
 
 def run_and_exit() -> None:
     """Run the command line on the program's arguments."""
     try:
-        signal.signal(signal.SIGTERM, _interrupt)  # which clusters and `timeout` send
+        catch_signals()
         from .cli.commands import main
 
         code = main(sys.argv[1:])
@@ -18,7 +20,21 @@ def run_and_exit() -> None:
     sys.exit(code)
 
 
+def catch_signals() -> None:
+    """Let Ctrl-C, unless it is ignored, and SIGTERM, which clusters and `timeout` send, raise KeyboardInterrupt."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
+
+
 def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Interrupt; later, where LLVM has called Python while it compiles a kernel: what is raised there gets lost."""
+    while frame is not None:
+        if hasattr(signal, "setitimer") and frame.f_globals.get("__name__", "").startswith("llvmlite."):
+            signal.signal(signal.SIGALRM, _interrupt)
+            signal.setitimer(signal.ITIMER_REAL, PAUSE)
+            return
+        frame = frame.f_back
     raise KeyboardInterrupt
 
 

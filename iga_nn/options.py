@@ -5,11 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, fields
-from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 from .errors import InputError, input_errors
+from .kinds import Checked
 
 if TYPE_CHECKING:
     from parameterize.config import Config
@@ -27,7 +27,7 @@ _LOCAL = ("workers", "threads_per_worker", "memory_limit")  # mean nothing for t
 
 
 @dataclass(frozen=True, kw_only=True)
-class SurfaceOptions:
+class SurfaceOptions(Checked):
     """Say which surface is taken from a file.
 
     Attributes:
@@ -85,7 +85,6 @@ class MapOptions(SurfaceOptions):
         """Return the configuration of these options. Raises InputError for values that cannot be run."""
         from parameterize.config import preset
 
-        self._check_kinds()
         if self.seed < 0:
             raise InputError(f"seed {self.seed}: must not be negative")
         with input_errors():
@@ -99,20 +98,6 @@ class MapOptions(SurfaceOptions):
                     raise InputError(f"{name.replace('_', ' ')}: has a meaning with --control-points auto alone")
             return config.with_control_points(self.control_points)
 
-    def _check_kinds(self) -> None:
-        """Raise InputError for values of another kind, which the command line refuses before."""
-        counts = ["seed", "max_control_points", "max_faces"]
-        counts += ["control_points"] * (self.control_points != "auto") + ["component"] * (self.component is not None)
-        for names, kind, words in (
-            (counts, Integral, "a whole number"),
-            (["steps_factor", "tolerance"], Real, "a number"),
-        ):
-            for name in names:
-                if not isinstance(value := getattr(self, name), kind) or isinstance(value, bool):
-                    raise InputError(f"{name.replace('_', ' ')}: must be {words}, got {value!r:.80}")
-        if not isinstance(self.corners, str | Path | None):
-            raise InputError(f"corners: must be the path of a JSON file, got {self.corners!r:.80}")
-
     @property
     def most_control_points(self) -> int:
         """Return how many control points a direction may get."""
@@ -120,7 +105,7 @@ class MapOptions(SurfaceOptions):
 
 
 @dataclass(frozen=True)
-class ProblemOptions(ABC):
+class ProblemOptions(Checked, ABC):
     """Hold what every PDE of the command line is told: its exact solution, the meshes it is solved on, and how.
 
     A new PDE is a subclass with options of its own, entered in PROBLEMS.
@@ -262,7 +247,7 @@ PROBLEMS: dict[str, type[ProblemOptions]] = {kind.section: kind for kind in (Poi
 
 
 @dataclass(frozen=True)
-class StudyOptions:
+class StudyOptions(Checked):
     """Give an exact solution of Poisson's problem, and the trial spaces it is approximated in.
 
     Attributes:
@@ -312,12 +297,15 @@ class ElasticityStudyOptions(StudyOptions):
 
     def problem(self) -> Equation:
         """Return the problem of these options. Raises InputError."""
+        if given := [entry for entry in self.traction if "=" in entry]:
+            face = given[0].partition("=")[0]
+            raise InputError(f"traction {given[0]}: a study takes that of the exact displacement: write {face} alone")
         own = ElasticityOptions(self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio)
         return own.problem()
 
 
 @dataclass(frozen=True, kw_only=True)
-class WorkerOptions:
+class WorkerOptions(Checked):
     """Say which workers compute the surfaces of a batch.
 
     Attributes:
@@ -364,9 +352,9 @@ def _check_count(name: str, count: int, fewest: int) -> None:
 
 def check_space(refine: Sequence[int], degree: int | None) -> None:
     """Raise InputError for levels or a degree that cannot be run."""
-    if not isinstance(refine, Sequence) or not all(isinstance(level, Integral) for level in refine):
-        raise InputError(f"refine {refine!r:.80}: give a tuple of whole numbers such as (0, 1)")
-    if not refine or min(refine) < 0 or len(set(refine)) != len(refine):
+    if not refine:
+        raise InputError("refine is empty: give one or more levels, such as 0 1")
+    if min(refine) < 0 or len(set(refine)) != len(refine):
         raise InputError(f"refine {refine}: give distinct levels, 0 or larger")
     _check_level(max(refine))
     from solve.discretization.space import MOST_DEGREE
@@ -398,6 +386,8 @@ def _range(text: str) -> list[int]:
     if not (first.isdecimal() and (last.isdecimal() or not dots)):
         raise InputError(f"refine {text!r}: write levels such as 0 1 2, or a range such as 0..2")
     _check_level(int(last or first))  # before the list is made
+    if int(last or first) < int(first):
+        raise InputError(f"refine {text!r}: the range ends before it begins; write {last}..{first}")
     return list(range(int(first), int(last or first) + 1))
 
 

@@ -5,6 +5,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -58,10 +59,10 @@ class SolverOptions:
     strict: bool = False
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.tolerance < 1.0:
-            raise ValueError(f"tolerance must lie between 0 and 1, got {self.tolerance}")
-        if self.max_iterations < 1:
-            raise ValueError(f"max_iterations must be at least 1, got {self.max_iterations}")
+        if not (isinstance(self.tolerance, Real) and 0.0 < self.tolerance < 1.0):
+            raise ValueError(f"tolerance must be a number between 0 and 1, got {self.tolerance!r:.80}")
+        if not (isinstance(self.max_iterations, Integral) and self.max_iterations >= 1):
+            raise ValueError(f"max_iterations must be a whole number, at least 1, got {self.max_iterations!r:.80}")
 
 
 def check_device(device: str, problem: BoundaryValueProblem) -> None:

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-import torch._dynamo  # Adam would load it in every process
 from mesh_files import obj
 from small_run import FEW, small_surface, tiny_config
 

@@ -5,7 +5,15 @@ from dataclasses import fields, replace
 import pytest
 
 from iga_nn.errors import InputError
-from iga_nn.options import PROBLEMS, ElasticityOptions, MapOptions, PoissonOptions
+from iga_nn.options import (
+    PROBLEMS,
+    ElasticityOptions,
+    ElasticityStudyOptions,
+    MapOptions,
+    PoissonOptions,
+    StudyOptions,
+    WorkerOptions,
+)
 
 SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss"}
 SCALAR = dict.fromkeys(("exact", "source", "boundary", "kappa", "reaction"), "1")
@@ -52,15 +60,46 @@ def test_auto_takes_its_limits_to_the_map():
         ({"control_points": "auto", "max_control_points": 101}, "max control points 101: at least 30, at most 100"),
         ({"control_points": 3}, "control points 3: at least 4, at most 100"),
         ({"tolerance": 1e-3}, "tolerance: has a meaning with --control-points auto alone"),
-        ({"control_points": "many"}, "control points: must be a whole number, got 'many'"),
+        ({"control_points": "many"}, "control points: must be a whole number or 'auto', got 'many'"),
         ({"seed": True}, "seed: must be a whole number, got True"),
         ({"steps_factor": None}, "steps factor: must be a number, got None"),
-        ({"component": "x"}, "component: must be a whole number, got 'x'"),
+        ({"component": "x"}, "component: must be a whole number or None, got 'x'"),
         ({"max_faces": "x"}, "max faces: must be a whole number, got 'x'"),
-        ({"corners": [1, 2]}, "corners: must be the path of a JSON file, got .1, 2."),
+        ({"corners": [1, 2]}, "corners: must be a path or None, got .1, 2."),
         ({"max_control_points": 40}, "max control points: has a meaning with --control-points auto alone"),
     ],
 )
 def test_limits_that_cannot_be_run_are_refused(given, says):
     with pytest.raises(InputError, match=says):
         MapOptions(**given).config()
+
+
+@pytest.mark.parametrize(
+    ("made", "says"),
+    [
+        (lambda: PoissonOptions(neumann={"u1": "0"}), "neumann: must be a tuple, each entry a string, got {'u1': '0'}"),
+        (lambda: PoissonOptions(quadrature="foo"), "quadrature: must be 'spline' or 'gauss' or 'gauss.1', got 'foo'"),
+        (lambda: PoissonOptions(refine=1), "refine: must be a tuple, each entry a whole number, got 1"),
+        (lambda: ElasticityOptions(young="1"), "young: must be a number, got '1'"),
+        (lambda: MapOptions(resume="yes"), "resume: must be True or False, got 'yes'"),
+        (lambda: WorkerOptions(workers=1.5), "workers: must be a whole number, got 1.5"),
+    ],
+)
+def test_a_value_of_another_kind_is_refused_where_the_options_are_made(made, says):
+    with pytest.raises(InputError, match=says):
+        made()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (StudyOptions(refine=("3..1",)), "refine '3..1': the range ends before it begins; write 1..3"),
+        (PoissonOptions(refine=()), "refine is empty: give one or more levels"),
+        (ElasticityStudyOptions("x;y;z", traction=("u1=0;0;0",)), "traction u1=0;0;0: a study takes that of the exact"),
+        (ElasticityOptions("x;y;z", young=1e300), "young must be a positive number from 1e-100 to 1e.100, got 1e.300"),
+    ],
+)
+def test_problems_that_cannot_be_run_are_refused(options, says):
+    with pytest.raises(InputError, match=says):
+        options.levels() if isinstance(options, StudyOptions) else None
+        options.problem()

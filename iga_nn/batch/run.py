@@ -10,6 +10,7 @@ from threading import RLock
 from parameterize.files import save_text
 
 from ..errors import InputError, expected_errors, one_line
+from ..kinds import check_kind
 from ..options import MapOptions, PoissonOptions, WorkerOptions
 from ..report import document as reports
 from ..workflow import pipeline
@@ -97,15 +98,23 @@ def run_batch(
     >>> len(batch.rows), batch.rows[0].report == outcome.report
     (1, True)
     """
-    mapping, options = mapping or MapOptions(), poisson or PoissonOptions()
+    mapping, options, workers = mapping or MapOptions(), poisson or PoissonOptions(), workers or WorkerOptions()
+    for name, value, kind in (
+        ("surfaces", surfaces, tuple[str | Path, ...]),
+        ("out", out, str | Path),
+        ("mapping", mapping, MapOptions),
+        ("poisson", options, PoissonOptions),
+        ("workers", workers, WorkerOptions),
+    ):
+        check_kind(name, value, kind)
     pipeline.checked(mapping, options)
     if out == "":
         raise InputError("out is empty: name a folder")
-    corners = None if mapping.corners is None else mapping.corners.absolute()
+    corners = None if mapping.corners is None else Path(mapping.corners).absolute()
     common = replace(mapping, corners=corners, resume=True)
     entries = entries_of([str(surface) for surface in surfaces], Path(out))
     tasks = [Task(entry.name, entry.mesh, entry.folder, common, options, vector) for entry in entries]
-    return run_tasks(Path(out), tasks, workers or WorkerOptions(), force=force, progress=progress)
+    return run_tasks(Path(out), tasks, workers, force=force, progress=progress)
 
 
 def run_tasks(

@@ -6,6 +6,7 @@ A command imports what it runs when it runs: `--help` and `--version` load neith
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -14,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
-from cyclopts import App, CycloptsError, Parameter, Token, convert
+from cyclopts import App, CycloptsError, Parameter, Token, UnusedCliTokensError, convert
 
 from ..errors import InputError, expected_errors, input_errors, one_line
 from ..options import (
@@ -34,6 +35,9 @@ from .progress import shown_batch, shown_progress
 
 if TYPE_CHECKING:
     from ..workflow.output_folder import Outcome
+
+# A suggestion that begins with another letter than the unknown option: --force, for --source, replaces results.
+_FAR_HINT = re.compile(r"(Unknown option: \W*(\w).*?) Did you mean --(?!\2).*")
 
 
 def _converted(kind: Any, tokens: Sequence[Token]) -> Any:
@@ -349,10 +353,18 @@ def main(argv: list[str]) -> int:
         print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
     except expected_errors() + (CycloptsError,) as error:
-        hint = _minus_hint(argv) if isinstance(error, CycloptsError) else ""
-        print(f"iga-nn: {one_line(error)}{hint}", file=sys.stderr)
+        print(f"iga-nn: {_refusal(error, argv)}", file=sys.stderr)
         return BAD_INPUT
     return code if isinstance(code, int) else DONE  # a command that only writes a file returns nothing
+
+
+def _refusal(error: Exception, argv: list[str]) -> str:
+    """Return what is wrong and what to do, in one line."""
+    if isinstance(error, UnusedCliTokensError):
+        return f"arguments that mean nothing here: {' '.join(error.unused_tokens or ())}; --help lists what there is"
+    if isinstance(error, CycloptsError):
+        return _FAR_HINT.sub(r"\1 --help lists the options.", one_line(error)) + _minus_hint(argv)
+    return one_line(error)
 
 
 def _processes(argv: list[str]) -> AbstractContextManager[None]:

@@ -21,6 +21,7 @@ from solve.discretization.space import TrialSpace, longest_edge
 from solve.field import SplineField
 
 from ..errors import InputError, input_errors
+from ..kinds import check_kind
 from ..new_file import check_new
 from ..options import PROBLEMS, Equation
 from ..report import document as reports
@@ -91,6 +92,7 @@ def load_volume(path: str | Path) -> BSplineVolume:
     >>> iga_nn.load_volume("volume.npz").degrees
     (3, 3, 3)
     """
+    check_kind("path", path, str | Path)
     source = Path(path)
     if source.is_dir():
         raise InputError(f"{source}: is a folder: name the volume.npz in it")
@@ -141,6 +143,8 @@ def export(
     >>> iga_nn.export("volume.npz", "view", "seen.vtu").name
     'seen.vtu'
     """
+    for name, value, kind in (("volume", volume, str | Path), ("to", to, str), ("out", out, str | Path | None)):
+        check_kind(name, value, kind)
     if to not in FORMATS:
         raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines")
     chosen = FORMATS[to]

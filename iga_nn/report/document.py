@@ -59,12 +59,14 @@ def write(folder: Path, report: Mapping[str, Any]) -> None:
 
 
 def read(folder: Path) -> Report | None:
-    """Return the report in a folder, None where there is none of this schema."""
+    """Return the report in a folder, None where there is none of this schema or it is damaged."""
     try:
         report = json.loads((folder / REPORT).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        if report["schema"] == SCHEMA and is_finished(report):
+            verdict(report, folder)  # which reads what is asked of it later
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return None
-    return report if isinstance(report, dict) and report.get("schema") == SCHEMA else None
+    return report if report["schema"] == SCHEMA else None
 
 
 def is_finished(report: Report | None) -> bool:

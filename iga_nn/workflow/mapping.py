@@ -100,10 +100,10 @@ def _prepare(
     if equation is not None:
         _check_data(equation, surface)
     is_resumed = options.resume and has_checkpoint(state.folder)
-    if options.resume and not is_resumed:
-        log.info("no checkpoint, starting anew")
     if not is_resumed:
         state.begin("map", "solution")
+    if options.resume and not is_resumed:
+        log.info("no checkpoint, starting anew")
     with state.timed("load"):
         expected = forecast(surface, config, device=device, unknowns=unknowns)
     log.info("estimate: %s", expected)

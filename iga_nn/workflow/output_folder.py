@@ -88,6 +88,8 @@ class RunFolder:
         kept = [target.name for target in targets if target.exists()]
         if self.guarded and kept:
             what = f"{REPORT} is damaged" if REPORT in kept else f"holds {kept[0]} without a report of its run"
+            if {REPORT, "volume.npz"} <= set(kept):
+                what += f"; `iga-nn solve poisson {self.folder / 'volume.npz'}` solves on its volume"
             raise InputError(f"{self.folder}: {what}; --force replaces the files there, --out names another folder")
         for target in targets:
             for old in (target, *unfinished(target)):

@@ -20,6 +20,7 @@ from solve.discretization.space import agreed
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
+from ..kinds import check_kind
 from ..levels import as_csv, as_table, rows_of
 from ..options import PROBLEMS, Equation, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
 from ..report import document as reports
@@ -91,9 +92,7 @@ def run(
     if problem not in PROBLEMS:
         raise InputError(f"problem {problem!r}: choose one of {', '.join(PROBLEMS)}")
     mapping, options = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
-    for name, value, kind in (("mapping", mapping, MapOptions), (problem, options, PROBLEMS[problem])):
-        if not isinstance(value, kind):
-            raise InputError(f"{name} must be {kind.__name__}(...), got {value!r:.80}")
+    check_kind(problem, options, PROBLEMS[problem])
     if others := [name for name, value in given.items() if value is not None]:
         raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
     return parameterize_to(mesh, out, mapping=mapping, problem=options, force=force, vector=vector, progress=progress)
@@ -111,6 +110,9 @@ def parameterize_to(
 ) -> Outcome:
     """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does."""
     mapping = mapping or MapOptions()
+    check_kind("mapping", mapping, MapOptions)
+    check_kind("mesh", mesh, str | Path)
+    check_kind("out", out, str | Path | None)
     equation, unknowns = (None, 0) if problem is None else checked(mapping, problem)
     command = _command(mesh, out, mapping, problem)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
@@ -165,6 +167,7 @@ def solve_to(
     call this and share the solve; the first one writes, the others get None. Takes the other options of `run`, and
     raises as it does.
     """
+    check_kind("volume", volume, str | Path)
     options, path = problem or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
@@ -207,6 +210,7 @@ def study_to(
 
     Takes the other options of `run`, and raises as it does.
     """
+    check_kind("volume", volume, str | Path)
     options, path = options or StudyOptions(), Path(volume)
     equation, levels = options.problem(), options.levels()
     loaded = load_volume(path)

@@ -7,6 +7,7 @@ scipy.interpolate is slow to load: it is imported where it is used.
 
 from collections import Counter
 from collections.abc import Sequence
+from numbers import Integral
 
 import numba
 import numpy as np
@@ -24,8 +25,8 @@ def open_uniform_knots(n_control_points: int, degree: int) -> Array:
     The paper calls these knots "quasi-uniform" (section 3.1).
     Raises ValueError when there are too few control points for the degree.
     """
-    if degree < 1:
-        raise ValueError(f"degree must be at least 1, got {degree}")
+    if not isinstance(degree, Integral) or degree < 1:
+        raise ValueError(f"degree must be a whole number, at least 1, got {degree!r:.80}")
     if n_control_points <= degree:
         raise ValueError(f"degree {degree} needs at least {degree + 1} control points, got {n_control_points}")
     breaks = np.linspace(0.0, 1.0, n_control_points - degree + 1)

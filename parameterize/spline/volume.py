@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,8 +103,10 @@ class BSplineVolume(Brief, Shown):
     control_points: Array
 
     def __post_init__(self) -> None:
-        if len(self.degrees) != 3 or len(self.knots) != 3:
-            raise ValueError("a volume has three degrees and three knot vectors")
+        if not all(isinstance(part, Sequence | np.ndarray) and len(part) == 3 for part in (self.degrees, self.knots)):
+            raise ValueError("a volume has three degrees, then three knot vectors, then its control points")
+        if not all(isinstance(degree, Integral) for degree in self.degrees):
+            raise ValueError(f"degrees must be whole numbers, got {self.degrees!r:.80}")
         points = real_array(self.control_points, "control_points")
         if points.ndim != 4 or points.shape[3] != 3:
             raise ValueError(f"control_points must have shape (n_u, n_v, n_w, 3), got {points.shape}")

@@ -1,5 +1,7 @@
 """The error that refuses a surface, and the checks that files and arrays share."""
 
+from numbers import Integral
+
 import numpy as np
 
 from ..arrays import Array, IntArray
@@ -22,7 +24,9 @@ class MeshError(ValueError):
 
 
 def check_face_count(count: int, max_faces: int) -> None:
-    """Raise MeshError where a surface has more faces than allowed."""
+    """Raise MeshError where a surface has more faces than allowed, and for a limit that no closed surface meets."""
+    if not isinstance(max_faces, Integral) or max_faces < 4:
+        raise MeshError(f"max_faces must be a whole number, at least 4, got {max_faces!r:.80}")
     if count > max_faces:
         raise MeshError(
             f"{count} faces, more than max_faces={max_faces}: raise --max-faces, or bring them down with --decimate"

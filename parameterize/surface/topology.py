@@ -4,6 +4,7 @@ Positions in messages are the user's: the caller passes `where`, which turns a v
 """
 
 from collections.abc import Callable
+from numbers import Integral
 
 import igl
 import numpy as np
@@ -27,6 +28,8 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
     sizes = ", ".join(f"{i}: {len(group)} faces" for i, group in enumerate(groups[:LISTED]))
     sizes += f", and {len(groups) - LISTED} more" if len(groups) > LISTED else ""
     if component is not None:
+        if not isinstance(component, Integral):
+            raise MeshError(f"component must be a whole number, counted from 0, got {component!r:.80}")
         if not 0 <= component < len(groups):
             raise MeshError(f"component {component} does not exist: there are {len(groups)}, counted from 0 ({sizes})")
         notice = [f"component {component} taken of {len(groups)} ({sizes})"] if len(groups) > 1 else []

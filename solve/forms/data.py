@@ -53,7 +53,8 @@ class Datum:
     def __call__(self, x: Array) -> Array:
         """Return values (c, ...) at points (3, ...).
 
-        Raises ExpressionError where they are not finite, ValueError where a function returns another shape or kind.
+        Raises ExpressionError where they are not finite, ValueError where a function fails or returns another shape or
+        kind.
         """
         each = x.shape[1:] if len(self.entries) == self.components else (self.components, *x.shape[1:])
         parts = []
@@ -61,7 +62,7 @@ class Datum:
             if isinstance(entry, Expression):
                 found = entry(*np.asarray(x))
             else:
-                found = np.asarray(entry.at(x) if isinstance(entry, SplineField) else entry(x))
+                found = np.asarray(entry.at(x) if isinstance(entry, SplineField) else self._called(entry, x))
                 if found.dtype.kind not in "iuf":
                     raise ValueError(f"{self.name} must return real numbers, got {found.dtype}")
             found = found[0] if found.shape == (1, *each) else found  # one component, written as (c, ...)
@@ -72,6 +73,13 @@ class Datum:
                 raise ValueError(message) from None
             parts.append(finite(self.name, found, x, entry))
         return np.stack(parts).reshape(self.components, *x.shape[1:])
+
+    def _called(self, function: Callable[[Array], ArrayLike], x: Array) -> ArrayLike:
+        """Return what a user's function returns; ValueError where it fails names the datum."""
+        try:
+            return function(x)
+        except Exception as error:
+            raise ValueError(f"{self.name} fails: {type(error).__name__}: {error}") from error
 
 
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:

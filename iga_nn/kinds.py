@@ -1,0 +1,61 @@
+"""Checks the values of a dataclass against its annotations: Python does not, and the command line does it itself."""
+
+from dataclasses import dataclass, fields
+from numbers import Integral, Real
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from .errors import InputError
+
+_KINDS: dict[Any, tuple[tuple[type, ...], str]] = {
+    int: ((Integral,), "a whole number"),
+    float: ((Real,), "a number"),
+    bool: ((bool,), "True or False"),
+    str: ((str,), "a string"),
+    Path: ((str, Path), "a path"),
+    NoneType: ((NoneType,), "None"),
+}
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A base of dataclasses whose values are of the kinds that they are annotated with. Raises InputError."""
+
+    def __post_init__(self) -> None:
+        """Refuse the first field whose value is of another kind."""
+        hints = get_type_hints(type(self))
+        for field in fields(self):
+            check_kind(field.name.replace("_", " "), getattr(self, field.name), hints[field.name])
+
+
+def check_kind(name: str, value: Any, hint: Any) -> None:
+    """Raise InputError for a value that is not of the kind that an annotation names."""
+    if not _fits(value, hint):
+        raise InputError(f"{name}: must be {_in_words(hint)}, got {value!r:.80}")
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    if get_origin(hint) in (Union, UnionType):
+        return any(_fits(value, kind) for kind in get_args(hint))
+    if get_origin(hint) is Literal:
+        return isinstance(value, str) and value in get_args(hint)
+    if get_origin(hint) is tuple:
+        return isinstance(value, tuple | list) and all(_fits(item, get_args(hint)[0]) for item in value)
+    kinds, _ = _known(hint)
+    return isinstance(value, kinds) and (hint is bool or not isinstance(value, bool))
+
+
+def _in_words(hint: Any) -> str:
+    if get_origin(hint) in (Union, UnionType):
+        return " or ".join(map(_in_words, get_args(hint)))
+    if get_origin(hint) is Literal:
+        return " or ".join(map(repr, get_args(hint)))
+    if get_origin(hint) is tuple:
+        return f"a tuple, each entry {_in_words(get_args(hint)[0])}"
+    return _known(hint)[1]
+
+
+def _known(hint: Any) -> tuple[tuple[type, ...], str]:
+    """Return the classes that an annotation allows, and how a message names them."""
+    return _KINDS.get(hint) or ((hint,), f"{hint.__name__}(...)")
