@@ -139,7 +139,12 @@ class System:
         return self._linear(self._precondition)
 
     def field(self, x: Array) -> SplineField:
-        """Return the spline of the free coefficients x (N,) and of those that are fixed."""
+        """Return the spline of the free coefficients x (N,) and of those that are fixed.
+
+        Raises ValueError for another number of them.
+        """
+        if np.size(x) != self.right.size:
+            raise ValueError(f"x must have {self.right.size} entries, the free coefficients, got {np.size(x)}")
         return self._spline(self._filled(np.reshape(x, self.right.shape)))
 
     def _filled(self, free: Array) -> Array:

@@ -6,9 +6,12 @@ import socket
 import sys
 from pathlib import Path
 
+import pytest
+
 import iga_nn.batch
 from iga_nn.batch import cluster
 from iga_nn.cli.commands import main
+from iga_nn.errors import InputError
 from iga_nn.workflow.output_folder import locked
 
 
@@ -18,6 +21,21 @@ def refused(capsys, *arguments, out=("--out", "out")):
     assert not said.out and "Traceback" not in said.err
     (line,) = [line for line in said.err.splitlines() if line.startswith("iga-nn: ")]
     return line
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"surfaces": "cube"}, "surfaces: must be a tuple, each entry a string or a path, got 'cube'"),
+        ({"surfaces": [3]}, "surfaces: must be a tuple, each entry a string or a path"),
+        ({"out": None}, "out: must be a string or a path, got None"),
+        ({"mapping": 3}, r"mapping: must be MapOptions\(...\), got 3"),
+        ({"workers": 3}, r"workers: must be WorkerOptions\(...\), got 3"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(in_folder, given, says):
+    with pytest.raises(InputError, match=says):
+        iga_nn.run_batch(**{"surfaces": ["cube"], "out": "out"} | given)
 
 
 def test_bad_options_are_one_line_and_cost_nothing(in_folder, capsys):

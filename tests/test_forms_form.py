@@ -278,6 +278,11 @@ def test_data_that_are_no_real_numbers_are_refused(source):
         iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(source=source))
 
 
+def test_a_function_that_fails_is_named():
+    with pytest.raises(ValueError, match="source fails: ZeroDivisionError: division by zero"):
+        iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(source=lambda x, y, z: 1 / 0))
+
+
 def test_a_study_of_one_level_is_refused():
     with pytest.raises(ValueError, match=r"refine must be levels such as range\(3\), got 1"):
         iga_nn.convergence(benchmark_volume(2), iga_nn.Poisson(), refine=1)

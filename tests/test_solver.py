@@ -271,6 +271,19 @@ def test_a_quadrature_that_is_unknown_is_refused():
         solve_problem(benchmark_volume(2), Poisson(), quadrature="newton")
 
 
+@pytest.mark.parametrize(
+    ("how", "says"),
+    [
+        ({"tolerance": "x"}, "tolerance must be a number between 0 and 1, got 'x'"),
+        ({"tolerance": 1.0}, "tolerance must be a number between 0 and 1, got 1.0"),
+        ({"max_iterations": 2.5}, "max_iterations must be a whole number, at least 1, got 2.5"),
+    ],
+)
+def test_limits_of_another_kind_are_refused(how, says):
+    with pytest.raises(ValueError, match=says):
+        solve_problem(benchmark_volume(2), Poisson(), **how)
+
+
 def test_bytes_are_no_datum():
     with pytest.raises(ValueError, match="source must be a number, a formula"):
         Poisson(source=b"1", boundary=0)

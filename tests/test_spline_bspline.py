@@ -33,7 +33,7 @@ def test_open_uniform_knots():
     assert len(open_uniform_knots(30, 3)) == 34 and len(breakpoints(open_uniform_knots(30, 3))) == 28
 
 
-@pytest.mark.parametrize(("n", "degree"), [(3, 3), (5, 0), (1, 1)])
+@pytest.mark.parametrize(("n", "degree"), [(3, 3), (5, 0), (1, 1), (5, 2.0), (5, "3"), (5, None)])
 def test_open_uniform_knots_needs_enough_control_points(n, degree):
     with pytest.raises(ValueError, match="degree"):
         open_uniform_knots(n, degree)

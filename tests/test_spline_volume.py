@@ -9,6 +9,9 @@ from parameterize.spline.volume import BSplineVolume
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
 
 
+CUBIC = [0, 0, 0, 0, 1, 1, 1, 1]
+
+
 def make_volume(seed=0, degrees=(3, 2, 1), shape=(6, 5, 4)):
     knots = tuple(open_uniform_knots(n, p) for n, p in zip(shape, degrees, strict=True))
     rows = [greville(k, p) for k, p in zip(knots, degrees, strict=True)]
@@ -50,7 +53,7 @@ def test_jacobian_and_hessian_agree_with_differences():
 def test_points_outside_of_the_cube_are_refused():
     volume = make_volume()
     assert np.isfinite(volume([[1.0 + 1e-12, 0.0, 0.5]])).all()
-    for outside in ([1.5, 0.0, 0.0], [0.0, -1e-6, 0.0]):
+    for outside in ([1.5, 0.0, 0.0], [0.0, -1e-6, 0.0], [0.5, np.nan, 0.5]):
         with pytest.raises(ValueError, match="points are parameters from 0 to 1"):
             volume([[0.5, 0.5, 0.5], outside])
 
@@ -203,3 +206,17 @@ def test_a_smooth_function_is_met_with_the_order_of_the_degree():
 def test_a_function_that_is_no_volume_is_refused(function, how, says):
     with pytest.raises(ValueError, match=says):
         BSplineVolume.from_function(function, **how)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "knots", "says"),
+    [
+        (3, (CUBIC,) * 3, "three degrees, then three knot vectors, then its control points"),
+        ((3, 3, 3), None, "three degrees, then three knot vectors, then its control points"),
+        ((3.5, 3, 3), (CUBIC,) * 3, r"degrees must be whole numbers, got \(3.5, 3, 3\)"),
+        (("3", 3, 3), (CUBIC,) * 3, "degrees must be whole numbers"),
+    ],
+)
+def test_degrees_and_knots_of_another_kind_are_refused(degrees, knots, says):
+    with pytest.raises(ValueError, match=says):
+        BSplineVolume(degrees, knots, np.zeros((4, 4, 4, 3)))

@@ -439,6 +439,19 @@ def test_a_path_that_is_none_is_refused_with_the_remedy():
         load_surface(None)
 
 
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"max_faces": "9"}, "max_faces must be a whole number, at least 4, got '9'"),
+        ({"max_faces": float("nan")}, "max_faces must be a whole number, at least 4, got nan"),
+        ({"component": "0"}, "component must be a whole number, counted from 0, got '0'"),
+    ],
+)
+def test_limits_of_another_kind_are_refused(given, says):
+    with pytest.raises(MeshError, match=says):
+        load_surface(trimesh.creation.icosphere(1), **given)
+
+
 def test_what_is_no_regular_file_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "pipe.obj")
     with pytest.raises(MeshError, match="no regular file"):

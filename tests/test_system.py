@@ -22,6 +22,12 @@ def test_a_cg_of_ones_own_finds_the_same_solution(problem):
     assert np.allclose(found.coefficients, system.solve(tolerance=1e-12).coefficients, atol=1e-9)
 
 
+def test_free_coefficients_of_another_number_are_refused():
+    system = iga_nn.discretize(benchmark_volume(4), ROBIN)
+    with pytest.raises(ValueError, match=f"x must have {len(system.load)} entries, the free coefficients, got 2"):
+        system.field([1.0, 2.0])
+
+
 def test_operators_are_symmetric_and_the_mass_integrates():
     """1 is in the space where all faces are free: its mass is the volume of the map."""
     volume = benchmark_volume(3, degree=2)

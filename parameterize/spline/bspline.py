@@ -211,7 +211,7 @@ def evaluate_at(
     where = np.atleast_2d(np.asarray(points, dtype=np.float64))
     if where.ndim != 2 or where.shape[1] != 3:
         raise ValueError(f"points must have shape (m, 3), got {where.shape}")
-    if np.any(outside := (np.abs(where - 0.5) > 0.5 + _ROUNDING).any(axis=1)):
+    if np.any(outside := ~(np.abs(where - 0.5) <= 0.5 + _ROUNDING).all(axis=1)):  # NaN included
         raise ValueError(f"points are parameters from 0 to 1, got {where[outside][0].tolist()}")
     spline = NdBSpline(tuple(knots), coefficients, tuple(degrees))
     return np.asarray(spline(where, nu=tuple(derivative)))
