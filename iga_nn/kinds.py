@@ -52,7 +52,7 @@ def _in_words(hint: Any) -> str:
     if get_origin(hint) is Literal:
         return " or ".join(map(repr, get_args(hint)))
     if get_origin(hint) is tuple:
-        return f"a tuple, each entry {_in_words(get_args(hint)[0])}"
+        return f"a tuple or a list, each entry {_in_words(get_args(hint)[0])}"
     return _known(hint)[1]
 
 

@@ -26,8 +26,8 @@ def refused(capsys, *arguments, out=("--out", "out")):
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"surfaces": "cube"}, "surfaces: must be a tuple, each entry a string or a path, got 'cube'"),
-        ({"surfaces": [3]}, "surfaces: must be a tuple, each entry a string or a path"),
+        ({"surfaces": "cube"}, "surfaces: must be a tuple or a list, each entry a string or a path, got 'cube'"),
+        ({"surfaces": [3]}, "surfaces: must be a tuple or a list, each entry a string or a path"),
         ({"out": None}, "out: must be a string or a path, got None"),
         ({"mapping": 3}, r"mapping: must be MapOptions\(...\), got 3"),
         ({"workers": 3}, r"workers: must be WorkerOptions\(...\), got 3"),

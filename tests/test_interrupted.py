@@ -12,7 +12,6 @@ import numba
 from numba.core.codegen import CPUCodeLibrary
 from iga_nn.__main__ import catch_signals
 
-
 signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored where the tests are started
 catch_signals()
 compiled = CPUCodeLibrary._object_compiled_hook

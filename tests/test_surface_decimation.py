@@ -39,7 +39,7 @@ def test_notices_and_the_file_stay_and_lengths_are_the_users():
 
 
 def test_too_few_faces_are_refused():
-    with pytest.raises(MeshError, match="raise --max-faces"):
+    with pytest.raises(MeshError, match="max_faces must be a whole number, at least 4"):
         decimate(sample("bean"), 3)
 
 

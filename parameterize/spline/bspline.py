@@ -23,7 +23,7 @@ def open_uniform_knots(n_control_points: int, degree: int) -> Array:
     """Return the open knot vector on [0, 1] with equal spans, shape (n_control_points + degree + 1,).
 
     The paper calls these knots "quasi-uniform" (section 3.1).
-    Raises ValueError when there are too few control points for the degree.
+    Raises ValueError for a degree that is no whole number or below 1, and for too few control points.
     """
     if not isinstance(degree, Integral) or degree < 1:
         raise ValueError(f"degree must be a whole number, at least 1, got {degree!r:.80}")
@@ -173,9 +173,14 @@ def divided_spans(knots: Array, parts: int) -> Array:
 
 
 def midpoints(knots: Array) -> Array:
-    """Return the middle of every span: inserting them halves all spans."""
+    """Return the middle of every span."""
     breaks = breakpoints(knots)
     return (breaks[:-1] + breaks[1:]) / 2.0
+
+
+def halved(knots: Array) -> Array:
+    """Return the knot vector in which every span is halved."""
+    return np.sort(np.concatenate([knots, midpoints(knots)]))
 
 
 def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import igl
 import numpy as np
 
-from .errors import MeshError
+from .errors import MeshError, check_face_limit
 from .surface import Surface, surface_from_arrays
 
 
@@ -15,12 +15,11 @@ def decimate(surface: Surface, max_faces: int) -> Surface:
     Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), none that makes triangles intersect. A
     notice says the counts and the largest distance moved; `sha256` is that of the new arrays.
     """
+    check_face_limit(max_faces)
     before = len(surface.faces)
     if before <= max_faces:
         return surface
     name = surface.source or surface.name
-    if max_faces < 4:
-        raise MeshError(f"{name}: max_faces={max_faces}, a closed surface needs at least 4: raise --max-faces")
     unit = np.asfortranarray(surface.unit_vertices)
     vertices, faces, *_ = igl.qslim(unit, surface.faces, max_faces, block_intersections=True)
     if len(faces) > max_faces:

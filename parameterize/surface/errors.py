@@ -25,12 +25,17 @@ class MeshError(ValueError):
 
 def check_face_count(count: int, max_faces: int) -> None:
     """Raise MeshError where a surface has more faces than allowed, and for a limit that no closed surface meets."""
-    if not isinstance(max_faces, Integral) or max_faces < 4:
-        raise MeshError(f"max_faces must be a whole number, at least 4, got {max_faces!r:.80}")
+    check_face_limit(max_faces)
     if count > max_faces:
         raise MeshError(
             f"{count} faces, more than max_faces={max_faces}: raise --max-faces, or bring them down with --decimate"
         )
+
+
+def check_face_limit(max_faces: int) -> None:
+    """Raise MeshError for a limit that no closed surface meets, or that is no whole number."""
+    if not isinstance(max_faces, Integral) or max_faces < 4:
+        raise MeshError(f"max_faces must be a whole number, at least 4, got {max_faces!r:.80}")
 
 
 def check_finite(vertices: Array) -> None:

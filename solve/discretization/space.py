@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray, Knots
-from parameterize.spline.bspline import apply_along, breakpoints, find_spans, insertion_into, midpoints
+from parameterize.spline.bspline import apply_along, breakpoints, find_spans, halved, insertion_into
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 log = logging.getLogger(__name__)
@@ -324,7 +324,7 @@ def trial_space(
     degrees = volume.degrees if degree is None else (degree,) * 3
     rows = list(map(same_smoothness, volume.knots, volume.degrees, degrees))
     for _ in range(refine):
-        rows = [np.sort(np.append(row, midpoints(row))) for row in rows]
+        rows = list(map(halved, rows))
     return TrialSpace(degrees, (rows[0], rows[1], rows[2]), dirichlet)
 
 
