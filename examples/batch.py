@@ -19,7 +19,7 @@ from iga_nn.batch.table import Row
 
 TITLES = {
     "arap_mean": "ARAP, unit volume",
-    "boundary_rms": "boundary distance, unit volume",
+    "distance_rms": "distance to the surface over the diagonal, rms",
     "l2_relative": "relative L2 error",
 }
 

@@ -122,7 +122,7 @@ def _document(results: dict[str, Result], options: argparse.Namespace) -> str:
         f"# Validation (iga-nn {iga_nn.__version__}, preset {options.preset}{short})",
         _table(
             "Table 3: quality, at the scale the models came in",
-            ("model", "", "ARAP mean", "ARAP max", "boundary rms", "certified"),
+            ("model", "", "ARAP mean", "ARAP max", "boundary rms at vertices", "certified"),
             [row for name, result in results.items() for row in _quality_rows(name, result)],
         ),
         _table(

@@ -61,8 +61,8 @@ class MapOptions(SurfaceOptions):
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
         resume: continue from the checkpoint in the output folder.
         steps_factor: multiply the steps of every stage by this factor; a small one gives a quick look.
-        tolerance: of control_points "auto": root mean square distance at the surface's vertices over the diagonal of
-            its bounding box.
+        tolerance: of control_points "auto": root mean square distance between surface and spline, taken both ways, over
+            the diagonal of the surface's bounding box.
         max_control_points: of control_points "auto": at most so many per direction.
 
     Examples:

@@ -56,7 +56,10 @@ class Task:
     @cached_property
     def mesh(self) -> tuple[Array, IntArray]:
         """Vertices (n, 3) and faces (m, 3) at volume 1, long edges cut."""
-        return subdivide_finely(self.surface.unit_vertices, self.surface.faces, self.own, self.config.spline)
+        spline = self.config.spline
+        return subdivide_finely(
+            self.surface.unit_vertices, self.surface.faces, spline.longest_edge, self.own + spline.most_points
+        )
 
     @cached_property
     def sphere(self) -> Layout:

@@ -173,12 +173,18 @@ class SplineConfig:
     iterations: int = 20  # of an inner solve, at most
     pull: float = 3e-4  # share of `vertex` in the preconditioner: more would hold back what slides along the surface
 
+    @property
+    def longest_edge(self) -> float:
+        """Return the length at volume 1 above which the mesh's edges are cut: a span of the cube."""
+        return 1.0 / (self.control_points - self.degree)
+
 
 @dataclass(frozen=True)
 class RefinementConfig:
     """When knots are inserted after the spline stage, where, and how the map is optimised then.
 
-    tolerance: of the root mean square distance at the mesh's vertices, over the diagonal of its bounding box.
+    tolerance: of the root mean square distance between the surface and the spline's boundary, taken both ways, over the
+    diagonal of the surface's bounding box.
     max_control_points: a direction.
     """
 

@@ -56,7 +56,7 @@ def surface_on_cube(
     """
     rotation = best_turn(sphere, options, np.random.default_rng(seed), turn)
     columns = np.hstack([sphere.vertices, sphere.places @ rotation.T])
-    columns, faces = subdivide_finely(columns, sphere.faces, own, spline)
+    columns, faces = subdivide_finely(columns, sphere.faces, spline.longest_edge, own + spline.most_points)
     points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])
     cut = cut_along_rays(places, faces, options.path_snap)
     return Layout(cut.carry(points), cut.faces, snap(cut.carry(places)))

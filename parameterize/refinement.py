@@ -19,8 +19,8 @@ from .config import RefinementConfig, SplineConfig
 from .optimization.rounds import Optimized, optimize
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback
-from .quality.distances import Distances
 from .quality.quality import arap_grid
+from .quality.two_sided import two_sided
 from .spline.bspline import breakpoints, midpoints
 from .spline.volume import BSplineVolume
 
@@ -32,19 +32,20 @@ Stop = Literal["tolerance met", "limit reached", "no better map"]
 
 @dataclass(frozen=True)
 class Level:
-    """Say of one map: its control points a direction, its boundary error, and how many spans are not proved.
+    """Say of one map: its control points a direction, its distance to the surface, and how many spans are not proved.
 
-    boundary: root mean square distance at the mesh's vertices over the diagonal of its bounding box.
+    distance, largest: between surface and spline, both ways, over the diagonal of the surface's bounding box; root mean
+    square, and the largest of all samples.
     """
 
     control_points: tuple[int, int, int]
-    boundary: float
+    distance: float
+    largest: float
     unproved: int
 
     def __str__(self) -> str:
-        return (
-            f"{' x '.join(map(str, self.control_points))} control points: boundary {self.boundary:.3g} of the diagonal"
-        )
+        size = " x ".join(map(str, self.control_points))
+        return f"{size} control points: distance {self.distance:.3g}, largest {self.largest:.3g} of the diagonal"
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,6 @@ class Refinement:
 def refine(
     found: Optimized,
     fit: SurfaceFit,
-    own: int,
     config: SplineConfig,
     refinement: RefinementConfig,
     *,
@@ -75,16 +75,15 @@ def refine(
 ) -> tuple[Optimized, SurfaceFit, Refinement]:
     """Return the last map of which no less is proved than of `found`, its surface data, and how it was found.
 
-    own: how many of the surface's points are vertices of the mesh, the first ones. Each refinement has checkpoints of
-    its own: the chosen knots, and those of its spline stage.
+    Each refinement has checkpoints of its own: the chosen knots, and those of its spline stage.
     """
     report: dict[str, Any] = {"history": history, "progress": progress}
-    spots = _Spots.of(found, fit, own, config)
+    spots = _Spots.of(found, fit, config)
     levels, dropped = [spots.level], None
     stopped: Stop = "tolerance met"
     for number in count(1):
         _log.info("%s", levels[-1])
-        if not any(found.faults) and levels[-1].boundary <= refinement.tolerance:
+        if not any(found.faults) and levels[-1].distance <= refinement.tolerance:
             break
         kept = checkpoints.of_part(f"refined{number}")
         finer = _chosen_knots(spots, config, refinement, kept)
@@ -92,8 +91,8 @@ def refine(
             stopped = "limit reached"
             break
         other = _optimized_on(finer, spots.volume, fit, config, refinement, kept, report)
-        spots = _Spots.of(*other, own, config)
-        if (other[0].faults, spots.level.boundary) >= (found.faults, levels[-1].boundary):
+        spots = _Spots.of(*other, config)
+        if (other[0].faults, spots.level.distance) >= (found.faults, levels[-1].distance):
             stopped, dropped = "no better map", spots.level
             _log.warning("no better map with %s, %d spans unproved: the one before is kept", dropped, dropped.unproved)
             break
@@ -107,7 +106,8 @@ def refine(
 class _Spots:
     """A map at volume 1, and what is found on it and where.
 
-    places, squares: the parameters (n, 3) of the mesh's vertices, and their squared distances (n,).
+    places (n, 3), squares (n,): the parameters of samples on the surface and the spline, and their squared distances
+    times the areas they stand for.
     """
 
     volume: BSplineVolume
@@ -118,15 +118,17 @@ class _Spots:
     arap_limit: float
 
     @classmethod
-    def of(cls, found: Optimized, fit: SurfaceFit, own: int, config: SplineConfig) -> "_Spots":
-        """Measure the boundary as the report will: at parameters that are settled."""
+    def of(cls, found: Optimized, fit: SurfaceFit, config: SplineConfig) -> "_Spots":
+        """Measure as the report will."""
         volume = BSplineVolume((config.degree,) * 3, fit.places.knots, found.control.permute(1, 2, 3, 0).cpu().numpy())
-        places = fit.places.settled(found.control, fit.points, config.last_slides, config.last_sweeps)
-        distances = np.linalg.norm(places.values(found.control)[:own] - fit.points[:own], axis=1)
-        diagonal = float(np.linalg.norm(np.ptp(fit.points[:own], axis=0)))
+        gaps = two_sided(volume, fit.points, fit.places.triangles)
+        distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
         unproved = found.certificate.unproved
-        level = Level(volume.shape, Distances.of(distances).rms / diagonal, len(unproved))
-        return cls(volume, places.parameters[:own], distances**2, unproved, level, config.arap_limit)
+        level = Level(volume.shape, distance.rms, distance.max, len(unproved))
+        ways = (gaps.mesh_to_spline, gaps.spline_to_mesh)
+        places = np.concatenate([way.parameters for way in ways])
+        squares = np.concatenate([way.shares * way.distances**2 for way in ways])
+        return cls(volume, places, squares, unproved, level, config.arap_limit)
 
     def amounts(self, distortion_share: float) -> list[Array]:
         """Return for each direction what is found on each of its spans.

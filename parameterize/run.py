@@ -158,7 +158,7 @@ def parameterize(
     if config.refinement is not None:
         with timed(seconds, "refine"):
             options = attempt.spline, config.refinement
-            found, fit, told = refine(found, fit, task.own, *options, checkpoints=checkpoints, **report)
+            found, fit, told = refine(found, fit, *options, checkpoints=checkpoints, **report)
     with timed(seconds, "optimize"):
         volume, boundary = _in_users_units(found, fit, task)
     with timed(seconds, "certify"):

@@ -5,6 +5,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull
 
+CORNERS = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
+CUBE_FACES = np.array(
+    [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5],
+        [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
+        [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]
+)  # fmt: skip
+
 
 def ball(count):
     """Unit sphere: points (count, 3) and triangles wound outward."""

@@ -63,7 +63,8 @@ def batch(done):
 def test_a_row_has_the_figures_of_its_report(batch, done):
     figures, quality = batch.rows[1].figures(), formula_parameterization().quality
     assert figures["arap_mean"] == quality.arap.unit_volume.mean
-    assert figures["boundary_rms"] == quality.boundary.unit_volume.rms
+    assert figures["distance_rms"] == quality.relative_distance.rms > 0.0
+    assert figures["distance_max"] == quality.relative_distance.max
     finest = done["poisson"]["levels"][-1]
     assert figures["l2_relative"] == finest["l2_relative"] and figures["dofs"] == finest["dofs"] == 11**3
     assert figures["seconds"] == done["seconds"]["total"] and figures["one_to_one"] == "yes"
@@ -115,7 +116,7 @@ def test_the_page_links_pictures_and_escapes(batch):
     (picture,) = found.all("img")
     assert picture["src"].startswith("data:image/png;base64,") and len(picture["src"]) < 20_000
     assert "not a surface, sorry" in found.text and "<i>" not in text
-    assert len(found.all("tr")) == 5 and len(found.all("button")) == 12
+    assert len(found.all("tr")) == 5 and len(found.all("button")) == 13
     assert not [each for each in found.all("a") + found.all("script") + found.all("link") if "http" in str(each)]
 
 

@@ -31,6 +31,8 @@ DUCK = g1.Row(
     arap_max_as_given=99.0,
     boundary_rms_unit_volume=0.0004,
     boundary_rms_as_given=99.0,
+    distance_rms=0.000567,
+    distance_max=0.00891,
     spline_to_mesh_rms=0.00123,
     flipped_triangles=2,
     seconds=120.0,
@@ -74,7 +76,7 @@ def test_figures_at_or_below_the_papers_are_bold_at_the_papers_scale(tmp_path):
     conch = ["conch", "folded", "", "**1.400**", "1.468", "99.000", "50.818", "99.000000", "0.001690"]
     assert cells(text, "duck")[0] == duck and cells(text, "conch")[0] == conch
     assert cells(text, "duck")[1:] == [
-        ["duck", "0.00123", "", "", "", "2"],
+        ["duck", "0.000567", "0.00891", "0.00123", "", "", "", "2"],
         ["duck", "30 x 30 x 30", "120.0", "", "", "", "", ""],
         ["duck", "", "", "", "", "2.50e-05", "", "21"],
     ]
@@ -93,7 +95,7 @@ def test_the_markdown_ends_with_the_counts_and_the_machine(tmp_path):
     rows = [CONCH, DUCK, bird, g1.Row("santa4", g1.ABSENT)]
     *_, counts, machine = g1.as_markdown(rows, options(tmp_path)).split("\n\n")
     assert counts.startswith(
-        "Certified 1 of 3; of G1, ARAP mean at or below the paper's 1 of 2, boundary rms at or below"
+        "Certified 1 of 3; of G1, ARAP mean at or below the paper's 1 of 2, rms at the vertices at or below"
     )
     assert counts.endswith("the paper's 1 of 2.")
     assert f"{g1.processes.cores()} cores, 1 at a time" in machine and machine.endswith("preset fast, seed 0.\n")

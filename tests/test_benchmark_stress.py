@@ -27,6 +27,8 @@ ROW = stress.Row(
     arap_mean=2.0,
     arap_max=30.0,
     boundary_rms=0.002,
+    distance_rms=0.0005,
+    distance_max=0.02,
     spline_to_mesh_max=0.01,
     seconds=100.0,
 )
@@ -85,7 +87,7 @@ def test_the_table_gives_shares_by_kind_and_lists_what_failed(tmp_path):
     lost = stress.Row(13, "bent", "fast", error="out | of memory")
     rows = [folded, ROW, replace(ROW, number=1, arap_mean=3.0), overlapping, lost]
     text = stress.as_text(rows, options(tmp_path, numbers=(1, 2, 7, 8, 13, 14)))
-    assert cells(text, "bent")[0][2:] == ["3", "2", "67 %", "2.50", "0.00200", "100", "100"]
+    assert cells(text, "bent")[0][2:] == ["3", "2", "67 %", "2.50", "0.00200", "0.00050", "100", "100"]
     assert cells(text, "spiky")[0][2:5] == ["2", "0", "0 %"]
     assert cells(text, "008-spiky")[0][1:6] == ["folded", "12", "2000", "4.00", "100"]
     assert cells(text, "002-spiky")[0][1] == "certified, meets itself"

@@ -12,20 +12,18 @@ from iga_nn.cli.commands import main
 from iga_nn.report import document as reports
 from parameterize.refinement import Level, Refinement
 
-FIRST, LAST = Level((30, 30, 30), 9e-4, 0), Level((34, 41, 30), 4.7e-4, 0)
+FIRST, LAST = Level((30, 30, 30), 9e-4, 0.02, 0), Level((34, 41, 30), 4.7e-4, 0.01, 0)
 MET = Refinement(5e-4, 60, "tolerance met", (FIRST, LAST), None)
+FAR = "30 x 30 x 30; rms distance 0.0009 of the diagonal"
 TOLD = {
-    "34 x 41 x 30, 30 x 30 x 30 at first; boundary rms 0.00047 of the diagonal, tolerance 0.0005 met": MET,
-    "30 x 30 x 30; boundary rms 0.0009 of the diagonal, tolerance 0.001 met": Refinement(
-        1e-3, 60, "tolerance met", (FIRST,), None
+    "34 x 41 x 30, 30 x 30 x 30 at first; rms distance 0.00047 of the diagonal, tolerance 0.0005 met; "
+    "largest distance 0.01": MET,
+    f"{FAR}, tolerance 0.001 met; largest distance 0.02": Refinement(1e-3, 60, "tolerance met", (FIRST,), None),
+    f"{FAR}, tolerance 0.0005 not met with at most 30 per direction; largest distance 0.02": Refinement(
+        5e-4, 30, "limit reached", (FIRST,), None
     ),
-    "30 x 30 x 30; boundary rms 0.0009 of the diagonal, tolerance 0.0005 not met with at most 30 per direction": (
-        Refinement(5e-4, 30, "limit reached", (FIRST,), None)
-    ),
-    "30 x 30 x 30; boundary rms 0.0009 of the diagonal, "
-    "tolerance 0.0005 not met: no better map that is certified was found with 34 x 41 x 30": Refinement(
-        5e-4, 60, "no better map", (FIRST,), replace(LAST, unproved=2)
-    ),
+    f"{FAR}, tolerance 0.0005 not met: no better map that is certified was found with 34 x 41 x 30; "
+    "largest distance 0.02": Refinement(5e-4, 60, "no better map", (FIRST,), replace(LAST, unproved=2)),
 }
 
 
@@ -34,6 +32,13 @@ def test_it_is_said_how_many_and_why(words):
     section = {"refinement": json.loads(json.dumps(asdict(TOLD[words])))}
     assert reports.control_points_in_words({"parameterization": section}) == words
     assert reports.control_points_in_words({"parameterization": {}}) == ""
+
+
+def test_reports_of_older_versions_are_still_put_into_words():
+    level = {"control_points": [30, 30, 30], "boundary": 9e-4, "unproved": 0}
+    told = {"tolerance": 1e-3, "max_control_points": 60, "stopped": "tolerance met", "levels": [level], "dropped": None}
+    words = "30 x 30 x 30; rms distance 0.0009 of the diagonal at the vertices, tolerance 0.001 met"
+    assert reports.control_points_in_words({"parameterization": {"refinement": told}}) == words
 
 
 @pytest.fixture

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from shapes import CORNERS
 
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.spline.volume import FACE_NAMES
-
-CORNERS = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
 
 
 def cube_map():

@@ -5,23 +5,15 @@ import json
 import igl
 import numpy as np
 import pytest
+from shapes import CORNERS, CUBE_FACES
 
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.jacobian import certify
 from parameterize.cube.boundary_map import BoundaryMap
-from parameterize.quality.distances import Distances, SampledBoundary, to_boundary, to_mesh
+from parameterize.quality.distances import Distances, SampledBoundary, nearest_on_boundary, to_mesh
 from parameterize.quality.quality import arap, arap_grid, measure, scaled_jacobian
 from parameterize.spline.bspline import collocation, greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
-
-CORNERS = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
-CUBE_FACES = np.array(
-    [
-        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5],
-        [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
-        [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
-    ]
-)  # fmt: skip
 
 
 def greville_grid(n, degree=3):
@@ -115,16 +107,24 @@ def test_slabs_do_not_show(monkeypatch):
     np.testing.assert_allclose(arap_grid(volume)[1], whole, rtol=1e-13)
 
 
+def to_boundary(points, volume, boundary):
+    where, distances = nearest_on_boundary(points, volume, boundary)
+    np.testing.assert_allclose(np.linalg.norm(volume(where) - points, axis=1), distances, atol=1e-14)
+    assert np.all(np.any((where == 0.0) | (where == 1.0), axis=1))
+    return distances
+
+
 def test_distances_by_hand():
     distances = Distances.of(np.array([3.0, 4.0, 0.0, 0.0]))
     assert (distances.rms, distances.mean, distances.max) == (2.5, 1.75, 4.0)
     assert distances.scaled(2.0) == Distances(5.0, 3.5, 8.0)
+    assert Distances.of(np.array([3.0, 4.0, 0.0]), np.array([0.0, 0.25, 0.75])) == Distances(2.0, 1.0, 4.0)
     with pytest.raises(ValueError, match="empty"):
         Distances.of(np.zeros(0))
 
 
 def test_sampled_boundary_is_the_cube():
-    sampled = SampledBoundary.of(affine(np.eye(3)), samples=4)
+    sampled = SampledBoundary.on(affine(np.eye(3)), *[np.linspace(0.0, 1.0, 4)] * 3)
     np.testing.assert_allclose(sampled.points, sampled.parameters, atol=1e-14)
     assert len(sampled.points) == 96 and len(sampled.triangles) == 108
     corners = sampled.points[sampled.triangles]
@@ -132,6 +132,23 @@ def test_sampled_boundary_is_the_cube():
     assert areas.sum() == pytest.approx(6.0)
     with pytest.raises(ValueError, match="at least 2"):
         SampledBoundary.of(affine(np.eye(3)), samples=1)
+
+
+def test_each_span_is_sampled_alike():
+    knots = open_uniform_knots(5, 3), np.array([0.0, 0.0, 0.1, 0.2, 1.0, 1.0]), open_uniform_knots(4, 3)
+    rows = [greville(row, p) for row, p in zip(knots, (3, 1, 3), strict=True)]
+    volume = BSplineVolume((3, 1, 3), knots, np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1))
+    sampled = SampledBoundary.of(volume, samples=8)
+    u, v, w = (np.unique(column) for column in sampled.parameters.T)
+    assert len(u) == 2 * 4 + 1 and len(w) == 7 + 1
+    np.testing.assert_allclose(
+        v, [0.0, 0.1 / 3, 0.2 / 3, 0.1, 0.4 / 3, 0.5 / 3, 0.2, 1.4 / 3, 2.2 / 3, 1.0], atol=1e-14
+    )
+    assert len(sampled.triangles) == len(sampled.cube_faces) == 4 * (8 * 9 + 9 * 7 + 8 * 7)
+    corners = sampled.parameters[sampled.triangles]
+    axis, side = sampled.cube_faces // 2, sampled.cube_faces % 2
+    for k in range(3):
+        np.testing.assert_array_equal(corners[np.arange(len(axis)), k, axis], side)
 
 
 def test_cube_inside_a_larger_cube():
@@ -152,8 +169,8 @@ def test_inner_points_see_the_nearest_face():
 
 def test_foot_points_are_on_the_spline_not_on_its_triangles():
     volume = ball()
-    on_it = SampledBoundary.of(volume, 23).points
-    coarse = SampledBoundary.of(volume, 12)
+    on_it, coarse = (SampledBoundary.on(volume, *[np.linspace(0.0, 1.0, count)] * 3) for count in (23, 12))
+    on_it = on_it.points
     assert to_mesh(on_it, coarse.points, coarse.triangles).max() > 1e-3
     assert to_boundary(on_it, volume, coarse).max() < 1e-9
     outside = 1.1 * on_it / np.linalg.norm(on_it, axis=1, keepdims=True)
@@ -184,8 +201,8 @@ def test_report_on_a_ball():
     assert report["control_points"] == [14, 14, 14] and report["degrees"] == [3, 3, 3]
     assert report["bijective"] == certificate.verdict and report["det_lower_bound"] == certificate.lower_bound
     assert report["boundary_injective"] is True and report["boundary_meeting"] is None
-    assert report["points"]["arap"] == 33**3 and report["points"]["spline_to_mesh"] == 153_600
-    assert report["points"]["mesh_to_spline"] == len(vertices) and report["points"]["boundary"] == len(vertices)
+    assert report["points"]["arap"] == 33**3 and report["points"]["spline_to_mesh"] == 6 * (11 * 15 + 1) ** 2
+    assert report["points"]["mesh_to_spline"] >= len(vertices) == report["points"]["boundary"]
     assert report["boundary"]["as_given"]["max"] == pytest.approx(0.25, abs=1e-4)  # 0.25 |F|, |F| = 1
     (_, (unit, values), weights), given = arap_grid(volume, scales=(scale, 1.0)), report["arap"]["as_given"]
     assert given == {"mean": pytest.approx(np.sum(weights * values)), "max": pytest.approx(values.max())}
@@ -198,8 +215,10 @@ def test_report_on_a_ball():
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     sagitta = 1.0 - np.sum(normals * corners[:, 0], axis=1)  # how deep the flat triangles lie below the sphere
-    assert report["surface_distance"]["spline_to_mesh"]["as_given"]["max"] == pytest.approx(sagitta.max(), rel=0.1)
-    assert report["surface_distance"]["mesh_to_spline"]["as_given"]["max"] < 2e-4
+    for distances in report["surface_distance"].values():  # the vertices are on the sphere, the triangles are not
+        assert distances["as_given"]["max"] == pytest.approx(sagitta.max(), rel=0.1)
+    both = report["surface_distance"]["two_sided"]
+    assert both["of_diagonal"]["rms"] == pytest.approx(both["as_given"]["rms"] / 12.0**0.5, rel=1e-12)
 
 
 def test_affine_report_by_hand():
@@ -214,6 +233,7 @@ def test_affine_report_by_hand():
         assert section["boundary"][scale] == {name: pytest.approx(size) for name in ("rms", "mean", "max")}
     for pair in section["surface_distance"].values():
         assert pair["as_given"]["max"] < 1e-12
+    assert report.diagonal == pytest.approx(5.25**0.5)
     text = str(report)
     assert "certified" in text and "1.25, 1.25" in text and "10, 10" in text
 

@@ -9,12 +9,15 @@ from parameterize import refinement
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import RefinementConfig, SplineConfig
 from parameterize.cube.cube import project_radially
+from parameterize.cube.cutting import subdivide_finely
 from parameterize.optimization.rounds import Optimized, optimize
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
 from parameterize.progress import History, ignore
+from parameterize.quality.two_sided import two_sided
 from parameterize.refinement import refine
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 CONFIG = SplineConfig(control_points=6, steps=12, penalties=(20.0, 100.0, 500.0, 2500.0), rounds=7, polish=1)
@@ -24,7 +27,7 @@ OWN = 300
 
 def surface_fit():
     """A rounded cube, slightly turned, whose parameters are the radial projection."""
-    points, faces = rounded_cube(OWN, power=12.0)
+    points, faces = subdivide_finely(*rounded_cube(OWN, power=4.0), CONFIG.longest_edge / 4.0, 9 * OWN)
     vertices = turned(points)
     places = SlidingParameters(KNOTS, 3, 0.5 + project_radially(points - 0.5), faces)
     quadrics = vertex_quadrics(vertices, faces, CONFIG.tangential)
@@ -44,19 +47,21 @@ def first():
 def refined(first, checkpoints=None, progress=ignore, **options):
     limits = RefinementConfig(**{"rounds": 4, "polish": 1} | options)
     kept = checkpoints or Checkpoints(None, {}, resume=False)
-    return refine(*first, OWN, CONFIG, limits, history=History(), progress=progress, checkpoints=kept)
+    return refine(*first, CONFIG, limits, history=History(), progress=progress, checkpoints=kept)
 
 
-def boundary_rms(found, fit):
-    places = fit.places.settled(found.control, fit.points, CONFIG.last_slides, CONFIG.last_sweeps)
-    distances = np.linalg.norm(places.values(found.control)[:OWN] - fit.points[:OWN], axis=1)
-    return np.sqrt((distances**2).mean()) / np.linalg.norm(np.ptp(fit.points[:OWN], axis=0))
+def distance(found, fit):
+    """Between the surface and the boundary of F, both ways, over the diagonal."""
+    volume = BSplineVolume((3,) * 3, fit.places.knots, found.control.permute(1, 2, 3, 0).numpy())
+    return two_sided(volume, fit.points, fit.places.triangles).summary().rms / np.linalg.norm(
+        np.ptp(fit.points, axis=0)
+    )
 
 
 @pytest.fixture(scope="module")
 def once(first, tmp_path_factory):
     """What one refinement makes of it, the options of that, and the folder of its checkpoints."""
-    options, folder = {"tolerance": 0.7 * boundary_rms(*first)}, tmp_path_factory.mktemp("refined")
+    options, folder = {"tolerance": 0.9 * distance(*first)}, tmp_path_factory.mktemp("refined")
     return refined(first, Checkpoints(folder, {}, resume=False), **options), options, folder
 
 
@@ -66,13 +71,13 @@ def test_a_map_close_enough_stays_as_it_is(first):
     assert told.stopped == "tolerance met" and told.dropped is None
     (level,) = told.levels
     assert level.control_points == (6, 6, 6) and level.unproved == 0
-    assert level.boundary == pytest.approx(boundary_rms(*first), rel=1e-12)
+    assert level.distance == pytest.approx(distance(*first), rel=1e-12)
 
 
 def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
     (found, fit, told), options, _ = once
     assert told.stopped == "tolerance met" and len(told.levels) > 1
-    assert boundary_rms(found, fit) == told.levels[-1].boundary <= options["tolerance"]
+    assert distance(found, fit) == told.levels[-1].distance <= options["tolerance"]
     assert not any(found.faults)
     assert tuple(found.control.shape[1:]) == told.levels[-1].control_points > (6, 6, 6)
     for row in fit.places.knots:
@@ -83,7 +88,7 @@ def test_no_direction_gets_more_than_the_limit(first):
     found, fit, told = refined(first, tolerance=1e-9, max_control_points=7)
     assert told.stopped == "limit reached"
     assert max(told.levels[-1].control_points) == 7 == max(found.control.shape[1:])
-    assert not any(found.faults) and boundary_rms(found, fit) < boundary_rms(*first)
+    assert not any(found.faults) and distance(found, fit) < distance(*first)
 
 
 def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypatch, caplog):

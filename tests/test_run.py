@@ -276,11 +276,12 @@ def test_corner_points_take_the_nearest_vertices(surface):
 @pytest.mark.parametrize("most", [300, 2000])
 def test_long_edges_add_so_many_points_at_most(surface, most):
     spline, own = replace(tiny_config().spline, control_points=30), len(surface.vertices)
-    vertices, faces = subdivide_finely(surface.unit_vertices, surface.faces, own, replace(spline, most_points=most))
+    mesh = surface.unit_vertices, surface.faces, spline.longest_edge
+    vertices, faces = subdivide_finely(*mesh, own + most)
     assert 0 < len(vertices) - len(surface.vertices) <= most
     edges = np.linalg.norm(vertices[faces] - vertices[faces[:, [1, 2, 0]]], axis=2)
     spans = 27 * edges.max()  # the length of the longest one
-    assert spans > 1.0 and len(subdivide_finely(surface.unit_vertices, surface.faces, own, spline)[0]) > 2000
+    assert spans > 1.0 and len(subdivide_finely(*mesh, own + spline.most_points)[0]) > 2000
     assert np.array_equal(vertices[: len(surface.vertices)], surface.unit_vertices)
 
 
@@ -420,7 +421,7 @@ def test_after_a_certified_growth_far_from_the_surface_a_stiffer_one_is_tried_an
 def test_a_map_grown_stiff_is_refined_stiff(surface, monkeypatch):
     told = []
 
-    def refine(found, fit, own, spline, *args, **options):
+    def refine(found, fit, spline, *args, **options):
         told.append((spline.fairness, spline.least_floor, spline.growth))
         return found, fit, None
 

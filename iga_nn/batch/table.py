@@ -31,7 +31,8 @@ FIGURES = {  # columns of batch.csv: their titles on the page
     "one_to_one": "one-to-one",
     "arap_mean": "ARAP mean",
     "arap_max": "ARAP max",
-    "boundary_rms": "boundary rms",
+    "distance_rms": "distance / diagonal, rms",
+    "distance_max": "largest",
     "dofs": "unknowns",
     "l2_relative": "relative L2 error",
     "error_estimate_relative": "estimated L2 error",
@@ -74,7 +75,8 @@ class Row:
         known |= (known.get("levels") or [{}])[-1]
         for key, value in known.get("arap", {}).get("unit_volume", {}).items():
             known[f"arap_{key}"] = value
-        known["boundary_rms"] = known.get("boundary_rms", {}).get("unit_volume")
+        for key, value in known.get("surface_distance", {}).items():
+            known[f"distance_{key}"] = value
         return {name: known.get(name) for name in FIGURES}
 
     def told(self) -> str:

@@ -125,11 +125,23 @@ def control_points_in_words(report: Report) -> str:
     elif told["stopped"] == "no better map":
         reason = f"{asked} not met: no better map that is certified was found with {_size(told['dropped'])}"
     start = f", {_size(first)} at first" if first != last else ""
-    return f"{_size(last)}{start}; boundary rms {last['boundary']:.2g} of the diagonal, {reason}"
+    if "boundary" in last:  # of an older version, which knew the distance at the mesh's vertices alone
+        return f"{_size(last)}{start}; rms distance {last['boundary']:.2g} of the diagonal at the vertices, {reason}"
+    rms, largest = f"rms distance {last['distance']:.2g} of the diagonal", f"largest distance {last['largest']:.2g}"
+    return f"{_size(last)}{start}; {rms}, {reason}; {largest}"
 
 
 def _size(level: Report) -> str:
     return " x ".join(map(str, level["control_points"]))
+
+
+def surface_distance(report: Report) -> Report:
+    """Return rms, mean and max of the distance between surface and spline, both ways, over the box's diagonal.
+
+    Empty where it is not known: of a volume without a surface, and in reports of older versions.
+    """
+    measured = report["parameterization"].get("surface_distance", {})
+    return measured.get("two_sided", {}).get("of_diagonal", {})
 
 
 def verdict(report: Report, folder: Path) -> Report:
@@ -140,6 +152,8 @@ def verdict(report: Report, folder: Path) -> Report:
     if "arap" in quality:
         short["arap"] = quality["arap"]
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
+    if distance := surface_distance(report):
+        short["surface_distance"] = distance
     defects = {name: quality[name] for name in ("unproved", "boundary_meeting") if quality.get(name)}
     short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
     if refinement := quality.get("refinement"):

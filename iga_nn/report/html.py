@@ -119,10 +119,11 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
     quality = report["parameterization"]
     facts = []
     if "arap" in quality:
-        arap, boundary = quality["arap"]["unit_volume"], quality["boundary"]
+        arap = quality["arap"]["unit_volume"]
         facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; at volume 1"))
-        given = f"rms at volume 1; {boundary['as_given']['rms']:.3g} as given"
-        facts.append(("Boundary distance", f"{boundary['unit_volume']['rms']:.3g}", given))
+    if distance := reports.surface_distance(report):
+        remark = f"rms over the box's diagonal, surface to spline and back; largest {distance['max']:.3g}"
+        facts.append(("Distance to the surface", f"{distance['rms']:.3g}", remark))
     if levels := reports.solved(report).get("levels"):
         finest = levels[-1]
         facts += [_error_fact(finest, *keys) for keys in ERRORS if finest.get(keys[0]) is not None]

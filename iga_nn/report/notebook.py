@@ -69,6 +69,7 @@ def _quality(quality: QualityReport) -> str:
         ("boundary at the mesh's vertices: rms, mean, max", *_both(quality.boundary)),
         ("mesh to spline: rms, mean, max", *_both(quality.mesh_to_spline)),
         ("spline to mesh: rms, mean, max", *_both(quality.spline_to_mesh)),
+        ("both ways: rms, mean, max", *_both(quality.surface_distance)),
     ]
     title = f"det J > 0: {quality.certificate.verdict}; one-to-one: {answer}"
     return _table(title, rows, head=("", "at volume 1", "as given"))

@@ -10,15 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..config import SplineConfig
 from ..surface.geometry import edge_table
 
 _PLANES = [(a, b, sign) for a, b in ((0, 1), (0, 2), (1, 2)) for sign in (1.0, -1.0)]
-_PIECES = (  # of a triangle 0, 1, 2 with so many new vertices: 3 on 0-1, 4 on 1-2, 5 on 2-0; of two, on 0-1 and 2-0
-    [(0, 1, 2)],
-    [(0, 3, 2), (3, 1, 2)],
-    [(0, 3, 5), (3, 1, 2), (3, 2, 5)],
-    [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
+_PIECES = (
+    np.array(  # of a triangle 0, 1, 2 with 0 to 3 new vertices: 3 on 0-1, 4 on 1-2, 5 on 2-0; of two, on 0-1 and 2-0
+        [
+            [(0, 1, 2), (0, 0, 0), (0, 0, 0), (0, 0, 0)],  # one more piece than new vertices; the rest is not read
+            [(0, 3, 2), (3, 1, 2), (0, 0, 0), (0, 0, 0)],
+            [(0, 3, 5), (3, 1, 2), (3, 2, 5), (0, 0, 0)],
+            [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
+        ]
+    )
 )
 
 
@@ -80,15 +83,14 @@ def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tu
         vertices = np.concatenate([vertices, ends[long].mean(axis=1)])
 
 
-def subdivide_finely(vertices: Array, faces: IntArray, own: int, spline: SplineConfig) -> tuple[Array, IntArray]:
-    """Cut edges that are longer than a span of the cube; less finely where that adds more points than it may.
+def subdivide_finely(vertices: Array, faces: IntArray, longest: float, most: int) -> tuple[Array, IntArray]:
+    """Cut edges that are longer than `longest`; less finely where that gives more than `most` points.
 
-    vertices: (n, 3), at volume 1, or with further columns; the first `own` are those of the mesh.
+    vertices: (n, 3), or with further columns, which are interpolated as well. The given vertices stay, however many.
     """
-    longest = 1.0 / (spline.control_points - spline.degree)
     while True:
         points, triangles = subdivide_long_edges(vertices, faces, longest)
-        if len(points) - own <= spline.most_points:
+        if len(points) <= max(most, len(vertices)):
             return points, triangles
         longest *= 1.25
 
@@ -122,15 +124,28 @@ def split_edges(faces: IntArray, edges: IntArray, first_new: int) -> IntArray:
 
     One split edge of a triangle gives two triangles, two give three, three give four.
     """
-    lookup = {pair: first_new + k for k, (i, j) in enumerate(edges.tolist()) for pair in ((i, j), (j, i))}
     touched = np.zeros(int(faces.max()) + 1, dtype=bool)
     touched[edges.ravel()] = True
     candidate = touched[faces].sum(axis=1) >= 2
-    pieces = []
-    for face in faces[candidate].tolist():
-        new = [lookup.get((face[k], face[k - 2]), -1) for k in range(3)]  # on the edges k -> k + 1
-        count = sum(vertex >= 0 for vertex in new)
-        turn = next((k for k in range(3) if new[k] >= 0 and (count == 1 or new[k - 1] >= 0)), 0)
-        six = face[turn:] + face[:turn] + new[turn:] + new[:turn]
-        pieces += [[six[place] for place in piece] for piece in _PIECES[count]]
-    return np.concatenate([faces[~candidate], np.array(pieces, dtype=np.int64).reshape(-1, 3)])
+    face = faces[candidate]
+    new = _numbers_on_sides(face, edges, first_new)
+    there = new >= 0
+    count = there.sum(axis=1)
+    turns = there & ((count == 1)[:, None] | np.roll(there, 1, axis=1))  # the sides that may become side 0 - 1
+    order = (turns.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    six = np.concatenate([np.take_along_axis(face, order, axis=1), np.take_along_axis(new, order, axis=1)], axis=1)
+    pieces = np.take_along_axis(six, _PIECES[count].reshape(-1, 12), axis=1).reshape(-1, 4, 3)
+    return np.concatenate([faces[~candidate], pieces[np.arange(4) <= count[:, None]]])
+
+
+def _numbers_on_sides(face: IntArray, edges: IntArray, first_new: int) -> IntArray:
+    """Return the new vertex on the sides 0-1, 1-2, 2-0 of each face (m, 3), -1 where there is none."""
+    if not len(edges):
+        return np.full(face.shape, -1, dtype=np.int64)
+    base = max(int(face.max(initial=0)), int(edges.max())) + 1
+    keys = edges[:, 0].astype(np.int64) * base + edges[:, 1]
+    order = np.argsort(keys)
+    side = np.sort(np.stack([face, np.roll(face, -1, axis=1)], axis=-1), axis=-1)  # (m, 3, 2)
+    asked = side[..., 0] * base + side[..., 1]
+    place = order[np.minimum(np.searchsorted(keys, asked, sorter=order), len(keys) - 1)]
+    return np.where(keys[place] == asked, first_new + place, -1)

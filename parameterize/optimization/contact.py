@@ -76,9 +76,8 @@ def contact_penalty(
     gap: how far apart sheets must be, in units of the control points (3, n_u, n_v, n_w). near: look at these samples
     alone, those of a penalty a few steps before; looking at all of them takes longer than a Newton step.
     """
-    boundary = SampledBoundary.of(
-        BSplineVolume((degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy()), _SAMPLES
-    )
+    volume = BSplineVolume((degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy())
+    boundary = SampledBoundary.on(volume, *[np.linspace(0.0, 1.0, _SAMPLES)] * 3)
     normals = vertex_normals(boundary.points, boundary.triangles)
     asked = np.arange(len(boundary.points)) if near is None else near
     touching = asked

@@ -7,10 +7,12 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..cube.cube import axis_and_side, damped_fit, tangent_axes
+from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import doubled_areas
 
-SAMPLES = 160  # a direction and cube face
+SAMPLES = 160  # a direction and cube face, at least
+PER_SPAN = 3  # likewise
 
 _NEWTON_STEPS = 5
 _DAMPING = 1e-12  # tangents may be parallel at an edge of the cube
@@ -26,11 +28,15 @@ class Distances:
     max: float
 
     @classmethod
-    def of(cls, values: Array) -> "Distances":
-        """Summarise distances (m,), each with the same weight; raise ValueError when there are none."""
+    def of(cls, values: Array, shares: Array | None = None) -> "Distances":
+        """Summarise distances (m,) with shares (m,) that sum to 1, by default all the same.
+
+        Raises ValueError when there are none.
+        """
         if values.size == 0:
             raise ValueError("there are no distances to summarise: the list of points is empty")
-        return cls(float(np.sqrt(np.mean(values**2))), float(np.mean(values)), float(np.max(values)))
+        mean_square, mean = np.average(values**2, weights=shares), np.average(values, weights=shares)
+        return cls(float(np.sqrt(mean_square)), float(mean), float(np.max(values)))
 
     def scaled(self, scale: float) -> "Distances":
         """Return the same distances in another unit of length."""
@@ -39,30 +45,50 @@ class Distances:
 
 @dataclass(frozen=True, eq=False)
 class SampledBoundary:
-    """The spline's boundary sampled on a regular grid a cube face, and the triangles between the samples."""
+    """The spline's boundary sampled on a grid a cube face, and the triangles between the samples."""
 
-    parameters: Array  # (6 * samples**2, 3), face after face in the order of FACE_NAMES
-    points: Array  # (6 * samples**2, 3)
-    triangles: IntArray  # (12 * (samples - 1)**2, 3), wound outwards where F keeps orientation
+    parameters: Array  # (n, 3), face after face in the order of FACE_NAMES
+    points: Array  # (n, 3)
+    triangles: IntArray  # (m, 3), wound outwards where F keeps orientation
+    cube_faces: IntArray  # (m,) of the triangles
 
     @classmethod
     def of(cls, volume: BSplineVolume, samples: int = SAMPLES) -> "SampledBoundary":
-        """Sample all six faces, edges included."""
+        """Sample all six faces, edges included: each span alike, `samples` a direction at least."""
         if samples < 2:
             raise ValueError(f"samples must be at least 2, got {samples}")
-        row = np.linspace(0.0, 1.0, samples)
-        number = np.arange(samples**2, dtype=np.int64).reshape(samples, samples)
-        a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-        face = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-        parameters, points, triangles = [], [], []
+        u, v, w = (_spread(breakpoints(row), samples) for row in volume.knots)
+        return cls.on(volume, u, v, w)
+
+    @classmethod
+    def on(cls, volume: BSplineVolume, *rows: Array) -> "SampledBoundary":
+        """Sample all six faces at three rows of parameters, each from 0 to 1."""
+        parameters, points, triangles, cube_faces, count = [], [], [], [], 0
         for k in range(6):
             axis, side = axis_and_side(k)
-            u, v, w = (np.array([float(side)]) if d == axis else row for d in range(3))
+            u, v, w = (np.array([float(side)]) if d == axis else row for d, row in enumerate(rows))
             parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
             points.append(volume.grid(u, v, w).reshape(-1, 3))
+            face = _halved_cells(*(len(row) for d, row in enumerate(rows) if d != axis))
             inwards = (side == 1) == (axis == 1)  # (u, w) is left-handed seen along v
-            triangles.append(k * samples**2 + (face[:, ::-1] if inwards else face))
-        return cls(np.concatenate(parameters), np.concatenate(points), np.concatenate(triangles))
+            triangles.append(count + (face[:, ::-1] if inwards else face))
+            cube_faces.append(np.full(len(face), k))
+            count += len(parameters[-1])
+        return cls(*(np.concatenate(parts) for parts in (parameters, points, triangles, cube_faces)))
+
+
+def _spread(breaks: Array, samples: int) -> Array:
+    """Divide each span between breakpoints equally, into PER_SPAN at least: so many parameters or more."""
+    pieces = max(PER_SPAN, -(-(samples - 1) // (len(breaks) - 1)))
+    inner = breaks[:-1, None] + np.diff(breaks)[:, None] * (np.arange(pieces) / pieces)
+    return np.append(inner.ravel(), breaks[-1])
+
+
+def _halved_cells(n_a: int, n_b: int) -> IntArray:
+    """Return two triangles for each cell of a grid of n_a x n_b points, numbered row by row."""
+    number = np.arange(n_a * n_b, dtype=np.int64).reshape(n_a, n_b)
+    a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
 def to_mesh(points: Array, vertices: Array, faces: IntArray) -> Array:
@@ -79,8 +105,8 @@ def nearest_on_mesh(points: Array, vertices: Array, faces: IntArray) -> tuple[Ar
     return np.einsum("mk,mka->ma", weights, corners), normals
 
 
-def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> Array:
-    """Return the distance of each point (m, 3) to the boundary of the spline: (m,).
+def nearest_on_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> tuple[Array, Array]:
+    """Return for points (m, 3) the parameters (m, 3) of the spline's nearest boundary points, and the distances (m,).
 
     The nearest point of the sampled triangles gives a cube face and parameters on it; Gauss-Newton steps in that face
     then lower the distance to the spline itself. The distances are to points of the spline's boundary, so never less
@@ -89,7 +115,7 @@ def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary)
     _, triangle, weights = _closest(points, boundary.points, boundary.triangles)
     corners = boundary.triangles[triangle]  # (m, 3)
     where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
-    axis, _ = axis_and_side(6 * triangle // len(boundary.triangles))
+    axis, _ = axis_and_side(boundary.cube_faces[triangle])
     active = np.arange(len(points))
     where[active, axis] = boundary.parameters[corners[:, 0], axis]
     best: Array = np.linalg.norm(volume(where) - points, axis=1)
@@ -108,7 +134,7 @@ def to_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary)
         active = active[gain > _CONVERGED * best[active]]
         if not active.size:
             break
-    return best
+    return where, best
 
 
 def _closest(points: Array, vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Array]:

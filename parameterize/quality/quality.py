@@ -14,8 +14,9 @@ from ..cube.boundary_map import BoundaryMap
 from ..display import Shown
 from ..spline.bspline import gauss_points
 from ..spline.volume import BSplineVolume
-from .distances import SAMPLES, Distances, SampledBoundary, to_boundary, to_mesh
+from .distances import Distances
 from .rotations import closest_rotations
+from .two_sided import two_sided
 
 _SLAB_POINTS = 100_000
 
@@ -60,11 +61,15 @@ class QualityReport(Shown):
     boundary : BothScales of Distances
         Rms, mean and max of the distance from F(v_p) to v over the mesh's own `mesh_vertices` vertices; cuts and
         subdivisions do not count.
-    mesh_to_spline : BothScales of Distances
-        From each of `mesh_vertices` vertices to the spline's boundary (foot point refined on the spline).
     mesh_vertices : int
-    spline_to_mesh : BothScales of Distances
-        From 160 x 160 points a cube face to the mesh's triangles.
+    mesh_to_spline, spline_to_mesh : BothScales of Distances
+        From samples on the mesh's triangles to the spline's boundary (foot point refined on the spline), and from
+        samples on this to the mesh; rms and mean over the area. `mesh_samples` and `spline_samples` say how many.
+    surface_distance : BothScales of Distances
+        Both ways together: rms and mean of the two, the largest of all samples.
+    diagonal : float
+        Of the mesh's bounding box, in the user's units.
+    mesh_samples, spline_samples : int
 
     Examples
     --------
@@ -81,9 +86,13 @@ class QualityReport(Shown):
     arap: BothScales[Distortion]
     arap_points: int
     boundary: BothScales[Distances]
-    mesh_to_spline: BothScales[Distances]
     mesh_vertices: int
+    mesh_to_spline: BothScales[Distances]
     spline_to_mesh: BothScales[Distances]
+    surface_distance: BothScales[Distances]
+    diagonal: float
+    mesh_samples: int
+    spline_samples: int
     boundary_check: BoundaryCheck
 
     def as_dict(self) -> dict[str, Any]:
@@ -94,14 +103,20 @@ class QualityReport(Shown):
             "surface_distance": {
                 "mesh_to_spline": asdict(self.mesh_to_spline),
                 "spline_to_mesh": asdict(self.spline_to_mesh),
+                "two_sided": asdict(self.surface_distance) | {"of_diagonal": asdict(self.relative_distance)},
             },
             "points": {
                 "arap": self.arap_points,
                 "boundary": self.mesh_vertices,
-                "mesh_to_spline": self.mesh_vertices,
-                "spline_to_mesh": 6 * SAMPLES**2,
+                "mesh_to_spline": self.mesh_samples,
+                "spline_to_mesh": self.spline_samples,
             },
         }
+
+    @property
+    def relative_distance(self) -> Distances:
+        """The distance between surface and spline, both ways, over the diagonal of the surface's bounding box."""
+        return self.surface_distance.as_given.scaled(1.0 / self.diagonal)
 
     def __str__(self) -> str:
         certificate = self.certificate
@@ -116,9 +131,10 @@ class QualityReport(Shown):
             f"{'':16}  {'at volume 1':<32}  as given",
             _line("ARAP mean, max", self.arap),
             f"{'':16}  {'rms, mean, max':<32}  rms, mean, max",
-            _line("boundary", self.boundary),
+            _line("at the vertices", self.boundary),
             _line("mesh to spline", self.mesh_to_spline),
             _line("spline to mesh", self.spline_to_mesh),
+            _line("both ways", self.surface_distance),
         ]
         return "\n".join(lines)
 
@@ -167,7 +183,7 @@ def measure(
     n = len(vertices)
     if len(boundary.vertices) < n:
         raise ValueError(f"boundary must start with the surface's {n} vertices, it has {len(boundary.vertices)}")
-    sampled = SampledBoundary.of(volume)
+    found = two_sided(volume, vertices, faces)
     _, (unit_volume, as_given), weights = arap_grid(volume, scales=(scale, 1.0))
     return QualityReport(
         control_points=volume.shape,
@@ -175,16 +191,21 @@ def measure(
         certificate=certificate,
         arap=BothScales(_distortion(unit_volume, weights), _distortion(as_given, weights)),
         arap_points=weights.size,
-        boundary=_both(np.linalg.norm(volume(boundary.parameters[:n]) - boundary.vertices[:n], axis=1), scale),
-        mesh_to_spline=_both(to_boundary(vertices, volume, sampled), scale),
-        mesh_vertices=len(vertices),
-        spline_to_mesh=_both(to_mesh(sampled.points, vertices, faces), scale),
+        boundary=_both(
+            Distances.of(np.linalg.norm(volume(boundary.parameters[:n]) - boundary.vertices[:n], axis=1)), scale
+        ),
+        mesh_vertices=n,
+        mesh_to_spline=_both(found.mesh_to_spline.summary(), scale),
+        spline_to_mesh=_both(found.spline_to_mesh.summary(), scale),
+        surface_distance=_both(found.summary(), scale),
+        diagonal=float(np.linalg.norm(np.ptp(vertices, axis=0))),
+        mesh_samples=len(found.mesh_to_spline.distances),
+        spline_samples=len(found.spline_to_mesh.distances),
         boundary_check=boundary_check,
     )
 
 
-def _both(distances: Array, scale: float) -> BothScales[Distances]:
-    as_given = Distances.of(distances)
+def _both(as_given: Distances, scale: float) -> BothScales[Distances]:
     return BothScales(as_given.scaled(scale), as_given)
 
 

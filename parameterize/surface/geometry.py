@@ -113,7 +113,12 @@ def vertex_weights(vertices: Array, faces: IntArray, own: int) -> Array:
 
     own: how many vertices count, the first ones; those that a subdivision added do not.
     """
+    counted = np.arange(len(vertices)) < own
+    return np.asarray(0.5 * counted / own + 0.5 * area_shares(vertices, faces))
+
+
+def area_shares(vertices: Array, faces: IntArray) -> Array:
+    """Return the share (n,) of the surface's area that is nearest to each vertex: a third of each triangle there."""
     area = np.linalg.norm(doubled_areas(vertices, faces), axis=1)
     share = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
-    counted = np.arange(len(vertices)) < own
-    return np.asarray(0.5 * counted / own + 0.5 * share / share.sum())
+    return np.asarray(share / share.sum())

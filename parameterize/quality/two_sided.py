@@ -1,0 +1,74 @@
+"""The distance between a surface and the boundary of a spline, both ways, at samples that cover all of the two.
+
+A mesh's vertices alone say nothing of what lies between them: a box has eight. So its triangles are cut until there are
+two samples a span of the spline's boundary at least, and the spline's spans are sampled likewise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+from ..cube.cutting import subdivide_finely
+from ..spline.bspline import breakpoints
+from ..spline.volume import BSplineVolume
+from ..surface.geometry import area_shares, doubled_areas
+from .distances import Distances, SampledBoundary, nearest_on_boundary, to_mesh
+
+_PER_SPAN = 2.0  # samples on the mesh a direction, where spans have the mean area
+_MOST_SAMPLES = 100_000  # on the mesh, where it has not more vertices itself
+
+
+@dataclass(frozen=True, eq=False)
+class OneWay:
+    """The distances (m,) of samples on one surface from the other surface.
+
+    shares (m,): of the area, their sum is 1. parameters (m, 3): on the boundary of the cube, of the spline's points.
+    """
+
+    distances: Array
+    shares: Array
+    parameters: Array
+
+    def summary(self) -> Distances:
+        """Return the root mean square and the mean over the area, and the largest."""
+        return Distances.of(self.distances, self.shares)
+
+
+@dataclass(frozen=True, eq=False)
+class TwoSided:
+    """The distances from a mesh to the spline's boundary, and from this to the mesh."""
+
+    mesh_to_spline: OneWay
+    spline_to_mesh: OneWay
+
+    def summary(self) -> Distances:
+        """Return the root mean square and the mean of both ways, each counting half, and the largest of all."""
+        one, other = self.mesh_to_spline.summary(), self.spline_to_mesh.summary()
+        rms = np.sqrt((one.rms**2 + other.rms**2) / 2.0)
+        return Distances(float(rms), (one.mean + other.mean) / 2.0, max(one.max, other.max))
+
+
+def two_sided(volume: BSplineVolume, vertices: Array, faces: IntArray) -> TwoSided:
+    """Measure between a closed mesh (vertices (n, 3), faces (m, 3)) and the spline's boundary, in their unit of length.
+
+    The largest distance is one at samples, so it may fall short of the largest of all, the Hausdorff distance.
+    """
+    boundary = SampledBoundary.of(volume)
+    points, triangles = subdivide_finely(vertices, faces, _spacing(volume, vertices, faces), _MOST_SAMPLES)
+    parameters, distances = nearest_on_boundary(points, volume, boundary)
+    return TwoSided(
+        OneWay(distances, area_shares(points, triangles), parameters),
+        OneWay(
+            to_mesh(boundary.points, vertices, faces),
+            area_shares(boundary.points, boundary.triangles),
+            boundary.parameters,
+        ),
+    )
+
+
+def _spacing(volume: BSplineVolume, vertices: Array, faces: IntArray) -> float:
+    """Return how long an edge between samples on the mesh may be."""
+    u, v, w = (len(breakpoints(row)) - 1 for row in volume.knots)
+    area = float(np.linalg.norm(doubled_areas(vertices, faces), axis=1).sum()) / 2.0
+    return float(np.sqrt(area / (2 * (u * v + v * w + w * u)))) / _PER_SPAN
