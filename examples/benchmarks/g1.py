@@ -308,8 +308,8 @@ def as_markdown(rows: Sequence[Row], options: Options) -> str:
     parts = [
         "# G1: our figures beside the paper's",
         "Figures at or below the paper's are bold. The paper's are those of Table B.6, with the models brought to "
-        "volume 1, and for conch and santa4 of Table 3, at the scale they came in. Distances in this table are those at "
-        "the mesh's vertices, root mean square, as the paper's. Its det J > 0 is at samples of the network; "
+        "volume 1, and for conch and santa4 of Table 3, at the scale they came in. Distances in this table are at the "
+        "mesh's vertices, root mean square, as the paper's. Its det J > 0 is at samples of the network; "
         '"certified" is a proof for the spline.',
         processes.as_markdown(QUALITY_HEAD, [_quality_cells(row) for row in rows]),
         "Distances between spline and mesh, sampled over all of both: the two together over the diagonal of the box, "
