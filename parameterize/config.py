@@ -375,6 +375,6 @@ def preset(name: str) -> Config:
     >>> config.spline.control_points, config.stages[0].steps
     (20, 45)
     """
-    if name not in PRESETS:
+    if not isinstance(name, str) or name not in PRESETS:
         raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")
     return PRESETS[name]

@@ -448,7 +448,8 @@ def test_what_a_killed_run_left_half_written_goes(formula_training, in_folder, m
 
 
 def test_second_run_in_the_same_folder_is_refused(in_folder, capsys):
-    with open_folder("cube", "out", force=False):
+    with open_folder("cube", "out", force=False) as state:
+        state.begin("map")
         assert main(["parameterize", "cube", "--out", "out"]) == 2
         assert "in use by another run" in one_line(capsys.readouterr().err)
 

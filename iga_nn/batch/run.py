@@ -17,7 +17,7 @@ from ..workflow import pipeline
 from ..workflow.cost_estimate import warn_of_memory
 from ..workflow.output_folder import forget, locked, writable
 from ..workflow.watched import Ended
-from .surfaces import entries_of
+from .surfaces import demand_one, entries_of
 from .table import Batch, Row, page
 from .task import Task, Work, compute
 
@@ -84,6 +84,8 @@ def run_batch(
     ------
     ExpressionError
         For a formula that is refused.
+    MeshError
+        Where none of the surfaces is there.
     InputError
         For other options, a folder that cannot be written, and where dask is not installed. Surfaces that are refused
         or fail raise nothing.
@@ -113,6 +115,7 @@ def run_batch(
     corners = None if mapping.corners is None else Path(mapping.corners).absolute()
     common = replace(mapping, corners=corners, resume=True)
     entries = entries_of([str(surface) for surface in surfaces], Path(out))
+    demand_one(entries)
     tasks = [Task(entry.name, entry.mesh, entry.folder, common, options, vector) for entry in entries]
     return run_tasks(Path(out), tasks, workers, force=force, progress=progress)
 
