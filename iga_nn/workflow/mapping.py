@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
+from parameterize.compilation import compilation_told
 from parameterize.files import save_arrays
 from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import FACE_NAMES
@@ -68,8 +69,9 @@ def map_surface(
 
     command: the one that repeats it. equation, unknowns: the problem that is solved on the map, and its size.
     """
-    given = _prepare(state, mesh, options, equation, unknowns)
-    result = _train(given, options, progress, state.folder / CHECKPOINT)
+    with compilation_told():
+        given = _prepare(state, mesh, options, equation, unknowns)
+        result = _train(given, options, progress, state.folder / CHECKPOINT)
     state.begin("map", "solution")  # what was left until the checkpoint of a resumed run was accepted
     state.seconds.update(result.seconds)
     _write(state, given, result, command, options)
