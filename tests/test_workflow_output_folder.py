@@ -14,7 +14,10 @@ from solve.study import benchmark_volume
 @pytest.mark.parametrize(
     "arguments, says",
     [
-        (["run", "poisson", "beann"], "the samples are bean, bumpy_ball, cube, ellipsoid, seashell; did you mean bean?"),
+        (
+            ["run", "poisson", "beann"],
+            "the samples are bean, bumpy_ball, cube, ellipsoid, seashell; did you mean bean?",
+        ),
         (["run", "elasticity", "Cube", "--body-force", "0;0;-1"], "did you mean cube?"),
         (["run", "poisson", "zzz"], "zzz: no such file and no sample; the samples are bean,"),
         (["parameterize", "sea_shell", "--out", "new/er/out"], "did you mean seashell?"),

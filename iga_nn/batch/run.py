@@ -13,6 +13,7 @@ from ..errors import InputError, expected_errors, one_line
 from ..kinds import check_kind
 from ..options import MapOptions, PoissonOptions, WorkerOptions
 from ..report import document as reports
+from ..rounding import rounded
 from ..workflow import pipeline
 from ..workflow.cost_estimate import warn_of_memory
 from ..workflow.output_folder import forget, locked, writable
@@ -186,7 +187,7 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
         if workers.scheduler is None:
             count = min(workers.workers, len(waiting))
             wanted = count * cluster.memory_limit(workers)
-            what = f"{count} workers may take {wanted / 1e9:.1f} GB of memory"
+            what = f"{count} workers may take {rounded(wanted / 1e9, 1)} GB of memory"
             warn_of_memory(wanted / 1e6, what, "lower --workers or --memory-limit, or free some")
         _write(batch)
         show()

@@ -28,6 +28,7 @@ from ..models import resolve
 from ..options import Equation, MapOptions
 from ..report import advice
 from ..report import document as reports
+from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
 from .verdict import tell
@@ -109,7 +110,7 @@ def _prepare(
     with state.timed("load"):
         expected = forecast(surface, config, device=device, unknowns=unknowns)
     log.info("estimate: %s", expected)
-    needed = f"{expected.memory_mb / 1000.0:.1f} GB of memory are needed"
+    needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
     warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
     return _Given(surface, corners, marks, expected)
 

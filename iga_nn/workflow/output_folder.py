@@ -36,7 +36,8 @@ class RunFolder:
     """Fill one output folder: its report so far, and the clock.
 
     vector: write plots of curves as PDF, too. finished: the result that a resumed run found; nothing is left to do.
-    guarded: files of which no report tells are the user's own, and not replaced. make: makes a folder that is not there.
+    guarded: files of which no report tells are the user's own, and not replaced. make: makes the folder, where it is
+    not there.
     """
 
     folder: Path
