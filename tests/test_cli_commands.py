@@ -458,7 +458,6 @@ def test_second_run_in_the_same_folder_is_refused(in_folder, capsys):
 def test_ctrl_c_while_the_program_loads_is_one_line(in_folder):
     Path("sitecustomize.py").write_text(
         "import sys, signal\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)  # where pytest itself was started to ignore it\n"
         "class Interrupt:\n"
         "    def find_spec(self, name, *_):\n"
         "        if name == 'cyclopts': signal.raise_signal(signal.SIGINT)\n"
