@@ -1,12 +1,16 @@
 """What is on the disk before a run is accepted, and after it was refused or interrupted: nothing of its own."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
+from small_run import shortened
 
+import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
 from iga_nn.workflow.output_folder import open_folder
+from parameterize.run import check_checkpoint
 from parameterize.spline.volume import BSplineVolume
 from solve.study import benchmark_volume
 
@@ -95,3 +99,40 @@ def test_a_solve_makes_its_folder_once_the_volume_is_read(in_folder, monkeypatch
     monkeypatch.setattr(BSplineVolume, "load", watched)
     assert main(["solve", "poisson", "map.npz", "--refine", "0"]) == 0
     assert Path("map/report.html").is_file()
+
+
+@pytest.mark.parametrize("arguments", [["solve", "poisson"], ["study"]])
+def test_what_a_training_reported_is_not_replaced_by_a_solve(arguments, formula_training, in_folder, capsys):
+    """Its report says how the map was made and how good it is; --force replaces a solve by another one only."""
+    formula_training()
+    assert main(["parameterize", "cube", "--out", "out"]) == 0
+    before = {file.name: file.read_bytes() for file in Path("out").iterdir()}
+    assert main([*arguments, "out/volume.npz", "--refine", "0", "--out", "out", "--force"]) == 2
+    assert "out: holds a map and the report of its training" in capsys.readouterr().err.splitlines()[-1]
+    assert {file.name: file.read_bytes() for file in Path("out").iterdir()} == before
+    for _ in range(2):
+        assert main([*arguments, "out/volume.npz", "--refine", "0", "--out", "other", "--force"]) == 0
+
+
+@pytest.mark.parametrize("other", [["cube", "--seed", "3"], ["ellipsoid"], ["cube", "--steps-factor", "0.5"]])
+def test_a_checkpoint_of_another_run_is_refused_before_anything_is_computed(
+    other, in_folder, short_training, capsys, monkeypatch
+):
+    def interrupted(now):
+        if now.stage == "cube":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        iga_nn.run("poisson", "cube", "out", progress=interrupted)
+    before = {file: file.read_bytes() for file in Path("out").rglob("*") if file.is_file()}
+    monkeypatch.setattr("parameterize.run.check_checkpoint", partial(check_checkpoint_of_short, check_checkpoint))
+    monkeypatch.setattr("iga_nn.workflow.mapping.forecast", lambda *_, **__: pytest.fail("too late"))
+    assert main(["run", "poisson", *other, "--out", "out", "--resume"]) == 2
+    assert "belongs to another run (" in capsys.readouterr().err
+    assert {file: file.read_bytes() for file in Path("out").rglob("*") if file.is_file()} == before
+
+
+def check_checkpoint_of_short(check, surface, config, **given):
+    """As the short training of the fixture shortens the config."""
+    short = shortened(config)
+    check(surface, short.with_control_points(min(8, short.spline.control_points)), **given)

@@ -108,6 +108,7 @@ def run_batch(
         ("mapping", mapping, MapOptions),
         ("poisson", options, PoissonOptions),
         ("workers", workers, WorkerOptions),
+        ("progress", progress, Callable | None),
     ):
         check_kind(name, value, kind)
     pipeline.checked(mapping, options)

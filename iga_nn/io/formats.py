@@ -93,6 +93,8 @@ def load_volume(path: str | Path) -> BSplineVolume:
     (3, 3, 3)
     """
     check_kind("path", path, str | Path)
+    if path == "":
+        raise InputError("no volume is named: give a volume.npz, or a file of another program")
     source = Path(path)
     if source.is_dir():
         raise InputError(f"{source}: is a folder: name the volume.npz in it")

@@ -103,7 +103,9 @@ def _prepare(
     if equation is not None:
         _check_data(equation, surface)
     is_resumed = options.resume and has_checkpoint(state.folder)
-    if not is_resumed:
+    if is_resumed:
+        _check_checkpoint(state, surface, corners, options)
+    else:
         state.begin("map", "solution")
     if options.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
@@ -113,6 +115,18 @@ def _prepare(
     needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
     warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
     return _Given(surface, corners, marks, expected)
+
+
+def _check_checkpoint(state: RunFolder, surface: Surface, corners: Any, options: MapOptions) -> None:
+    """Raise InputError for a checkpoint of another surface, seed or config: it is seen before anything is computed."""
+    from parameterize.checkpoint import CheckpointError
+    from parameterize.run import check_checkpoint
+
+    given: dict[str, Any] = {"seed": options.seed, "device": options.device, "corners": corners}
+    try:
+        check_checkpoint(surface, options.config(), checkpoint_dir=state.folder / CHECKPOINT, **given)
+    except CheckpointError as error:
+        raise InputError(str(error)) from None
 
 
 def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray:

@@ -84,12 +84,16 @@ class RunFolder:
     def begin(self, *parts: Part) -> None:
         """Make the folder, or remove from it the report and the files of these parts that an older run left.
 
-        Call it once the input is accepted. Raises InputError where such a file is there but no readable report of the
-        run that made it, and where the folder cannot be made.
+        Call it once the input is accepted. Raises InputError where the folder cannot be made, where such a file is
+        there but no readable report of the run that made it, and where the report of a training would go without its
+        map.
         """
         if self.make is not None:
             make, self.make = self.make, None
             make()
+        if "map" not in parts and "config" in (reports.read(self.folder) or {}):
+            what = "holds a map and the report of its training, which would be lost"
+            raise InputError(f"{self.folder}: {what}; --out names another folder")
         targets = [self.folder / name for name in files_of("report", *parts)]
         kept = [target.name for target in targets if target.exists()]
         if self.guarded and kept:
