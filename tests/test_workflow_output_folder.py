@@ -136,3 +136,8 @@ def check_checkpoint_of_short(check, surface, config, **given):
     """As the short training of the fixture shortens the config."""
     short = shortened(config)
     check(surface, short.with_control_points(min(8, short.spline.control_points)), **given)
+
+
+def test_a_batch_whose_options_are_refused_leaves_no_folder(in_folder, capsys):
+    assert main(["batch", "cube", "--out", "new/er/out", "--memory-limit", "1XB"]) == 2
+    assert list(in_folder.iterdir()) == []

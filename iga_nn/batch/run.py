@@ -16,7 +16,7 @@ from ..report import document as reports
 from ..rounding import rounded
 from ..workflow import pipeline
 from ..workflow.cost_estimate import warn_of_memory
-from ..workflow.output_folder import forget, locked, writable
+from ..workflow.output_folder import forget, locked, new_folder, writable
 from ..workflow.watched import Ended
 from .surfaces import demand_one, entries_of
 from .table import Batch, Row, page
@@ -136,9 +136,7 @@ def run_tasks(
     work: a function of a module that the workers can import; it calls `compute` with its arguments.
     """
     workers.check()
-    with writable(out):
-        out.mkdir(parents=True, exist_ok=True)
-    with locked(out):
+    with locked(out) if out.exists() else new_folder(out):
         batch = Batch(out, tuple(_found(task, force) for task in tasks))
         if "waiting" in batch.counts:
             return _computed(batch, tasks, workers, progress or (lambda *_: None), work)

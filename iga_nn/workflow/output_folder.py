@@ -143,7 +143,7 @@ def open_folder(
     try:
         with ExitStack() as held:
             if not is_there:
-                yield RunFolder(folder, vector, make=lambda: held.enter_context(_new_folder(folder)))
+                yield RunFolder(folder, vector, make=lambda: held.enter_context(new_folder(folder)))
                 return
             held.enter_context(locked(folder))
             finished = _finished_result(folder, force, resume)
@@ -157,7 +157,7 @@ def open_folder(
 
 
 @contextmanager
-def _new_folder(folder: Path) -> Iterator[None]:
+def new_folder(folder: Path) -> Iterator[None]:
     """Make a folder with those above it, hold it, and remove in the end those that are empty. Raises InputError."""
     missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
