@@ -21,8 +21,13 @@ def run_and_exit() -> None:
 
 
 def catch_signals() -> None:
-    """Let Ctrl-C, unless it is ignored, and SIGTERM, which clusters and `timeout` send, raise KeyboardInterrupt."""
-    signal.signal(signal.SIGTERM, _interrupt)
+    """Let Ctrl-C, and SIGTERM, which clusters and `timeout` send, raise KeyboardInterrupt.
+
+    One that is ignored from the start stays so: `nohup`, or a script that starts the program in the background, wants
+    it to go on.
+    """
+    if signal.getsignal(signal.SIGTERM) is not signal.SIG_IGN:
+        signal.signal(signal.SIGTERM, _interrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupt)
 

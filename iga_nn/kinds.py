@@ -1,5 +1,6 @@
 """Checks the values of a dataclass against its annotations: Python does not, and the command line does it itself."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from numbers import Integral, Real
 from pathlib import Path
@@ -14,6 +15,7 @@ _KINDS: dict[Any, tuple[tuple[type, ...], str]] = {
     bool: ((bool,), "True or False"),
     str: ((str,), "a string"),
     Path: ((str, Path), "a path"),
+    Callable: ((Callable,), "a function"),  # type: ignore[dict-item]
     NoneType: ((NoneType,), "None"),
 }
 

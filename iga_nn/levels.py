@@ -7,6 +7,8 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from .rounding import rounded
+
 if TYPE_CHECKING:
     from solve import ConvergenceRow
 
@@ -85,6 +87,6 @@ def as_table(study: Study) -> str:
     keys = [key for key in COLUMNS if key in TITLES and key != "h"]
     lines = [[*(TITLES[key] for key in keys), "seconds"]]
     for row in rows_of(study):
-        lines.append([*(number(key, row[key]) for key in keys), f"{row['setup'] + row['solve']:.2f}"])
+        lines.append([*(number(key, row[key]) for key in keys), rounded(row["setup"] + row["solve"], 2)])
     widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
     return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in lines)

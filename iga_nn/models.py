@@ -8,7 +8,7 @@ from pathlib import Path
 
 from parameterize.surface.surface import MAX_FACES, MeshError, Surface, load_surface, surface_from_arrays
 
-from .errors import InputError
+from .errors import InputError, did_you_mean
 from .new_file import check_new, save_new
 from .samples import SAMPLES, obj_text
 
@@ -50,14 +50,22 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
         return surface_from_arrays(*SAMPLES[name](), name, component=component, max_faces=max_faces)
     if found := _in_data_folder(name):
         return load_surface(found, component=component, max_faces=max_faces)
-    known = Path(name).name.split(".")[0]
-    if known in MODELS:
-        raise MeshError(f"{name}: not found; get it with `iga-nn fetch {known}`, or set {DATA_FOLDER} to its folder")
-    if Path(name).exists():
+    if Path(name).exists() and Path(name).name.split(".")[0] not in MODELS:
         return load_surface(name, component=component, max_faces=max_faces)
+    raise not_found(name)
+
+
+def not_found(name: str) -> MeshError:
+    """Return the refusal of a name that is no file, no sample and no model at hand: what to do, and what is near."""
+    stem = Path(name).name.split(".")[0]
+    if stem in MODELS:
+        return MeshError(f"{name}: not found; get it with `iga-nn fetch {stem}`, or set {DATA_FOLDER} to its folder")
+    if name == f"{stem}.obj" and stem in SAMPLES:
+        return MeshError(f"{name}: no such file; `iga-nn sample {stem}` writes it")
+    hint = did_you_mean(name, (*SAMPLES, *MODELS))
     if Path(name).suffix:
-        raise MeshError(f"{name}: no such file: check the name and the folder")
-    raise MeshError(f"{name}: no such file and no sample; the samples are {', '.join(SAMPLES)}")
+        return MeshError(f"{name}: no such file: check the name and the folder{hint}")
+    return MeshError(f"{name}: no such file and no sample; the samples are {', '.join(SAMPLES)}{hint}")
 
 
 def fetch_all(name: str, out: str | Path | None = None, *, force: bool = False) -> Iterator[Path]:
@@ -81,7 +89,8 @@ def fetch(name: str, out: str | Path | None = None, *, force: bool = False) -> P
     and without a network, saying where to put the file; MeshError where the model cannot be read.
     """
     if name not in MODELS:
-        raise InputError(f"{name}: no such model; the models are {', '.join(sorted(MODELS))}; g1 is all but conch")
+        known = f"the models are {', '.join(sorted(MODELS))}; g1 is all but conch"
+        raise InputError(f"{name}: no such model; {known}{did_you_mean(name, MODELS)}")
     target = check_new(f"{name}.obj" if out is None else out, ".obj")
     source = _in_data_folder(name) or _download(name)
     is_obj = source.suffix == ".obj"

@@ -8,6 +8,8 @@ from dataclasses import KW_ONLY, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
+from parameterize.config import MAX_CONTROL_POINTS
+
 from .errors import InputError, input_errors
 from .kinds import Checked
 
@@ -19,7 +21,6 @@ if TYPE_CHECKING:
 Equation: TypeAlias = "Poisson | Elasticity | Problem"
 Formula = str  # one that starts with a minus is written --option=-x
 
-MAX_CONTROL_POINTS = 100  # per direction
 MAX_REFINE = 6
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
 MAX_WORKERS = 256  # on one machine

@@ -9,6 +9,8 @@ from parameterize.arrays import Array, IntArray
 from parameterize.files import save_text
 from parameterize.surface.surface import Surface, surface_from_arrays
 
+from .errors import did_you_mean
+
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
@@ -31,8 +33,8 @@ def sample(name: str) -> Surface:
     >>> iga_nn.sample("ellipsoid").vertices.shape
     (2500, 3)
     """
-    if name not in SAMPLES:
-        raise ValueError(f"no sample {name!r}: choose one of {', '.join(SAMPLES)}")
+    if not isinstance(name, str) or name not in SAMPLES:
+        raise ValueError(f"no sample {name!r}: choose one of {', '.join(SAMPLES)}{did_you_mean(str(name), SAMPLES)}")
     vertices, faces = SAMPLES[name]()
     return surface_from_arrays(vertices, faces, name)
 

@@ -47,6 +47,26 @@ class Checkpoints:
         other._suffix += f"-{name}"
         return other
 
+    def check(self) -> None:
+        """Raise CheckpointError where one of the files in the folder, of any part, is of another version or run.
+
+        Only their headers are read; what is damaged is refused when it is loaded.
+        """
+        for path in sorted(self._folder.glob("*.safetensors")) if self._folder is not None else []:
+            try:
+                with safe_open(path, framework="pt") as file:
+                    header = file.metadata() or {}
+                found = json.loads(header["identity"])
+            except (SafetensorError, OSError, LookupError, ValueError):
+                continue
+            _demand_format(path, header)
+            self._demand_own(path, found)
+
+    def _demand_own(self, path: Path, found: Any) -> None:
+        """Raise CheckpointError for a checkpoint with another identity."""
+        if differing := _differing(json.loads(self._identity), found):
+            raise CheckpointError(f"{path}: belongs to another run ({', '.join(differing)} differ); {_ANEW}")
+
     def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:
         """Write checkpoint `name`, replacing an older one. Raises OSError naming the file, say on a full disk."""
         if self._folder is None:
@@ -72,17 +92,19 @@ class Checkpoints:
                 tensors = {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118 - not a mapping
         except (SafetensorError, OSError, ValueError) as error:
             raise CheckpointError(f"{path}: not a readable checkpoint ({error}); {_DAMAGED}") from None
-        if header.get("format") != str(FORMAT):
-            raise CheckpointError(
-                f"{path}: written by another version of iga-nn (format {header.get('format', 'unknown')}, "
-                f"this one reads {FORMAT}); {_ANEW}"
-            )
+        _demand_format(path, header)
         if header.pop("sha256", None) != _digest(tensors, header):
             raise CheckpointError(f"{path}: not a readable checkpoint (damaged); {_DAMAGED}")
-        differing = _differing(json.loads(self._identity), json.loads(header["identity"]))
-        if differing:
-            raise CheckpointError(f"{path}: belongs to another run ({', '.join(differing)} differ); {_ANEW}")
+        self._demand_own(path, json.loads(header["identity"]))
         return tensors, json.loads(header["state"])
+
+
+def _demand_format(path: Path, header: Mapping[str, str]) -> None:
+    """Raise CheckpointError for the header of another version."""
+    if (written := header.get("format", "unknown")) != str(FORMAT):
+        raise CheckpointError(
+            f"{path}: written by another version of iga-nn (format {written}, this one reads {FORMAT}); {_ANEW}"
+        )
 
 
 def _digest(tensors: Mapping[str, Tensor], header: Mapping[str, str]) -> str:

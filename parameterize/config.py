@@ -10,6 +10,8 @@ from math import inf
 from numbers import Integral, Real
 from typing import Literal
 
+MAX_CONTROL_POINTS = 100  # per direction
+
 Target = Literal["S(2)", "S(1)", "cube"]
 
 
@@ -305,22 +307,31 @@ class Config:
     def refined(self, tolerance: float, max_control_points: int) -> Config:
         """Return the same options with knots inserted until a tolerance is met, see RefinementConfig.
 
-        Raises ValueError for a tolerance that is not positive, and for fewer control points than there are already.
+        Raises ValueError for a tolerance that is not positive, and for fewer control points than there are already, too
+        many, or no whole number.
         """
-        if not 0.0 < tolerance < inf:
-            raise ValueError(f"tolerance must be positive and finite, got {tolerance}")
-        if max_control_points < self.spline.control_points:
-            fewest = self.spline.control_points
-            raise ValueError(f"max_control_points must be at least {fewest}, got {max_control_points}")
+        if not isinstance(tolerance, Real) or not 0.0 < tolerance < inf:
+            raise ValueError(f"tolerance must be positive and finite, got {tolerance!r:.80}")
+        if not isinstance(max_control_points, Integral):
+            raise ValueError(f"max_control_points must be a whole number, got {max_control_points!r:.80}")
+        fewest = self.spline.control_points
+        if not fewest <= max_control_points <= MAX_CONTROL_POINTS:
+            given = f"between {fewest} and {MAX_CONTROL_POINTS}, got {max_control_points}"
+            raise ValueError(f"max_control_points must lie {given}")
         return replace(self, refinement=RefinementConfig(tolerance, max_control_points))
 
     def with_control_points(self, n: int) -> Config:
-        """Return the same options with n x n x n control points. Raises ValueError for too few, or no whole number."""
+        """Return the same options with n x n x n control points.
+
+        Raises ValueError for too few, too many, or no whole number.
+        """
         if not isinstance(n, Integral):
             raise ValueError(f"the number of control points must be a whole number, got {n!r:.80}")
         if n <= self.spline.degree:
             fewest = self.spline.degree + 1
             raise ValueError(f"degree {self.spline.degree} needs at least {fewest} control points, got {n}")
+        if n > MAX_CONTROL_POINTS:
+            raise ValueError(f"at most {MAX_CONTROL_POINTS} control points per direction can be run, got {n}")
         return replace(self, spline=replace(self.spline, control_points=n))
 
 
@@ -381,6 +392,6 @@ def preset(name: str) -> Config:
     >>> config.spline.control_points, config.stages[0].steps
     (20, 45)
     """
-    if name not in PRESETS:
+    if not isinstance(name, str) or name not in PRESETS:
         raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")
     return PRESETS[name]

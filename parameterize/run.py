@@ -122,7 +122,7 @@ def parameterize(
     Raises
     ------
     TypeError
-        For a surface, config or seed of another type.
+        For a surface, config, seed or progress of another type.
     ValueError
         For a negative seed, bad corners or a device that is not there.
     CheckpointError
@@ -139,16 +139,11 @@ def parameterize(
     ((6, 6, 6), 1)
     """
     config, seed = _checked(surface, config, seed)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
     place = choose_device(device)
     given = None if corners is None else corner_vertices(surface, corners)
-    identity = {
-        "surface": hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest(),
-        "config": asdict(config),
-        "seed": seed,
-        "device": place.type,
-        "dtype": str(dtype),
-        "corners": None if given is None else given.tolist(),
-    }
+    identity = _identity(surface, config, seed, place, dtype, given)
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     history, seconds = History(), dict[str, float]()
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
@@ -178,6 +173,36 @@ def parameterize(
         origin=attempt.origin,
         refinement=told,
     )
+
+
+def check_checkpoint(
+    surface: Surface,
+    config: Config,
+    *,
+    seed: int,
+    device: str,
+    corners: ArrayLike | None,
+    checkpoint_dir: Path,
+    dtype: torch.dtype = torch.float32,
+) -> None:
+    """Raise CheckpointError where a run of these arguments of `parameterize` could not go on from that folder."""
+    given = None if corners is None else corner_vertices(surface, corners)
+    identity = _identity(surface, config, seed, choose_device(device), dtype, given)
+    Checkpoints(checkpoint_dir, identity, resume=True).check()
+
+
+def _identity(
+    surface: Surface, config: Config, seed: int, device: torch.device, dtype: torch.dtype, corners: IntArray | None
+) -> dict[str, Any]:
+    """Return what the checkpoints of a run are known by."""
+    return {
+        "surface": hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest(),
+        "config": asdict(config),
+        "seed": seed,
+        "device": device.type,
+        "dtype": str(dtype),
+        "corners": None if corners is None else corners.tolist(),
+    }
 
 
 def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config, int]:

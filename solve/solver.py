@@ -1,12 +1,13 @@
 """One entrance for all problems: check, discretize, solve."""
 
 import functools
-import logging
+import inspect
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
+from parameterize.compilation import compilation_told
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume, demand_volume
 from parameterize.threads import default_threads
@@ -18,8 +19,6 @@ from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .solution import Solution
 from .system import SolverOptions, System, assemble_data, balanced, build, check_device
-
-log = logging.getLogger(__name__)
 
 
 def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution:
@@ -75,7 +74,7 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     ExpressionError
         Where the data are not finite or have the wrong sign.
     TypeError
-        For what is no problem or no volume.
+        For what is no problem or no volume, and for an option that there is not.
 
     Examples
     --------
@@ -85,7 +84,11 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     >>> solution.report.dofs, solution.report.l2_relative < 1e-3
     (343, True)
     """
-    of_solver = {field.name: how.pop(field.name) for field in fields(SolverOptions) if field.name in how}
+    own = [field.name for field in fields(SolverOptions)]
+    options = [*list(inspect.signature(discretize).parameters)[2:], *own]
+    if unknown := [name for name in how if name not in options]:
+        raise TypeError(f"{unknown[0]}: is no option of a solve; the options are {', '.join(options)}")
+    of_solver = {name: how.pop(name) for name in own if name in how}
     check_device(SolverOptions(**of_solver).device, problem)
     return discretize(volume, problem, **how).solve(**of_solver)
 
@@ -155,7 +158,6 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
 @functools.cache
 def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool) -> None:
     """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
-    log.info("preparing the compiled kernels: some seconds on the first use, then they are cached")
     # A large block freed teaches glibc (mallopt(3), M_MMAP_THRESHOLD) to keep freed memory. Else every temporary of a
     # plane goes back to the system and is faulted in again: formulas take five times as long.
     np.empty(2**21)
@@ -163,4 +165,5 @@ def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool)
     rows = [greville(row, p) for row, p in zip(knots, degrees, strict=True)]
     cube = BSplineVolume(degrees, tuple(knots), np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1))  # type: ignore[arg-type]
     problem = Poisson(exact="x*x") if is_scalar else Elasticity(exact=("x*x", "y", "z"))
-    build(cube, problem, trial_space(cube, 1, degree)).solve()
+    with compilation_told():
+        build(cube, problem, trial_space(cube, 1, degree)).solve()

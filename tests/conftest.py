@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import shutil
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,9 @@ import numpy as np
 import pytest
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch: its sums round differently with the number of threads
+for _number in (signal.SIGINT, signal.SIGTERM):
+    if signal.getsignal(_number) is signal.SIG_IGN:  # `nohup make test &`; what the tests start would inherit it
+        signal.signal(_number, lambda *_: None)  # so it is ignored here alone: a new program starts with the default
 STAGES = ("S(2)", "S(1)", "cube", "corners", "edges")
 
 

@@ -448,7 +448,8 @@ def test_what_a_killed_run_left_half_written_goes(formula_training, in_folder, m
 
 
 def test_second_run_in_the_same_folder_is_refused(in_folder, capsys):
-    with open_folder("cube", "out", force=False):
+    with open_folder("cube", "out", force=False) as state:
+        state.begin("map")
         assert main(["parameterize", "cube", "--out", "out"]) == 2
         assert "in use by another run" in one_line(capsys.readouterr().err)
 
@@ -457,7 +458,6 @@ def test_second_run_in_the_same_folder_is_refused(in_folder, capsys):
 def test_ctrl_c_while_the_program_loads_is_one_line(in_folder):
     Path("sitecustomize.py").write_text(
         "import sys, signal\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)  # where pytest itself was started to ignore it\n"
         "class Interrupt:\n"
         "    def find_spec(self, name, *_):\n"
         "        if name == 'cyclopts': signal.raise_signal(signal.SIGINT)\n"

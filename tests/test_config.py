@@ -49,7 +49,7 @@ def test_refined():
     for tolerance in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="tolerance must be positive and finite"):
             config.refined(tolerance, 20)
-    with pytest.raises(ValueError, match="at least 12, got 11"):
+    with pytest.raises(ValueError, match="between 12 and 100, got 11"):
         config.refined(1e-3, 11)
 
 

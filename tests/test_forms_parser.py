@@ -4,6 +4,7 @@ import formulas
 import numpy as np
 import pytest
 
+from solve.forms.frame import UnitFrame
 from solve.forms.jets import PAIRS
 from solve.forms.parser import Expression, ExpressionError
 
@@ -23,10 +24,24 @@ POINTS = np.random.default_rng(0).uniform(0.3, 1.2, (3, 20))
         ("abs(-3)*sqrt(16)", 12.0),
         ("1.5e1", 15.0),
         ("x + 10*y + 100*z", 321.0),
+        ("+y", 2.0),
+        ("+2**2", 4.0),
+        ("-+y", -2.0),
+        ("+-y", -2.0),
+        ("x - +y", -1.0),
+        ("x + + + y", 3.0),
+        ("+(x)*+(y + +z)", 5.0),
+        ("2*+y", 4.0),
+        ("6/+y", 3.0),
+        ("y**+3", 8.0),
+        ("y**-+1", 0.5),
+        ("abs(+x - +z)", 2.0),
+        ("+Y", 20.0),
     ],
 )
 def test_values_by_hand(text, value):
-    assert Expression(text)(1.0, 2.0, 3.0) == pytest.approx(value)
+    frame = UnitFrame((0.0, 0.0, 0.0), 0.1)  # Y = 10 y
+    assert Expression(text, frame)(1.0, 2.0, 3.0) == pytest.approx(value)
 
 
 @pytest.mark.parametrize(
@@ -39,6 +54,8 @@ def test_values_by_hand(text, value):
         ("y/x", (-2, 1, 0), (4, -1, 0, 0, 0, 0)),
         ("log(y)", (0, 0.5, 0), (0, 0, 0, -0.25, 0, 0)),
         ("abs(0-x)", (1, 0, 0), (0, 0, 0, 0, 0, 0)),
+        ("+x*+x*+y", (4, 1, 0), (4, 2, 0, 0, 0, 0)),
+        ("-+(+y)**+2", (0, -4, 0), (0, 0, 0, -2, 0, 0)),
     ],
 )
 def test_derivatives_by_hand(text, gradient, hessian):
@@ -103,7 +120,9 @@ ATTACKS = [
     "x % 2",
     "x @ y",
     "~x",
-    "+x",
+    "+",
+    "+" * 900 + "x",
+    "x +* y",
     "x := 1",
     "x; y",
     "'text'",

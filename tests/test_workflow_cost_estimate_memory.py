@@ -45,7 +45,7 @@ def test_what_does_not_fit_names_the_processes_that_would(monkeypatch, caplog):
         with caplog.at_level(logging.INFO, "iga_nn"):
             cost_estimate.tell_memory(volume, options.problem(), options)
         said = [record.getMessage() for record in caplog.records]
-        assert said[0] == f"estimate: {wanted.on(1) / 1000.0:.2f} GB of memory"
+        assert said[0] == f"estimate: {wanted.on(1) / 1000.0:.1f} GB of memory"
         assert len(said) == 1 + (free < wanted.on(1))
         if named:
             assert f"mpiexec -n {named} iga-nn solve .. --mpi" in said[1]

@@ -13,11 +13,12 @@ from ..errors import InputError, expected_errors, one_line
 from ..kinds import check_kind
 from ..options import MapOptions, PoissonOptions, WorkerOptions
 from ..report import document as reports
+from ..rounding import rounded
 from ..workflow import pipeline
 from ..workflow.cost_estimate import warn_of_memory
-from ..workflow.output_folder import forget, locked, writable
+from ..workflow.output_folder import forget, locked, new_folder, writable
 from ..workflow.watched import Ended
-from .surfaces import entries_of
+from .surfaces import demand_one, entries_of
 from .table import Batch, Row, page
 from .task import Task, Work, compute
 
@@ -84,6 +85,8 @@ def run_batch(
     ------
     ExpressionError
         For a formula that is refused.
+    MeshError
+        Where none of the surfaces is there.
     InputError
         For other options, a folder that cannot be written, and where dask is not installed. Surfaces that are refused
         or fail raise nothing.
@@ -105,6 +108,7 @@ def run_batch(
         ("mapping", mapping, MapOptions),
         ("poisson", options, PoissonOptions),
         ("workers", workers, WorkerOptions),
+        ("progress", progress, Callable | None),
     ):
         check_kind(name, value, kind)
     pipeline.checked(mapping, options)
@@ -113,6 +117,7 @@ def run_batch(
     corners = None if mapping.corners is None else Path(mapping.corners).absolute()
     common = replace(mapping, corners=corners, resume=True)
     entries = entries_of([str(surface) for surface in surfaces], Path(out))
+    demand_one(entries)
     tasks = [Task(entry.name, entry.mesh, entry.folder, common, options, vector) for entry in entries]
     return run_tasks(Path(out), tasks, workers, force=force, progress=progress)
 
@@ -131,9 +136,7 @@ def run_tasks(
     work: a function of a module that the workers can import; it calls `compute` with its arguments.
     """
     workers.check()
-    with writable(out):
-        out.mkdir(parents=True, exist_ok=True)
-    with locked(out):
+    with locked(out) if out.exists() else new_folder(out):
         batch = Batch(out, tuple(_found(task, force) for task in tasks))
         if "waiting" in batch.counts:
             return _computed(batch, tasks, workers, progress or (lambda *_: None), work)
@@ -183,7 +186,7 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
         if workers.scheduler is None:
             count = min(workers.workers, len(waiting))
             wanted = count * cluster.memory_limit(workers)
-            what = f"{count} workers may take {wanted / 1e9:.1f} GB of memory"
+            what = f"{count} workers may take {rounded(wanted / 1e9, 1)} GB of memory"
             warn_of_memory(wanted / 1e6, what, "lower --workers or --memory-limit, or free some")
         _write(batch)
         show()

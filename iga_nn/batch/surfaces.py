@@ -9,7 +9,7 @@ from pathlib import Path
 from parameterize.surface.readers.file import FORMATS
 
 from ..errors import InputError
-from ..models import MODELS, SET, in_set
+from ..models import MODELS, SET, in_set, not_found
 from ..samples import SAMPLES
 from ..workflow.output_folder import default_folder
 
@@ -43,6 +43,12 @@ def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
         Entry(printable(name), mesh, out.absolute() / folder)
         for name, mesh, folder in zip(found.values(), meshes, distinct_folders(meshes), strict=True)
     ]
+
+
+def demand_one(entries: Sequence[Entry]) -> None:
+    """Raise MeshError where none of the surfaces that are named is there; where some are, the table tells of others."""
+    if not any(entry.mesh in SAMPLES or entry.mesh in MODELS or Path(entry.mesh).exists() for entry in entries):
+        raise not_found(entries[0].name)
 
 
 def _names_in(given: str) -> Iterator[str]:

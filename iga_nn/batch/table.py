@@ -17,6 +17,7 @@ from ..levels import csv_text
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..report.html import filled
+from ..rounding import rounded
 from ..version import __version__
 from ..workflow.watched import Ended
 from .surfaces import Entry, printable
@@ -84,7 +85,7 @@ class Row:
         figures = self.figures()
         facts: list[str] = [self.state, *filter(None, [self.line])]
         if self.report is not None:
-            facts += [f"ARAP mean {figures['arap_mean']:.3f}", f"{figures['seconds']:.0f} s"]
+            facts += [f"ARAP mean {figures['arap_mean']:.3f}", f"{rounded(figures['seconds'], 0)} s"]
         return f"{self.entry.name}: {', '.join(facts)}"
 
 
@@ -163,7 +164,7 @@ def _text(name: str, value: Any) -> str:
         return "–"
     if isinstance(value, str):
         return value
-    return f"{value:,.0f}" if name in WHOLE else f"{value:.3g}"
+    return rounded(value, 0) if name in WHOLE else f"{value:.3g}"
 
 
 def _picture(path: Path) -> str:

@@ -7,6 +7,7 @@ from ..levels import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice
 from ..report import document as reports
 from ..report.artifacts import PAGE
+from ..rounding import rounded
 from ..workflow.output_folder import Outcome
 from . import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED
 
@@ -37,7 +38,7 @@ def verdict_in_words(outcome: Outcome) -> str:
     if chosen := reports.control_points_in_words(outcome.report):
         lines.append(f"control points   {chosen}")
     levels = [_level(level) for level in verdict.get("levels", [])]
-    lines += [*levels[:-1], f"{verdict['seconds']:.1f} s", *advice.in_words(outcome.report)]
+    lines += [*levels[:-1], f"{rounded(verdict['seconds'], 1)} s", *advice.in_words(outcome.report)]
     proved = f"det J > 0 {verdict['bijective']}; one-to-one: {verdict['one_to_one']}"
     ending = {"verdict": proved, "error": "".join(levels[-1:]), "open": str(outcome.folder / PAGE)}
     return "\n".join([*lines, *(f"{name:16s} {text}" for name, text in ending.items() if text)])

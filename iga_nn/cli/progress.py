@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +17,7 @@ from rich.progress import Progress as Bar
 from rich.table import Column
 from rich.text import Text
 
+from ..rounding import rounded
 from ..workflow.watched import logged
 
 if TYPE_CHECKING:
@@ -68,7 +70,9 @@ def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
     """Show the state of a batch: how many surfaces ended, the stage and the share done of those computed."""
     total = len(batch.rows)
     ended = total - batch.counts.get("waiting", 0)
-    state = ", ".join(f"{each.name} {each.stage} {each.share:.0%}" for each in running) or "workers start"
+    state = (
+        ", ".join(f"{each.name} {each.stage} {rounded(100.0 * each.share, 0)}%" for each in running) or "workers start"
+    )
     done = ended + sum(each.share for each in running)
     bar = {"completed": done, "total": total, "ended": f"{ended}/{total}"}
     show(f"{ended} of {total} surfaces; {state}", state=state if ended < total else "", **bar)
@@ -76,7 +80,7 @@ def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
 
 def describe(progress: Progress) -> str:
     """Return folds, time left and loss as text; how long the spline fit takes is known only when it runs."""
-    minutes, seconds = divmod(round(max(0.0, progress.seconds_left)), 60)
+    minutes, seconds = divmod(math.ceil(max(0.0, progress.seconds_left)), 60)
     left = f"{minutes}:{seconds:02d} left"
     folds = f"{progress.folded} fold{'s' * (progress.folded != 1)}"
     when = f"about {left}" if progress.stage == "spline" else f"{left}, then the spline fit"

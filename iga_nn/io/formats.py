@@ -20,7 +20,7 @@ from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
 from solve.field import SplineField
 
-from ..errors import InputError, input_errors
+from ..errors import InputError, did_you_mean, input_errors
 from ..kinds import check_kind
 from ..new_file import check_new
 from ..options import PROBLEMS, Equation
@@ -93,6 +93,8 @@ def load_volume(path: str | Path) -> BSplineVolume:
     (3, 3, 3)
     """
     check_kind("path", path, str | Path)
+    if path == "":
+        raise InputError("no volume is named: give a volume.npz, or a file of another program")
     source = Path(path)
     if source.is_dir():
         raise InputError(f"{source}: is a folder: name the volume.npz in it")
@@ -146,7 +148,8 @@ def export(
     for name, value, kind in (("volume", volume, str | Path), ("to", to, str), ("out", out, str | Path | None)):
         check_kind(name, value, kind)
     if to not in FORMATS:
-        raise InputError(f"format {to!r}: choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines")
+        known = f"choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines"
+        raise InputError(f"format {to!r}: {known}{did_you_mean(to, FORMATS)}")
     chosen = FORMATS[to]
     target = check_new(
         Path(volume).stem + chosen.ending if out is None else out, chosen.ending[chosen.ending.index(".") :]

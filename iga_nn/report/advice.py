@@ -6,10 +6,11 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray, in_brackets
 from parameterize.certificate.jacobian import Certificate
+from parameterize.config import MAX_CONTROL_POINTS
 from parameterize.spline.bspline import midpoints
 from parameterize.spline.volume import BSplineVolume
 
-from ..options import MAX_CONTROL_POINTS, MapOptions
+from ..options import MapOptions
 from .document import Report, is_certified
 
 SHOWN = 5  # places

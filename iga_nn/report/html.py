@@ -15,6 +15,7 @@ from parameterize.files import save_text
 
 from ..errors import one_line
 from ..levels import TITLES, as_rows, capitalized
+from ..rounding import rounded
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, SOLVED, figures_of
@@ -86,6 +87,7 @@ def filled(template: str, **content: Any) -> str:
     """Return a template of this package with its content, which is escaped."""
     loader = PackageLoader("iga_nn", "")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    environment.filters["rounded"] = rounded
     return environment.get_template(template).render(content)
 
 
@@ -174,5 +176,5 @@ def _details(report: Report) -> dict[str, dict[str, Any]]:
     given |= {name: report[name] for name in ("seed", "device") if name in report}
     if "config" in report:
         given["preset"] = report["config"]["name"]
-    seconds = {name: f"{value:.2f}" for name, value in report["seconds"].items()}
+    seconds = {name: rounded(value, 2) for name, value in report["seconds"].items()}
     return {"Input": given, "Seconds": seconds, "Versions": report["versions"]}

@@ -26,6 +26,7 @@ from solve.discretization.quadrature import rule_of
 from solve.discretization.space import trial_space
 
 from ..options import Equation, ProblemOptions
+from ..rounding import rounded
 
 if TYPE_CHECKING:
     import torch
@@ -74,7 +75,7 @@ class Forecast:
         unit, size = ("minute", 60.0) if high >= 90.0 else ("second", 1.0)
         first, last = max(1, round(low / size)), max(1, round(high / size))
         span = f"{first} to {last} {unit}s" if first < last else f"{last} {unit}{'s' * (last > 1)}"
-        return f"about {span}, {self.memory_mb / 1000.0:.1f} GB of memory"
+        return f"about {span}, {rounded(self.memory_mb / 1000.0, 1)} GB of memory"
 
 
 def forecast(
@@ -208,7 +209,7 @@ def warn_of_memory(wanted_mb: float, what: str, remedy: str) -> None:
     """Warn where so many megabytes are not free. what: takes them, in words."""
     free = available_memory_mb()
     if free is not None and wanted_mb > free:
-        log.warning("%s, %.1f GB are free: %s", what, free / 1000.0, remedy)
+        log.warning("%s, %s GB are free: %s", what, rounded(free / 1000.0, 1), remedy)
 
 
 @dataclass(frozen=True)
@@ -244,15 +245,16 @@ def tell_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptio
         processes, here = comm.size, comm.allgather(platform.node()).count(platform.node())
     wanted, free = solve_memory(volume, equation, options), available_memory_mb(here)
     needed = wanted.on(processes)
-    log.info("estimate: %.2f GB of memory%s", needed / 1000.0, f" on each of {processes} processes" * (processes > 1))
+    each = f" on each of {processes} processes" * (processes > 1)
+    log.info("estimate: %s GB of memory%s", rounded(needed / 1000.0, 1), each)
     if free is None or needed <= free:
         return
     spans = len(trial_space(volume, max(options.refine), options.degree).breaks[0]) - 1
     enough = next((count for count in range(processes + 1, spans + 1) if wanted.on(count) <= free), None)
     more = f", or take {enough} processes with as much memory each: mpiexec -n {enough} iga-nn solve .. --mpi"
     log.warning(
-        "%.2f GB of memory are needed, %.2f GB are free: lower --refine%s",
-        needed / 1000.0,
-        free / 1000.0,
+        "%s GB of memory are needed, %s GB are free: lower --refine%s",
+        rounded(needed / 1000.0, 2),
+        rounded(free / 1000.0, 2),
         more if enough else "",
     )

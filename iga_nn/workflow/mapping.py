@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
+from parameterize.compilation import compilation_told
 from parameterize.files import save_arrays
 from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import FACE_NAMES
@@ -27,6 +28,7 @@ from ..models import resolve
 from ..options import Equation, MapOptions
 from ..report import advice
 from ..report import document as reports
+from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
 from .verdict import tell
@@ -68,8 +70,9 @@ def map_surface(
 
     command: the one that repeats it. equation, unknowns: the problem that is solved on the map, and its size.
     """
-    given = _prepare(state, mesh, options, equation, unknowns)
-    result = _train(given, options, progress, state.folder / CHECKPOINT)
+    with compilation_told():
+        given = _prepare(state, mesh, options, equation, unknowns)
+        result = _train(given, options, progress, state.folder / CHECKPOINT)
     state.begin("map", "solution")  # what was left until the checkpoint of a resumed run was accepted
     state.seconds.update(result.seconds)
     _write(state, given, result, command, options)
@@ -100,16 +103,30 @@ def _prepare(
     if equation is not None:
         _check_data(equation, surface)
     is_resumed = options.resume and has_checkpoint(state.folder)
-    if not is_resumed:
+    if is_resumed:
+        _check_checkpoint(state, surface, corners, options)
+    else:
         state.begin("map", "solution")
     if options.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
     with state.timed("load"):
         expected = forecast(surface, config, device=device, unknowns=unknowns)
     log.info("estimate: %s", expected)
-    needed = f"{expected.memory_mb / 1000.0:.1f} GB of memory are needed"
+    needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
     warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
     return _Given(surface, corners, marks, expected)
+
+
+def _check_checkpoint(state: RunFolder, surface: Surface, corners: Any, options: MapOptions) -> None:
+    """Raise InputError for a checkpoint of another surface, seed or config: it is seen before anything is computed."""
+    from parameterize.checkpoint import CheckpointError
+    from parameterize.run import check_checkpoint
+
+    given: dict[str, Any] = {"seed": options.seed, "device": options.device, "corners": corners}
+    try:
+        check_checkpoint(surface, options.config(), checkpoint_dir=state.folder / CHECKPOINT, **given)
+    except CheckpointError as error:
+        raise InputError(str(error)) from None
 
 
 def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray:

@@ -4,8 +4,8 @@ import logging
 import os
 import shutil
 import time
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -36,13 +36,15 @@ class RunFolder:
     """Fill one output folder: its report so far, and the clock.
 
     vector: write plots of curves as PDF, too. finished: the result that a resumed run found; nothing is left to do.
-    guarded: files of which no report tells are the user's own, and not replaced.
+    guarded: files of which no report tells are the user's own, and not replaced. make: makes the folder, where it is
+    not there.
     """
 
     folder: Path
     vector: bool = False
     finished: Outcome | None = None
     guarded: bool = False
+    make: Callable[[], None] | None = None
     report: reports.Report = field(default_factory=lambda: {"schema": reports.SCHEMA})
     seconds: dict[str, float] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
@@ -80,10 +82,18 @@ class RunFolder:
         self.report.setdefault("not_drawn", {})[what] = reason
 
     def begin(self, *parts: Part) -> None:
-        """Remove the report and the files of these parts that an older run left; call it once the input is accepted.
+        """Make the folder, or remove from it the report and the files of these parts that an older run left.
 
-        Raises InputError where such a file is there but no readable report of the run that made it.
+        Call it once the input is accepted. Raises InputError where the folder cannot be made, where such a file is
+        there but no readable report of the run that made it, and where the report of a training would go without its
+        map.
         """
+        if self.make is not None:
+            make, self.make = self.make, None
+            make()
+        if "map" not in parts and "config" in (reports.read(self.folder) or {}):
+            what = "holds a map and the report of its training, which would be lost"
+            raise InputError(f"{self.folder}: {what}; --out names another folder")
         targets = [self.folder / name for name in files_of("report", *parts)]
         kept = [target.name for target in targets if target.exists()]
         if self.guarded and kept:
@@ -119,19 +129,23 @@ def default_folder(source: str | Path) -> Path:
 def open_folder(
     source: str | Path, out: str | Path | None, force: bool, resume: bool = False, vector: bool = False
 ) -> Iterator[RunFolder]:
-    """Create the output folder, hold it for one run and yield it; an empty one is removed again at the end.
+    """Hold the output folder for one run and yield it; one that is not there is made by `RunFolder.begin`.
 
+    An input that is refused so leaves nothing behind; what was made and stays empty is removed again at the end.
     Raises InputError, before anything costly is computed, where the folder cannot be written or another run uses it,
     and where it holds a result or an interrupted run that neither `force` nor `resume` allows to touch.
     """
     if out == "":
         raise InputError("out is empty: name a folder")
     folder = Path(out) if out is not None else default_folder(source)
-    is_new = not folder.exists()
     with writable(folder):
-        folder.mkdir(parents=True, exist_ok=True)
+        is_there = folder.exists()
     try:
-        with locked(folder):
+        with ExitStack() as held:
+            if not is_there:
+                yield RunFolder(folder, vector, make=lambda: held.enter_context(new_folder(folder)))
+                return
+            held.enter_context(locked(folder))
             finished = _finished_result(folder, force, resume)
             if not finished:
                 with writable(folder):
@@ -140,10 +154,21 @@ def open_folder(
             yield RunFolder(folder, vector, finished, guarded)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {_way_on(folder)}") from None
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[None]:
+    """Make a folder with those above it, hold it, and remove in the end those that are empty. Raises InputError."""
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        with writable(folder):
+            folder.mkdir(parents=True)  # where another run has made it since, that one has it
+        with locked(folder):
+            yield
     finally:
-        if is_new:
-            with suppress(OSError):  # it is not empty
-                folder.rmdir()
+        with suppress(OSError):  # one is not empty, nor are those above it
+            for place in missing:
+                place.rmdir()
 
 
 def _finished_result(folder: Path, force: bool, resume: bool) -> Outcome | None:

@@ -5,6 +5,7 @@ Every file is written as soon as its content is known, so that a late failure lo
 
 import logging
 from collections import deque
+from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from itertools import chain
 from pathlib import Path
@@ -89,6 +90,7 @@ def run(
     >>> [level["dofs"] for level in outcome.report["poisson"]["levels"]], (outcome.folder / "report.html").exists()
     ([216], True)
     """
+    check_kind("problem", problem, str)
     if problem not in PROBLEMS:
         raise InputError(f"problem {problem!r}: choose one of {', '.join(PROBLEMS)}")
     mapping, options = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
@@ -113,6 +115,7 @@ def parameterize_to(
     check_kind("mapping", mapping, MapOptions)
     check_kind("mesh", mesh, str | Path)
     check_kind("out", out, str | Path | None)
+    check_kind("progress", progress, Callable | None)
     equation, unknowns = (None, 0) if problem is None else checked(mapping, problem)
     command = _command(mesh, out, mapping, problem)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:

@@ -8,6 +8,7 @@ from typing import Any
 from parameterize.arrays import in_brackets
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.jacobian import certify
+from parameterize.compilation import compilation_told
 from parameterize.quality.quality import proved
 from parameterize.spline.volume import BSplineVolume
 
@@ -21,8 +22,9 @@ log = logging.getLogger(__name__)
 
 def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
     """Certify a volume and return the section `parameterization` of report.json."""
-    certificate = certify(volume)
-    facts = proved(volume.shape, volume.degrees, certificate, check_boundary(volume))
+    with compilation_told():
+        certificate = certify(volume)
+        facts = proved(volume.shape, volume.degrees, certificate, check_boundary(volume))
     return facts | advice.unproved(volume, certificate)
 
 

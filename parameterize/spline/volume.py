@@ -215,9 +215,9 @@ class BSplineVolume(Brief, Shown):
         return np.stack([self.grid(u, v, w, d) for d in ((1, 0, 0), (0, 1, 0), (0, 0, 1))], axis=-1)
 
     def refined(self, levels: int = 1) -> "BSplineVolume":
-        """Return the same map with every span halved `levels` times, exactly (knot insertion)."""
-        if levels < 0:
-            raise ValueError(f"levels must be non-negative, got {levels}")
+        """Return the same map with every span halved `levels` times, exactly (knot insertion). Raises ValueError."""
+        if not isinstance(levels, Integral) or levels < 0:
+            raise ValueError(f"levels must be a whole number, at least 0, got {levels!r:.80}")
         volume = self
         for _ in range(levels):
             u, v, w = map(halved, volume.knots)

@@ -172,6 +172,8 @@ class _Translator:
             case ast.UnaryOp(op=ast.USub()):
                 inner = self._node(node.operand, depth + 1)
                 return lambda p: -inner(p)
+            case ast.UnaryOp(op=ast.UAdd()):
+                return self._node(node.operand, depth + 1)
             case ast.BinOp(op=ast.BitXor()):
                 raise self._refuse(node, "a power is written with **, as in x**2")
             case ast.BinOp(op=op) if type(op) in OPERATORS:
