@@ -6,6 +6,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.quality.quality import scaled_jacobian
+from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .discretization.errors import Errors
@@ -184,7 +185,8 @@ def solve_notices(volume: BSplineVolume, matrix: MatrixFree, certified: str | No
         notices.append(f"the map is {certified}, not certified: do not trust the solution")
     if matrix.folded:
         points = matrix.space.total(int(np.prod(matrix.rule.shape)))
-        notices.append(f"det J < 0 at {matrix.folded} of {points} Gauss points: solved with |det J| instead")
+        wrong = "det J < 0" if orientation(volume) > 0 else "the map is left-handed, and det J > 0"
+        notices.append(f"{wrong} at {matrix.folded} of {points} Gauss points: solved with |det J| instead")
     if result.indefinite:
         notices.append(
             f"no convergence: after {result.iterations} iterations the matrix turned out not to be positive definite, "
@@ -206,15 +208,15 @@ def solve_notices(volume: BSplineVolume, matrix: MatrixFree, certified: str | No
 
 
 def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array, float]:
-    """Return where the map's scaled Jacobian, det J over the product of its columns' lengths, is least.
+    """Return where the map's scaled Jacobian, |det J| over the product of its columns' lengths, is least.
 
-    Of all Gauss points: parameters (3,), the point in space (3,) and the value there, 1 where the parameter lines meet
+    It is negative where the map is folded. Of all Gauss points: parameters (3,), the point in space (3,) and the value there, 1 where the parameter lines meet
     at right angles, 0 where the map degenerates.
     """
     rule = gauss_rule(space)
-    parameters, point, least = np.zeros(3), np.zeros(3), np.inf
+    parameters, point, least, hand = np.zeros(3), np.zeros(3), np.inf, orientation(volume)
     for q, fields, _ in map_planes(volume, rule):
-        scaled = scaled_jacobian(np.moveaxis(fields[:, 1:], (0, 1), (2, 3)))  # of (q_w, q_v, 3, 3)
+        scaled = hand * scaled_jacobian(np.moveaxis(fields[:, 1:], (0, 1), (2, 3)))  # of (q_w, q_v, 3, 3)
         w, v = (int(i) for i in np.unravel_index(np.argmin(scaled), scaled.shape))
         if scaled[w, v] < least:
             least = float(scaled[w, v])

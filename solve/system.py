@@ -17,7 +17,8 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .diagnostics import ConvergenceError, judge, solve_notices
 from .discretization.boundary import boundary_coefficients, face_rule, has_face
-from .discretization.errors import error_estimate, error_norms, missing_mean
+from .discretization.errors import error_norms, missing_mean
+from .discretization.estimate import error_estimate
 from .discretization.operator import FormOperator, Operator, assemble
 from .discretization.quadrature import rule_of
 from .discretization.space import TrialSpace, agreed, embedded, longest_edge

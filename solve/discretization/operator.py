@@ -14,6 +14,7 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import collocation
+from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
@@ -46,7 +47,7 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    threads: of a product. folded: at how many of the points of all processes det J < 0. robin: the rules of the faces
+    threads: of a product. folded: at how many of the points of all processes det J has the wrong sign. robin: the rules of the faces
     that have Robin's term, as far as this process integrates.
     """
 
@@ -189,20 +190,20 @@ def assemble(
     component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
     threads: of this pass and of the operator; the functions must then be safe to call from several at a time.
 
-    Where the map is folded, |det J| takes the place of det J: the form stays positive, an answer to show if not to
-    trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
+    |det J| takes the place of det J: right for a left-handed volume, and where a map is folded the form stays positive,
+    an answer to show if not to trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
     Raises ValueError where det J is zero at a point, naming it.
     """
     rule = rule or operator_rule(space)
     parts = space, rule, threads
     basis, part = MatrixFree(*parts), component or 0
     load = np.zeros((form.components, *space.shape))
-    folded = []
+    folded, hand = [], orientation(volume)
     factors = kept = None
 
     def fill(points: IntArray) -> None:
         for q, rows, measure, x in geometry_planes(volume, rule, points):
-            folded.append(_count_folded(measure, rule, q))
+            folded.append(_count_folded(hand * measure, rule, q))
             size = np.abs(measure)
             if kept is not None:
                 kept[q] = rows
@@ -242,7 +243,10 @@ def add_integrals(
 
 
 def _count_folded(measure: Array, rule: GaussRule, q: int) -> int:
-    """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J."""
+    """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J.
+
+    Of a left-handed volume det J is taken with the opposite sign.
+    """
     if measure.min() > 0.0:
         return 0
     flat = np.argwhere(measure == 0.0)
