@@ -60,21 +60,22 @@ def judge(
 ) -> tuple[list[str], bool]:
     """Return what is doubtful in a problem and the errors of its solution, a line each; whether these mean anything.
 
-    They do not where a formula that decides what is solved does not vary, or the mesh resolves too little.
+    They do not where a formula that decides what is solved does not vary, or the mesh does not resolve the exact
+    solution. An estimated error is no reason: it is said, and may be wrong.
     """
     points = Points.on(volume, SAMPLES, SAMPLES, SAMPLES)
     ends = {name: np.take(points, -int(name[1]), 1 + AXES.index(name[0])) for name in FACE_NAMES}
     contradictory = contradictions(volume, problem)
     empty = empty_formulas(problem, points, ends)
     rough, unresolved = [], []
-    if estimate is not None and not (estimate.l2_relative or 0.0) <= LARGEST_ERROR:  # NaN included
-        share = f"its relative L2 error is estimated as {estimate.l2_relative:.2g}"
-        rough.append(f"the mesh does not resolve the solution: {share}")
+    if estimate is not None and (estimate.l2_relative or 0.0) > LARGEST_ERROR:
+        share = f"the relative L2 error is estimated as {estimate.l2_relative:.2g}"
+        rough.append(f"the mesh hardly resolves the solution, {share}: refine it, and see whether the solution stays")
     if errors is not None and not contradictory and (errors.l2_relative or 0.0) > LARGEST_ERROR:
         share = f"{unknowns:,} unknowns do not resolve it, the relative L2 error is {errors.l2_relative:.2g}"
         described, remedy = _exact_on(problem, points)
         unresolved.append(f"{described}: {share}{remedy}")
-    meaningful = not rough and not unresolved and not any(role in DECISIVE for role, _ in empty)
+    meaningful = not unresolved and not any(role in DECISIVE for role, _ in empty)
     return [*rough, *contradictory, *(notice for _, notice in empty), *unresolved], meaningful
 
 
@@ -210,8 +211,8 @@ def solve_notices(volume: BSplineVolume, matrix: MatrixFree, certified: str | No
 def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array, float]:
     """Return where the map's scaled Jacobian, |det J| over the product of its columns' lengths, is least.
 
-    It is negative where the map is folded. Of all Gauss points: parameters (3,), the point in space (3,) and the value there, 1 where the parameter lines meet
-    at right angles, 0 where the map degenerates.
+    Of all Gauss points: parameters (3,), the point in space (3,) and the value there, 1 where the parameter lines meet
+    at right angles, 0 where the map degenerates, negative where it is folded.
     """
     rule = gauss_rule(space)
     parameters, point, least, hand = np.zeros(3), np.zeros(3), np.inf, orientation(volume)

@@ -29,7 +29,8 @@ def patches_of(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patc
 def best_cut(faces: Sequence[Patch], hand: int = 1) -> tuple[Octant, View]:
     """Return the octant to leave out and the view that together show most of the cut.
 
-    faces: six patches of m x m points, m odd. hand: the volume's orientation, 1 or -1. The boundary of an octant is closed, so the area of its cut planes that
+    faces: six patches of m x m points, m odd. hand: the volume's orientation, 1 or -1.
+    The boundary of an octant is closed, so the area of its cut planes that
     faces the viewer is, with sign, that of its outer faces turned away; these are known from the faces alone.
     """
     view, points = view_of(faces), [patch.points for patch in faces]

@@ -73,7 +73,7 @@ def draw_distortion(path: str | Path | None, volume: BSplineVolume) -> Figure:
 
 
 def draw_folds(path: str | Path | None, volume: BSplineVolume, places: Array) -> Figure:
-    """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where the sign of det J is not proved."""
+    """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J's sign is not proved."""
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, _glass(volume), places)
     return save(figure, path, f"The sign of det J is not proved on {len(places)} spans: black balls")

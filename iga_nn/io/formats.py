@@ -36,7 +36,8 @@ class Format:
     """Hold a format of another program.
 
     ending: of its files, after the volume's stem. write: puts the volume into a file; it is also given the solution and
-    its problem, None where there are none. beside: ending and writer of a second file, where the solution needs one; it is also given the volume.
+    its problem, None where there are none. beside: ending and writer of a second file, where the solution needs one; it
+    is given the volume, too.
     """
 
     ending: str

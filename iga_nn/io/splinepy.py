@@ -9,7 +9,8 @@ of a double. All three count the control points with u fastest (volume.npz: w fa
   coordinates (0, 1)^3 of its span. Boundary attributes 1 to 6 are w0, w1, v0, u1, v1, u0. With a solution the map is
   written on the solution's knots, and the solution's coefficients in the same order in a grid function beside it: one
   per row, three for displacements (VDim: 3, Ordering: 1). A left-handed volume, whose det J is negative, is written
-  with w reversed, so that 1 and 2 are w1 and w0: MFEM would take det J for the weight of its integrals. G+Smo takes |det J|.
+  with w reversed, so that 1 and 2 are w1 and w0: MFEM would take det J for the weight of its integrals. G+Smo
+  takes |det J|.
 - JSON: splinepy's own list of splines, here one `BSpline`.
 
 A solution u_h(u, v, w) has a file of its own in G+Smo's and splinepy's formats, on its own degrees and knots: a spline

@@ -112,7 +112,8 @@ def solved(report: Report) -> Report:
 def one_to_one(report: Report) -> str:
     """Return whether the map is one-to-one: "yes", "no" or "undecided".
 
-    "yes" takes both proofs, det J of one sign and a boundary that does not meet itself; a fold or a meeting place is a "no".
+    "yes" takes both proofs, that det J has one sign and that the boundary does not meet itself; a fold or a meeting
+    place is a "no".
     """
     quality = report["parameterization"]
     if quality["bijective"] == "folded" or quality.get("boundary_injective") is False:

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..arrays import Array
 from .bspline import gauss_points
 from .volume import BSplineVolume
 
 FACES = tuple(product(range(3), (0, 1)))  # axis and side
+
 
 def face_vectors(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Array, Array]:
     """Return points on a face, and normals as long as the surface element: (3, q_b, q_c) each.
@@ -29,7 +29,7 @@ def face_vectors(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: 
     return points, area if side else -area
 
 
-def enclosed_volume(volume: BSplineVolume, middle: ArrayLike) -> float:
+def enclosed_volume(volume: BSplineVolume, middle: Array) -> float:
     """Return the integral of det J over the cube, exactly, from the six faces: negative on a left-handed volume.
 
     middle: a point (3,) near the body, about which the integrals are taken.

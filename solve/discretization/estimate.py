@@ -1,6 +1,8 @@
 """The error of a solution, estimated from its residual (docs/solver.md)."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -9,13 +11,14 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation
-from parameterize.spline.volume import AXES, BSplineVolume
+from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from ..field import Points
 from ..forms.form import strong_form
 from ..forms.frame import face_geometry
 from ..forms.jets import PAIRS, SYMMETRIC, Jet
 from ..forms.problem import BoundaryValueProblem
+from .boundary import has_face
 from .errors import Errors, ratio
 from .quadrature import gauss_rule
 from .space import TrialSpace, agreed
@@ -39,33 +42,81 @@ def error_estimate(
     """
     if space.is_only_continuous or problem.not_differentiable:
         return None
+    lowest = lowest_waves(volume, problem)
+    sums = np.zeros(2)
+    with agreed(space.comm):
+        for square, size in _inside(volume, space, coefficients, problem, lowest):
+            sums += square, size
+        for face in filter(partial(has_face, space), problem.dirichlet):
+            sums[0] += _from_face(volume, space, coefficients, problem, lowest, face)
+    l2, norm = np.sqrt(space.total(sums)).tolist()
+    return Errors(l2, ratio(l2, norm))
+
+
+def _inside(
+    volume: BSplineVolume,
+    space: TrialSpace,
+    coefficients: Array,
+    problem: BoundaryValueProblem,
+    lowest: Sequence[float],
+) -> Iterator[tuple[float, float]]:
+    """Yield the squares of the norms of error and solution, layer by layer of spans in u."""
     rule, counts = gauss_rule(space), space.gauss_points
     bases = [
         [[collocation(knots[a], degrees[a], rule.points[a], order) for order in range(3)] for a in range(3)]
         for degrees, knots in ((space.degrees, space.knots), (volume.degrees, volume.knots))
     ]
-    sizes, lowest = [np.diff(breaks) for breaks in space.breaks], lowest_waves(volume, problem)
-    w_u, w_v, w_w = rule.weights
-    sums = np.zeros(2)
-    with agreed(space.comm):
-        for span, start in enumerate(range(0, rule.shape[0], counts[0])):  # layer by layer of spans in u
-            layer = slice(start, start + counts[0])
-            solution = _derivatives(bases[0], coefficients, layer)
-            geometry = _derivatives(bases[1], np.moveaxis(volume.control_points, -1, 0), layer)
-            x = Points.of(geometry[0, 0, 0], (rule.points[0][layer], *rule.points[1:]))
-            residual, inverse, det = _residual(geometry, solution, problem, x)
-            weights = np.abs(det) * w_u[layer, None, None] * w_v[:, None] * w_w
-            sums[1] += (weights * solution[0, 0, 0] ** 2).sum()
-            slopes = [_span_means(row, counts) for row in inverse]  # each (3, 1, s_v, s_w)
-            spacing = sizes[0][span], sizes[1][:, None], sizes[2]
-            middle = _middle(x, counts)
-            for oscillates, part in _parts(residual, counts):
-                waves = [slopes[a] * (2.0 * np.pi / spacing[a] if oscillates[a] else lowest[a]) for a in range(3)]
-                factor = np.min([problem.form.symbol(_dot(signs, waves), middle) for signs in SIGNS], axis=0)
-                squares = (_blocks(weights, counts) * part**2).sum(axis=(0, *INSIDE))
-                sums[0] += (squares / factor**2).sum()
-    l2, norm = np.sqrt(space.total(sums)).tolist()
-    return Errors(l2, ratio(l2, norm))
+    sizes, w_u, w_v, w_w = [np.diff(breaks) for breaks in space.breaks], *rule.weights
+    for span, start in enumerate(range(0, rule.shape[0], counts[0])):
+        layer = slice(start, start + counts[0])
+        solution = _derivatives(bases[0], coefficients, layer)
+        geometry = _derivatives(bases[1], np.moveaxis(volume.control_points, -1, 0), layer)
+        x = Points.of(geometry[0, 0, 0], (rule.points[0][layer], *rule.points[1:]))
+        inverse, det = _inverse([geometry[order] for order in FIRST])
+        residual = problem.source_at(x) - strong_form(problem.form, _jets(geometry, solution, inverse), x)
+        weights = np.abs(det) * w_u[layer, None, None] * w_v[:, None] * w_w
+        spans = _Spans.of(inverse, x, counts, (sizes[0][span : span + 1], *sizes[1:]))
+        error = sum(
+            float((_integrals(part**2, weights, counts) / spans.factor(problem, oscillates, lowest) ** 2).sum())
+            for oscillates, part in _parts(residual, counts)
+        )
+        yield error, float((weights * solution[0, 0, 0] ** 2).sum())
+
+
+def _from_face(
+    volume: BSplineVolume,
+    space: TrialSpace,
+    coefficients: Array,
+    problem: BoundaryValueProblem,
+    lowest: Sequence[float],
+    face: str,
+) -> float:
+    """Return the square of the norm of the error that given values of u make inside where the space misses them.
+
+    A wave on a face, whose factor in the law is S, decays like exp(-k t) along the parameter t across the face, k^2
+    times the factor of t's own direction being S.
+    """
+    axis, side = divmod(FACE_NAMES.index(face), 2)
+    counts = [1 if a == axis else degree + 2 for a, degree in enumerate(space.degrees)]
+    rule, one = gauss_rule(space, counts), np.ones(1)
+    u, v, w = (float(side) * one if a == axis else rule.points[a] for a in range(3))
+    w_u, w_v, w_w = (one if a == axis else rule.weights[a] for a in range(3))
+    sizes = [one if a == axis else np.diff(space.breaks[a]) for a in range(3)]
+    found, x = coefficients, Points.on(volume, u, v, w)
+    for a, row in enumerate((u, v, w)):
+        found = apply_along(collocation(space.knots[a], space.degrees[a], row), found, a + 1)
+    inverse, det = _inverse([np.moveaxis(volume.grid(u, v, w, order), -1, 0) for order in FIRST])
+    weights = np.abs(det) * w_u[:, None, None] * w_v[:, None] * w_w
+    has_area = _blocks(det != 0.0, counts).all(axis=INSIDE)  # a face may shrink to an edge or a point
+    spans = _Spans.of(inverse, x, counts, sizes)
+    across = _quadratic(problem.form.tensor(spans.middle), spans.slopes[axis])
+    along = [0.0 if a == axis else k for a, k in enumerate(lowest)]
+    total = 0.0
+    for oscillates, part in _parts(problem.boundary_at(x) - found, counts):
+        depth = 0.5 * np.sqrt(across / spans.factor(problem, oscillates, along))
+        squares = _integrals(part**2, weights, counts) * np.minimum(depth, 1.0)
+        total += float(squares[has_area].sum())
+    return total
 
 
 def lowest_waves(volume: BSplineVolume, problem: BoundaryValueProblem) -> list[float]:
@@ -92,13 +143,42 @@ def _hold(volume: BSplineVolume, problem: BoundaryValueProblem, axis: int, side:
     if (role := f"robin {face}: alpha") not in problem.data:
         return 0.0
     x, area = face_geometry(volume, (ON_FACE,) * 3, axis, side)
-    order: Orders = FIRST[axis]
     u, v, w = (np.array([float(side)]) if a == axis else ON_FACE for a in range(3))
-    tangent = np.moveaxis(np.squeeze(volume.grid(u, v, w, order), axis), -1, 0)
-    tensor = problem.form.tensor(x)
-    through = sum(area[i] * area[j] * tensor[SYMMETRIC[i][j]] for i in range(3) for j in range(3))
+    tangent = np.moveaxis(np.squeeze(volume.grid(u, v, w, FIRST[axis]), axis), -1, 0)
     det = np.abs(_dot(area, tangent))
-    return float((problem.data[role](x)[0] * det * np.linalg.norm(area, axis=0)).sum() / np.sum(through))
+    alpha = problem.data[role](x)[0] * det * np.linalg.norm(area, axis=0)
+    through = float(_quadratic(problem.form.tensor(x), area).sum())
+    return float(alpha.sum()) / through if through > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class _Spans:
+    """Spans of a grid: the gradients of the three parameters, means over each span, their sizes and middle points."""
+
+    slopes: list[Array]  # (3, s_u, s_v, s_w) each
+    sizes: list[Array]  # each of a shape that fits (s_u, s_v, s_w)
+    middle: Points  # (3, s_u, s_v, s_w)
+
+    @classmethod
+    def of(cls, inverse: Sequence[Array], x: Points, counts: Sequence[int], sizes: Sequence[Array]) -> "_Spans":
+        """Take the rows of J^-1 (3, ...) and points x (3, ...), `counts` of them a span, and the sizes of spans."""
+        u, v, w = (slice(n // 2, None, n) for n in counts)
+        rows = [np.asarray(row)[part] for row, part in zip(x.rows or (), (u, v, w), strict=True)]
+        size_u, size_v, size_w = sizes
+        means = [_span_means(row, counts) for row in inverse]
+        return cls(means, [size_u[:, None, None], size_v[:, None], size_w], Points.of(np.asarray(x)[:, u, v, w], rows))
+
+    def factor(self, problem: BoundaryValueProblem, oscillates: Sequence[bool], lowest: Sequence[float]) -> Array:
+        """Return the factor of the law (s_u, s_v, s_w) for waves of one period a span in some directions.
+
+        lowest: the wave numbers in the others.
+        """
+        waves = [
+            slope * (2.0 * np.pi / size if is_short else low)
+            for slope, size, is_short, low in zip(self.slopes, self.sizes, oscillates, lowest, strict=True)
+        ]
+        least: Array = np.min([problem.form.symbol(_dot(signs, waves), self.middle) for signs in SIGNS], axis=0)
+        return least
 
 
 def _derivatives(bases: list[list[csr_array]], coefficients: Array, layer: slice) -> dict[Orders, Array]:
@@ -113,14 +193,16 @@ def _derivatives(bases: list[list[csr_array]], coefficients: Array, layer: slice
     return found
 
 
-def _residual(
-    geometry: dict[Orders, Array], spline: dict[Orders, Array], problem: BoundaryValueProblem, x: Points
-) -> tuple[Array, list[Array], Array]:
-    """Return source less law (c, ...), the rows of J^-1, each (3, ...), and det J (...) at the points of a layer."""
-    tangents = [geometry[order] for order in FIRST]
+def _inverse(tangents: Sequence[Array]) -> tuple[list[Array], Array]:
+    """Return the rows of J^-1, each (3, ...), and det J (...) from the columns of J."""
     cofactors = [np.cross(tangents[a - 2], tangents[a - 1], axis=0) for a in range(3)]
     det = (tangents[0] * cofactors[0]).sum(axis=0)
-    inverse = [row / det for row in cofactors]
+    with np.errstate(divide="ignore", invalid="ignore"):  # det J may vanish on a face
+        return [row / det for row in cofactors], det
+
+
+def _jets(geometry: dict[Orders, Array], spline: dict[Orders, Array], inverse: Sequence[Array]) -> list[Jet]:
+    """Return value and derivatives in space of a spline's components, from those in the parameters and J^-1."""
     jets = []
     for component, value in enumerate(spline[0, 0, 0]):
         gradient = _dot(inverse, [spline[order][component] for order in FIRST])
@@ -128,7 +210,7 @@ def _residual(
         rows = [_dot([bent[place] for place in SYMMETRIC[a]], inverse) for a in range(3)]  # H J^-1, each (3, ...)
         hessian = (_dot([row[i] for row in inverse], [row[j] for row in rows]) for i, j in PAIRS)
         jets.append(Jet(value, tuple(gradient), tuple(hessian)))
-    return problem.source_at(x) - strong_form(problem.form, jets, x), inverse, det
+    return jets
 
 
 def _parts(residual: Array, counts: Sequence[int]) -> Iterator[tuple[tuple[bool, ...], Array]]:
@@ -166,12 +248,16 @@ def _span_means(field: Array, counts: Sequence[int]) -> Array:
     return blocks.squeeze(INSIDE)
 
 
-def _middle(x: Points, counts: Sequence[int]) -> Points:
-    """Return a point in the middle of each span: (3, s_u, s_v, s_w)."""
-    u, v, w = (slice(n // 2, None, n) for n in counts)
-    rows = x.rows or ()
-    return Points.of(np.asarray(x)[:, u, v, w], [row[part] for row, part in zip(rows, (u, v, w), strict=True)])
+def _integrals(field: Array, weights: Array, counts: Sequence[int]) -> Array:
+    """Return the integrals (s_u, s_v, s_w) over spans of the sum over components of blocks (c, ...)."""
+    found: Array = (_blocks(weights, counts) * field).sum(axis=(0, *INSIDE))
+    return found
 
 
-def _dot(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:
+def _quadratic(tensor: Array, row: Array) -> Array:
+    """Return row . T row (...) of a symmetric tensor's six entries (6, ...) and vectors (3, ...)."""
+    return _dot(row, [_dot([tensor[place] for place in SYMMETRIC[i]], row) for i in range(3)])
+
+
+def _dot(a: Sequence[Array] | Sequence[float] | Array, b: Sequence[Array] | Array) -> Array:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -47,8 +47,8 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    threads: of a product. folded: at how many of the points of all processes det J has the wrong sign. robin: the rules of the faces
-    that have Robin's term, as far as this process integrates.
+    threads: of a product. folded: at how many of the points of all processes det J has the wrong sign.
+    robin: the rules of the faces that have Robin's term, as far as this process integrates.
     """
 
     space: TrialSpace
