@@ -33,6 +33,7 @@ from .solution import Solution, SolveReport
 DEVICES = ("cpu", "cuda")
 SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
 
+LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
 log = logging.getLogger(__name__)
@@ -212,12 +213,16 @@ class System:
             full += missing_mean(volume, space, full[0], problem)
         clock.append(time.process_time())
         errors = estimate = None
-        if problem.exact is not None:
+        largest = max(space.shared(float(np.abs(full).max(initial=0.0))))
+        has_norm = largest <= LARGEST_VALUE
+        if has_norm and problem.exact is not None:
             errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
-        if options.estimate or (options.estimate is None and problem.exact is None):
+        if has_norm and (options.estimate or (options.estimate is None and problem.exact is None)):
             estimate = error_estimate(volume, space, full, problem)
         clock.append(time.process_time())
         doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
+        if not has_norm:
+            doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
         failed = solve_notices(volume, self.matrix, options.certified, result)
         report = SolveReport(
             elements=space.elements,
@@ -230,7 +235,7 @@ class System:
             errors=errors,
             estimate=estimate,
             notices=(*doubtful, *failed),
-            meaningful=meaningful,
+            meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,
         )

@@ -77,7 +77,9 @@ def _inside(
         weights = np.abs(det) * w_u[layer, None, None] * w_v[:, None] * w_w
         spans = _Spans.of(inverse, x, counts, (sizes[0][span : span + 1], *sizes[1:]))
         error = sum(
-            float((_integrals(part**2, weights, counts) / spans.factor(problem, oscillates, lowest) ** 2).sum())
+            float(
+                _integrals((part / _on_points(spans.factor(problem, oscillates, lowest))) ** 2, weights, counts).sum()
+            )
             for oscillates, part in _parts(residual, counts)
         )
         yield error, float((weights * solution[0, 0, 0] ** 2).sum())
@@ -246,6 +248,11 @@ def _span_means(field: Array, counts: Sequence[int]) -> Array:
     for axis in INSIDE:
         blocks = _mean(blocks, axis)
     return blocks.squeeze(INSIDE)
+
+
+def _on_points(values: Array) -> Array:
+    """Return values (s_u, s_v, s_w) of spans in the shape of blocks."""
+    return values[:, None, :, None, :, None]
 
 
 def _integrals(field: Array, weights: Array, counts: Sequence[int]) -> Array:
