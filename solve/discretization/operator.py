@@ -198,12 +198,12 @@ def assemble(
     parts = space, rule, threads
     basis, part = MatrixFree(*parts), component or 0
     load = np.zeros((form.components, *space.shape))
-    folded, hand = [], orientation(volume)
+    negative = []
     factors = kept = None
 
     def fill(points: IntArray) -> None:
         for q, rows, measure, x in geometry_planes(volume, rule, points):
-            folded.append(_count_folded(hand * measure, rule, q))
+            negative.append(_count_negative(measure, rule, q))
             size = np.abs(measure)
             if kept is not None:
                 kept[q] = rows
@@ -221,10 +221,12 @@ def assemble(
         elif form.constant:
             kept = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
         basis.on_planes(fill)
-    total = space.total(sum(folded))
+    folded = space.total(sum(negative))
+    if folded and orientation(volume) < 0:
+        folded = space.total(int(np.prod(rule.shape))) - folded
     if factors is None:
-        return FormOperator(*parts, volume, form, kept, folded=total), load
-    return Operator(*parts, factors, folded=total), load
+        return FormOperator(*parts, volume, form, kept, folded=folded), load
+    return Operator(*parts, factors, folded=folded), load
 
 
 def add_integrals(
@@ -242,11 +244,8 @@ def add_integrals(
     result[first[q] : first[q] + u.shape[2]] += np.multiply.outer(u[kinds[0], q], plane)
 
 
-def _count_folded(measure: Array, rule: GaussRule, q: int) -> int:
-    """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J.
-
-    Of a left-handed volume det J is taken with the opposite sign.
-    """
+def _count_negative(measure: Array, rule: GaussRule, q: int) -> int:
+    """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J."""
     if measure.min() > 0.0:
         return 0
     flat = np.argwhere(measure == 0.0)
