@@ -218,7 +218,7 @@ class System:
         if has_norm and problem.exact is not None:
             errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
         if has_norm and (options.estimate or (options.estimate is None and problem.exact is None)):
-            estimate = error_estimate(volume, space, full, problem)
+            estimate = error_estimate(volume, space, full, problem, self._energy(result.x))
         clock.append(time.process_time())
         doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
         if not has_norm:
@@ -241,6 +241,12 @@ class System:
         )
         field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
+
+    def _energy(self, free: Array) -> float | None:
+        """Return a(u_h, u_h) of free coefficients that solve the system, None where it is not the work of the loads."""
+        if not self.problem.form.symmetric or self.space.total(np.count_nonzero(self.known)):
+            return None
+        return float(self.space.total((self.right * free).sum()))
 
     def _iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""

@@ -168,6 +168,16 @@ def test_estimate_is_near_the_true_error_of_a_stretched_body(name):
     assert 0.5 < coarse.report.error_estimate / true_error(volume, coarse, problem, parts, layers) < 5.0
 
 
+@pytest.mark.parametrize(("spans", "length"), [((4, 2, 2), 20.0), ((8, 2, 2), 20.0), ((8, 2, 2), 60.0)])
+def test_a_beam_that_is_too_stiff_is_noticed(spans, length):
+    """Bent by a force at its end a beam 1 x 1 sinks by 4 F l^3 / E; a coarse mesh misses a share of that."""
+    free = dict.fromkeys(("v0", "v1", "w0", "w1"), ("0", "0", "0"))
+    pulled = Elasticity(force=("0", "0", "0"), traction={**free, "u1": ("0", "0", "1")})
+    found = solve_problem(box((length, 1, 1), spans), pulled, tolerance=1e-12)
+    missing = 1.0 - found([[1.0, 0.5, 0.5]])[0, 2] / (4.0 * length**3)
+    assert missing > 0.02 and 0.3 < found.report.error_estimate_relative / missing < 5.0
+
+
 def test_what_the_space_holds_has_no_error():
     """z (1 - z) / 2 is a parabola, and so are its values on a face in the plate's own space."""
     points = greville(open_uniform_knots(7, 3), 3)

@@ -1,5 +1,6 @@
 """The error of a solution, estimated from its residual (docs/solver.md)."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -33,23 +34,32 @@ SECOND: tuple[Orders, ...] = ((2, 0, 0), (1, 1, 0), (1, 0, 1), (0, 2, 0), (0, 1,
 
 
 def error_estimate(
-    volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: BoundaryValueProblem
+    volume: BSplineVolume,
+    space: TrialSpace,
+    coefficients: Array,
+    problem: BoundaryValueProblem,
+    energy: float | None = None,
 ) -> Errors | None:
     """Return the estimated error of a solution with coefficients (c, n_u, n_v, n_w), c components.
 
+    energy: a(u_h, u_h), of a symmetric law whose given values are zero, else None. The work of the loads on the error
+    is then the square of its energy norm, and as large a share of u_h is added: bodies that bend are too stiff by it.
     None where the residual tells too little: in a space that is only continuous somewhere, whose derivatives jump, and
     where the derivatives of the law's coefficients are unknown.
     """
     if space.is_only_continuous or problem.not_differentiable:
         return None
     lowest = lowest_waves(volume, problem)
-    sums = np.zeros(2)
+    sums = np.zeros(3)  # squares of the norms of the error, its energy norm, the norm of the solution
     with agreed(space.comm):
-        for square, size in _inside(volume, space, coefficients, problem, lowest):
-            sums += square, size
+        for squares in _inside(volume, space, coefficients, problem, lowest):
+            sums += squares
         for face in filter(partial(has_face, space), problem.dirichlet):
             sums[0] += _from_face(volume, space, coefficients, problem, lowest, face)
-    l2, norm = np.sqrt(space.total(sums)).tolist()
+    square, energy_of_error, norm = space.total(sums).tolist()
+    norm = math.sqrt(norm)
+    soft = norm * energy_of_error / energy if energy is not None and energy > 0.0 else 0.0
+    l2 = math.hypot(math.sqrt(square), soft)
     return Errors(l2, ratio(l2, norm))
 
 
@@ -59,8 +69,8 @@ def _inside(
     coefficients: Array,
     problem: BoundaryValueProblem,
     lowest: Sequence[float],
-) -> Iterator[tuple[float, float]]:
-    """Yield the squares of the norms of error and solution, layer by layer of spans in u."""
+) -> Iterator[tuple[float, float, float]]:
+    """Yield the squares of the norms of the error, of its energy norm and of the solution, layer by layer in u."""
     rule, counts = gauss_rule(space), space.gauss_points
     bases = [
         [[collocation(knots[a], degrees[a], rule.points[a], order) for order in range(3)] for a in range(3)]
@@ -76,13 +86,12 @@ def _inside(
         residual = problem.source_at(x) - strong_form(problem.form, _jets(geometry, solution, inverse), x)
         weights = np.abs(det) * w_u[layer, None, None] * w_v[:, None] * w_w
         spans = _Spans.of(inverse, x, counts, (sizes[0][span : span + 1], *sizes[1:]))
-        error = sum(
-            float(
-                _integrals((part / _on_points(spans.factor(problem, oscillates, lowest))) ** 2, weights, counts).sum()
-            )
-            for oscillates, part in _parts(residual, counts)
-        )
-        yield error, float((weights * solution[0, 0, 0] ** 2).sum())
+        error = work = 0.0
+        for oscillates, part in _parts(residual, counts):
+            factor = _on_points(spans.factor(problem, oscillates, lowest))
+            error += float(_integrals((part / factor) ** 2, weights, counts).sum())
+            work += float(_integrals(part * (part / factor), weights, counts).sum())
+        yield error, work, float((weights * solution[0, 0, 0] ** 2).sum())
 
 
 def _from_face(
