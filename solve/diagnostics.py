@@ -6,6 +6,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.quality.quality import scaled_jacobian
+from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .discretization.errors import Errors
@@ -59,21 +60,22 @@ def judge(
 ) -> tuple[list[str], bool]:
     """Return what is doubtful in a problem and the errors of its solution, a line each; whether these mean anything.
 
-    They do not where a formula that decides what is solved does not vary, or the mesh resolves too little.
+    They do not where a formula that decides what is solved does not vary, or the mesh does not resolve the exact
+    solution. An estimated error is no reason: it is said, and may be wrong.
     """
     points = Points.on(volume, SAMPLES, SAMPLES, SAMPLES)
     ends = {name: np.take(points, -int(name[1]), 1 + AXES.index(name[0])) for name in FACE_NAMES}
     contradictory = contradictions(volume, problem)
     empty = empty_formulas(problem, points, ends)
     rough, unresolved = [], []
-    if estimate is not None and not (estimate.l2_relative or 0.0) <= LARGEST_ERROR:  # NaN included
-        share = f"its relative L2 error is estimated as {estimate.l2_relative:.2g}"
-        rough.append(f"the mesh does not resolve the solution: {share}")
+    if estimate is not None and (estimate.l2_relative or 0.0) > LARGEST_ERROR:
+        share = f"the relative L2 error is estimated as {estimate.l2_relative:.2g}"
+        rough.append(f"the mesh hardly resolves the solution, {share}: refine it, and see whether the solution stays")
     if errors is not None and not contradictory and (errors.l2_relative or 0.0) > LARGEST_ERROR:
         share = f"{unknowns:,} unknowns do not resolve it, the relative L2 error is {errors.l2_relative:.2g}"
         described, remedy = _exact_on(problem, points)
         unresolved.append(f"{described}: {share}{remedy}")
-    meaningful = not rough and not unresolved and not any(role in DECISIVE for role, _ in empty)
+    meaningful = not unresolved and not any(role in DECISIVE for role, _ in empty)
     return [*rough, *contradictory, *(notice for _, notice in empty), *unresolved], meaningful
 
 
@@ -184,7 +186,8 @@ def solve_notices(volume: BSplineVolume, matrix: MatrixFree, certified: str | No
         notices.append(f"the map is {certified}, not certified: do not trust the solution")
     if matrix.folded:
         points = matrix.space.total(int(np.prod(matrix.rule.shape)))
-        notices.append(f"det J < 0 at {matrix.folded} of {points} Gauss points: solved with |det J| instead")
+        wrong = "det J < 0" if orientation(volume) > 0 else "the map is left-handed, and det J > 0"
+        notices.append(f"{wrong} at {matrix.folded} of {points} Gauss points: solved with |det J| instead")
     if result.indefinite:
         notices.append(
             f"no convergence: after {result.iterations} iterations the matrix turned out not to be positive definite, "
@@ -206,15 +209,15 @@ def solve_notices(volume: BSplineVolume, matrix: MatrixFree, certified: str | No
 
 
 def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array, float]:
-    """Return where the map's scaled Jacobian, det J over the product of its columns' lengths, is least.
+    """Return where the map's scaled Jacobian, |det J| over the product of its columns' lengths, is least.
 
     Of all Gauss points: parameters (3,), the point in space (3,) and the value there, 1 where the parameter lines meet
-    at right angles, 0 where the map degenerates.
+    at right angles, 0 where the map degenerates, negative where it is folded.
     """
     rule = gauss_rule(space)
-    parameters, point, least = np.zeros(3), np.zeros(3), np.inf
+    parameters, point, least, hand = np.zeros(3), np.zeros(3), np.inf, orientation(volume)
     for q, fields, _ in map_planes(volume, rule):
-        scaled = scaled_jacobian(np.moveaxis(fields[:, 1:], (0, 1), (2, 3)))  # of (q_w, q_v, 3, 3)
+        scaled = hand * scaled_jacobian(np.moveaxis(fields[:, 1:], (0, 1), (2, 3)))  # of (q_w, q_v, 3, 3)
         w, v = (int(i) for i in np.unravel_index(np.argmin(scaled), scaled.shape))
         if scaled[w, v] < least:
             least = float(scaled[w, v])

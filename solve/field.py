@@ -87,12 +87,15 @@ class SplineField(Brief):
         return evaluate_grid(self.degrees, self.knots, self.coefficients, (u, v, w))
 
     def at(self, x: Array) -> Array:
-        """Return values (...) or (c, ...) at the points (3, ...) that the solver hands to laws and functions.
+        """Return values (...) or (c, ...) at the points x (3, ...) that a law or a datum is given by the solver.
 
-        Raises ValueError for points whose parameters are not known.
+        At parameters a field is called: `field(uvw)`. Raises ValueError for points whose parameters are not known.
         """
         if not isinstance(x, Points) or x.rows is None:
-            raise ValueError("a field has values at the points x that the solver hands out, whole and unchanged")
+            raise ValueError(
+                "a field is a function of the parameters u, v, w: call field(uvw), uvw of shape (m, 3) with numbers "
+                "from 0 to 1, or field.grid(u, v, w); `at` takes the points x that a law or a datum is given, unchanged"
+            )
         values = np.moveaxis(self.grid(*x.rows), -1, 0) if self.coefficients.ndim == 4 else self.grid(*x.rows)[None]
         single = [axis for axis in range(3) if axis not in x.order]  # directions of one parameter
         values = values.transpose(0, *(1 + axis for axis in (*x.order, *single))).reshape(-1, *x.shape[1:])

@@ -17,7 +17,8 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .diagnostics import ConvergenceError, judge, solve_notices
 from .discretization.boundary import boundary_coefficients, face_rule, has_face
-from .discretization.errors import error_estimate, error_norms, missing_mean
+from .discretization.errors import error_norms, missing_mean
+from .discretization.estimate import error_estimate
 from .discretization.operator import FormOperator, Operator, assemble
 from .discretization.quadrature import rule_of
 from .discretization.space import TrialSpace, agreed, embedded, longest_edge
@@ -32,6 +33,7 @@ from .solution import Solution, SolveReport
 DEVICES = ("cpu", "cuda")
 SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
 
+LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
 log = logging.getLogger(__name__)
@@ -211,12 +213,16 @@ class System:
             full += missing_mean(volume, space, full[0], problem)
         clock.append(time.process_time())
         errors = estimate = None
-        if problem.exact is not None:
+        largest = max(space.shared(float(np.abs(full).max(initial=0.0))))
+        has_norm = largest <= LARGEST_VALUE
+        if has_norm and problem.exact is not None:
             errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
-        if options.estimate or (options.estimate is None and problem.exact is None):
-            estimate = error_estimate(volume, space, full, problem)
+        if has_norm and (options.estimate or (options.estimate is None and problem.exact is None)):
+            estimate = error_estimate(volume, space, full, problem, self._energy(result.x))
         clock.append(time.process_time())
         doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
+        if not has_norm:
+            doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
         failed = solve_notices(volume, self.matrix, options.certified, result)
         report = SolveReport(
             elements=space.elements,
@@ -229,12 +235,18 @@ class System:
             errors=errors,
             estimate=estimate,
             notices=(*doubtful, *failed),
-            meaningful=meaningful,
+            meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,
         )
         field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
+
+    def _energy(self, free: Array) -> float | None:
+        """Return a(u_h, u_h) of free coefficients that solve the system, None where it is not the work of the loads."""
+        if not self.problem.form.symmetric or self.space.total(np.count_nonzero(self.known)):
+            return None
+        return float(self.space.total((self.right * free).sum()))
 
     def _iterate(self, options: SolverOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""

@@ -15,6 +15,7 @@ from exact_arithmetic import (
 
 from parameterize.certificate.jacobian import certify
 from parameterize.spline.bspline import open_uniform_knots
+from parameterize.spline.orientation import mirrored
 from parameterize.spline.volume import BSplineVolume
 
 CASES = [
@@ -113,12 +114,16 @@ def test_mean_is_the_signed_volume():
     )
 
 
-def test_mirrored_map_is_folded_everywhere():
-    points = identity().control_points * np.array([-1.0, 1.0, 1.0])
-    certificate = certify(BSplineVolume.uniform(points))
-    assert certificate.verdict == "folded" and certificate.mean_det == pytest.approx(-1.0)
-    assert len(certificate.unproved) == 27
-    assert certificate.lower_bound < 0.0
+def test_a_mirror_image_is_certified_as_left_handed():
+    """-det J is the det J of the map itself, so that all bounds and places are the same."""
+    for volume in (identity(), bump(0.5), bump(2.5)):
+        image = mirrored(volume)
+        own, found = certify(volume), certify(image)
+        assert (own.left_handed, found.left_handed) == (False, True)
+        assert (found.verdict, found.lower_bound, found.witness) == (own.verdict, own.lower_bound, own.witness)
+        assert found.mean_det == -own.mean_det and np.array_equal(found.unproved, own.unproved)
+        assert (own.claim, found.claim) == ("det J > 0", "det J < 0")
+    assert np.linalg.det(image.jacobian([found.witness])[0]) > 0.0  # the wrong sign there
 
 
 def test_fold_in_the_middle_has_a_witness_there():

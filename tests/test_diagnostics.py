@@ -70,10 +70,20 @@ def test_data_may_be_constant_on_a_face_because_it_is_flat():
     assert notices == ""
 
 
-def test_an_estimate_of_a_solution_not_resolved_is_named():
+def test_an_estimate_of_a_solution_not_resolved_is_named_and_is_no_verdict():
     report, notices = said(MILLIMETRES, Poisson(source="sin(x)"))
-    assert report.error_estimate_relative > 0.5 and not report.meaningful
-    assert "does not resolve the solution" in notices
+    assert report.error_estimate_relative > 0.5 and report.meaningful
+    assert f"is estimated as {report.error_estimate_relative:.2g}: refine it" in notices
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_smallest_kappa_is_solved_and_a_solution_too_large_for_its_norms_is_named():
+    """Scaled by 1e100 the solution is that of kappa = 1; with a source of 1e100 it is beyond 1e150."""
+    plain, small = (solve_problem(UNIT, Poisson(source="1", kappa=kappa)).report for kappa in ("1", "1e-100"))
+    assert small.error_estimate_relative == pytest.approx(plain.error_estimate_relative, rel=1e-6)
+    assert small.error_estimate == pytest.approx(1e100 * plain.error_estimate, rel=1e-6)
+    report, notices = said(UNIT, Poisson(source="1e100", kappa="1e-100"))
+    assert not report.meaningful and report.error_estimate is None and "too large for its norms" in notices
 
 
 def test_a_vector_that_is_not_resolved_is_named_whole():

@@ -60,6 +60,26 @@ def test_nine_entries_are_the_six():
     assert np.array_equal(Poisson(exact=WAVE, kappa=nine).tensor(where), PROBLEMS["tensor kappa"].tensor(where))
 
 
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[2, 0.5, 0], [0.5, 3, "x"], [0, "x", 4]],
+        ((2, 0.5, 0), (0.5, 3, "x"), (0, "x", 4)),
+        [np.array([2, 0.5, 0], dtype=object), [0.5, 3, "x"], (0, "x", 4)],
+    ],
+)
+def test_three_rows_of_kappa_are_the_six(rows):
+    where = np.random.default_rng(0).random((3, 5))
+    six = Poisson(exact=WAVE, kappa=(2, 0.5, 0, 3, "x", 4))
+    assert np.array_equal(Poisson(exact=WAVE, kappa=rows).tensor(where), six.tensor(where))
+
+
+@pytest.mark.parametrize("rows", [[[1, 0], [0, 1]], np.ones((2, 3)), [[1, 0, 0], [0, 1, 0], 1], [[1, 0, 0]]])
+def test_other_rows_of_kappa_are_refused(rows):
+    with pytest.raises(ValueError, match="three rows of three entries"):
+        Poisson(exact=WAVE, kappa=rows)
+
+
 def test_functions_as_data_agree_with_formulas():
     volume = benchmark_volume(3, degree=2)
     formulas = Poisson(
@@ -135,6 +155,9 @@ def test_the_term_of_a_robin_face_is_symmetric_and_has_the_face_as_its_sum():
     [
         ({"kappa": "x"}, "kappa must be positive, and is not at x=-"),
         ({"kappa": ("1", "2", "0", "1", "0", "1")}, "kappa must be positive definite"),
+        ({"kappa": "1e-300"}, "kappa must be 1e-100 or more, and is not at x="),
+        ({"kappa": "9e-101+0*x"}, "kappa must be 1e-100 or more"),
+        ({"kappa": ("1e-300", "0", "0", "1e-300", "0", "1e-300")}, "kappa must be 1e-100 or more"),
         ({"reaction": "x"}, "reaction must be zero or positive"),
         ({"robin": {"u0": ("0-1", None)}}, "robin u0: alpha must be zero or positive"),
         ({"neumann": {"u0": "log(0*x)"}}, "neumann u0 is not finite"),

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from volumes import spans_at
 
-from iga_nn.io.splinepy import write_mfem
-from parameterize.spline.volume import FACE_NAMES
+from iga_nn.io.splinepy import write_mfem, write_mfem_field
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Poisson, benchmark_volume, solve_problem
 
 mfem = pytest.importorskip("mfem.ser")
@@ -88,6 +88,21 @@ def test_robin_problem_agrees(tmp_path):
     ours, theirs, l2 = compare_robin(benchmark_volume(4), tmp_path)
     assert ours.report.l2 == pytest.approx(l2, rel=0.02)
     assert np.abs(ours(POINTS) - theirs.values(POINTS)).max() < 0.2 * l2
+
+
+def test_a_left_handed_volume_is_turned_for_mfem(tmp_path, caplog):
+    """MFEM takes det J for the weight of its integrals: the mesh has w reversed, and a notice says so."""
+    volume = benchmark_volume(4)
+    left = BSplineVolume(volume.degrees, volume.knots, volume.control_points[::-1] * [1.0, 1.0, 1.2])
+    ours, theirs, l2 = compare_robin(left, tmp_path)
+    assert "left-handed" in caplog.text and "w reversed" in caplog.text
+    assert ours.report.l2 == pytest.approx(l2, rel=0.02)
+    there = POINTS * [1.0, 1.0, -1.0] + [0.0, 0.0, 1.0]
+    assert np.abs(ours(POINTS) - theirs.values(there)).max() < 0.2 * l2
+    write_mfem_field(tmp_path / "u.gf", ours.field, left)
+    read = mfem.GridFunction(theirs.mesh, str(tmp_path / "u.gf"))
+    theirs.solution.Assign(read)
+    assert np.abs(ours(POINTS) - theirs.values(there)).max() < 1e-12
 
 
 def test_dirichlet_problem_agrees(tmp_path):

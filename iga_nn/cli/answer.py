@@ -39,7 +39,7 @@ def verdict_in_words(outcome: Outcome) -> str:
         lines.append(f"control points   {chosen}")
     levels = [_level(level) for level in verdict.get("levels", [])]
     lines += [*levels[:-1], f"{rounded(verdict['seconds'], 1)} s", *advice.in_words(outcome.report)]
-    proved = f"det J > 0 {verdict['bijective']}; one-to-one: {verdict['one_to_one']}"
+    proved = f"{reports.claim(outcome.report)} {verdict['bijective']}; one-to-one: {verdict['one_to_one']}"
     ending = {"verdict": proved, "error": "".join(levels[-1:]), "open": str(outcome.folder / PAGE)}
     return "\n".join([*lines, *(f"{name:16s} {text}" for name, text in ending.items() if text)])
 
@@ -54,7 +54,8 @@ def _level(level: dict[str, Any]) -> str:
 def volume_in_words(facts: reports.Report) -> str:
     """Return the facts that `check` found out about a volume, the verdicts first."""
     others = {key: value for key, value in facts.items() if key not in ("bijective", "boundary_injective")}
-    proved = {"det J > 0": facts["bijective"], "one-to-one": reports.one_to_one({"parameterization": facts})}
+    report = {"parameterization": facts}
+    proved = {reports.claim(report): facts["bijective"], "one-to-one": reports.one_to_one(report)}
     return "\n".join([*(f"{name:16s} {text}" for name, text in proved.items()), facts_in_words(others)])
 
 

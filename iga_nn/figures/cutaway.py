@@ -26,15 +26,16 @@ def patches_of(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patc
     return [plain_patch(points_on(volume, grid), color, every=every) for grid, color in places]
 
 
-def best_cut(faces: Sequence[Patch]) -> tuple[Octant, View]:
+def best_cut(faces: Sequence[Patch], hand: int = 1) -> tuple[Octant, View]:
     """Return the octant to leave out and the view that together show most of the cut.
 
-    faces: six patches of m x m points, m odd. The boundary of an octant is closed, so the area of its cut planes that
+    faces: six patches of m x m points, m odd. hand: the volume's orientation, 1 or -1.
+    The boundary of an octant is closed, so the area of its cut planes that
     faces the viewer is, with sign, that of its outer faces turned away; these are known from the faces alone.
     """
     view, points = view_of(faces), [patch.points for patch in faces]
     choices = [(octant, side) for octant in product((0, 1), (0, 1), (0, 1)) for side in (view, view.turned())]
-    return max(choices, key=lambda choice: float(_outside(points, choice[0]) @ choice[1].towards))
+    return max(choices, key=lambda choice: hand * float(_outside(points, choice[0]) @ choice[1].towards))
 
 
 def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
@@ -73,7 +74,7 @@ def _quarter(patch: Patch, sides: tuple[int, int]) -> Patch:
 
 
 def _outside(faces: Sequence[Array], octant: Octant) -> Array:
-    """Return the vector area (3,) of the octant's three outer faces, outward."""
+    """Return the vector area (3,) of the octant's three outer faces, outward on a right-handed volume."""
     total = np.zeros(3)
     for axis, side in enumerate(octant):
         points = faces[2 * axis + side]

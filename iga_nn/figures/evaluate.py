@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
-from parameterize.quality.quality import arap
+from parameterize.quality.quality import arap_on
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 from solve.field import Points, SplineField
 from solve.forms.frame import UnitFrame
@@ -45,8 +45,8 @@ def points_on(volume: BSplineVolume, grid: Grid) -> Array:
 
 def distortions(volume: BSplineVolume, grids: Sequence[Grid]) -> list[Array]:
     """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1: (samples, samples) for each grid."""
-    length = UnitFrame.of(volume).length
-    return [np.tanh(np.sqrt(_flat(arap(volume.grid_jacobian(*grid) / length))) / 2.0) for grid in grids]
+    scale = 1.0 / UnitFrame.of(volume).length
+    return [np.tanh(np.sqrt(_flat(arap_on(volume, *grid, scale))) / 2.0) for grid in grids]
 
 
 def solution_on(solution: SplineField, grid: Grid) -> Array:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
+from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 
 from .cutaway import best_cut, octant_label, patches_of, without_octant
@@ -48,7 +49,7 @@ def draw_cut(path: str | Path | None, volume: BSplineVolume) -> Figure:
     The octant and the view are those that show most of the cut.
     """
     named = patches_of(volume, SAMPLES, EVERY)
-    octant, view = best_cut(named[:6])
+    octant, view = best_cut(named[:6], orientation(volume))
     distorted = [
         replace(patch, colors=colors(values, SHARES))
         for patch, values in zip(named, distortions(volume, all_grids(SAMPLES)), strict=True)
@@ -72,10 +73,10 @@ def draw_distortion(path: str | Path | None, volume: BSplineVolume) -> Figure:
 
 
 def draw_folds(path: str | Path | None, volume: BSplineVolume, places: Array) -> Figure:
-    """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J > 0 is not proved."""
+    """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J's sign is not proved."""
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, _glass(volume), places)
-    return save(figure, path, f"det J > 0 is not proved on {len(places)} spans: black balls")
+    return save(figure, path, f"The sign of det J is not proved on {len(places)} spans: black balls")
 
 
 def draw_meeting(path: str | Path | None, volume: BSplineVolume, meeting: Meeting) -> Figure:

@@ -36,12 +36,13 @@ class Format:
     """Hold a format of another program.
 
     ending: of its files, after the volume's stem. write: puts the volume into a file; it is also given the solution and
-    its problem, None where there are none. beside: ending and writer of a second file, where the solution needs one.
+    its problem, None where there are none. beside: ending and writer of a second file, where the solution needs one; it
+    is given the volume, too.
     """
 
     ending: str
     write: Callable[..., None]
-    beside: tuple[str, Callable[[Path, SplineField], None]] | None = None
+    beside: tuple[str, Callable[[Path, SplineField, BSplineVolume], None]] | None = None
 
 
 FORMATS = {
@@ -166,7 +167,7 @@ def export(
             chosen.write(temporary, loaded, field, problem)
             if field is not None and write_field is not None:
                 with replacing(beside) as temporary_beside:
-                    write_field(temporary_beside, field)
+                    write_field(temporary_beside, field, loaded)
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
     return target

@@ -8,7 +8,9 @@ of a double. All three count the control points with u fastest (volume.npz: w fa
   12 edges, 6 faces, then the inside. Elements are the non-empty knot spans, u fastest, each with the reference
   coordinates (0, 1)^3 of its span. Boundary attributes 1 to 6 are w0, w1, v0, u1, v1, u0. With a solution the map is
   written on the solution's knots, and the solution's coefficients in the same order in a grid function beside it: one
-  per row, three for displacements (VDim: 3, Ordering: 1).
+  per row, three for displacements (VDim: 3, Ordering: 1). A left-handed volume, whose det J is negative, is written
+  with w reversed, so that 1 and 2 are w1 and w0: MFEM would take det J for the weight of its integrals. G+Smo
+  takes |det J|.
 - JSON: splinepy's own list of splines, here one `BSpline`.
 
 A solution u_h(u, v, w) has a file of its own in G+Smo's and splinepy's formats, on its own degrees and knots: a spline
@@ -22,11 +24,14 @@ from typing import Any
 
 import numpy as np
 
+from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve.field import SplineField
 
 from ..errors import InputError, one_line
 from .splinepy_gate import checked_text
+
+log = logging.getLogger(__name__)
 
 INSTALL = "pip install 'iga-nn[interop]'"
 WEIGHTS_ALIKE = 1e-12  # relative
@@ -46,14 +51,21 @@ def write_json(path: Path, spline: BSplineVolume | SplineField, *_: object) -> N
 
 
 def write_mfem(path: Path, volume: BSplineVolume, solution: SplineField | None = None, *_: object) -> None:
-    """Write a volume as an MFEM NURBS mesh, on the knots of the solution where there is one."""
+    """Write a volume as an MFEM NURBS mesh, on the knots of the solution where there is one.
+
+    A left-handed volume is written with w reversed: MFEM takes det J itself for the weight of its integrals.
+    """
     shown = volume if solution is None else _on_knots_of(solution, volume)
-    _splinepy().io.mfem.export(str(path), to_splinepy(shown).nurbs)
+    spline = to_splinepy(shown)
+    if orientation(volume) < 0:
+        log.warning("the volume is left-handed, which MFEM does not take: written with w reversed, w0 and w1 exchanged")
+        spline = to_splinepy(shown, reverse_w=True)
+    _splinepy().io.mfem.export(str(path), spline.nurbs)
 
 
-def write_mfem_field(path: Path, field: SplineField) -> None:
-    """Write a solution as an MFEM grid function on the mesh of a volume with the same degrees and knots."""
-    spline = to_splinepy(field)
+def write_mfem_field(path: Path, field: SplineField, volume: BSplineVolume) -> None:
+    """Write a solution as an MFEM grid function on the mesh that `write_mfem` makes of it and its volume."""
+    spline = to_splinepy(field, reverse_w=orientation(volume) < 0)
     order, _ = _splinepy().io.mfem.dof_mapping(spline)
     values = np.asarray(spline.control_points)[order]  # (m, 1) or (m, 3)
     head = ["FiniteElementSpace", "FiniteElementCollection: NURBS", f"VDim: {values.shape[1]}", "Ordering: 1", ""]
@@ -127,8 +139,14 @@ def _splinepy() -> Any:
     return splinepy
 
 
-def to_splinepy(spline: BSplineVolume | SplineField) -> Any:
-    """Return a splinepy.BSpline of the same degrees, knots and coefficients. Raises InputError without splinepy."""
+def to_splinepy(spline: BSplineVolume | SplineField, *, reverse_w: bool = False) -> Any:
+    """Return a splinepy.BSpline of the same degrees, knots and coefficients. Raises InputError without splinepy.
+
+    reverse_w: whether w is replaced by 1 - w.
+    """
     net = spline.control_points if isinstance(spline, BSplineVolume) else spline.coefficients
+    knots = [row.tolist() for row in spline.knots]
+    if reverse_w:
+        net, knots[2] = net[:, :, ::-1], (1.0 - spline.knots[2][::-1]).tolist()
     rows = net.transpose(2, 1, 0, *range(3, net.ndim)).reshape(np.prod(net.shape[:3]), -1)  # u fastest
-    return _splinepy().BSpline(list(spline.degrees), [knots.tolist() for knots in spline.knots], rows)
+    return _splinepy().BSpline(list(spline.degrees), knots, rows)

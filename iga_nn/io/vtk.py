@@ -5,7 +5,7 @@ of F; neighbours share the points between them. A cell's points are in the order
 edges, faces, inside. The cells count u fastest. The degrees of each cell (HigherOrderDegrees) and the weights of the
 points (RationalWeights, all 1) are active attributes: readers take them for the shape functions. Point data are
 Bernstein coefficients, too. Where a solution has a higher degree or more knots than the map, both are written in the
-higher degree on all spans, exactly.
+higher degree on all spans, exactly. VTK's cells are right-handed: of a left-handed volume each has w reversed.
 
 VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
 tessellations are right. For slicing and clipping there are the samples (`_view.vtu`): linear hexahedra whose nodes lie
@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
-from parameterize.quality.quality import arap
+from parameterize.quality.quality import arap_on
 from parameterize.spline.bernstein import elevation, extraction
 from parameterize.spline.bspline import apply_along, divided_spans, insert_knots, sparse_rows
+from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve.field import Points, SplineField
 from solve.forms.frame import UnitFrame
@@ -75,7 +76,7 @@ def _exact(volume: BSplineVolume, solution: SplineField | None) -> pyvista.Unstr
     breaks = [np.unique(np.concatenate([s.knots[a] for s in shown])) for a in range(3)]
     degrees = [max(s.degrees[a] for s in shown) for a in range(3)]
     points = _bernstein(volume.degrees, volume.knots, volume.control_points, breaks, degrees).reshape(-1, 3)
-    cells = _cells([len(b) - 1 for b in breaks], degrees)  # (s, nodes of a cell)
+    cells = _cells([len(b) - 1 for b in breaks], degrees, orientation(volume) < 0)  # (s, nodes of a cell)
     counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
     grid = pyvista.UnstructuredGrid(counted.ravel(), np.full(len(cells), BEZIER_HEXAHEDRON), points)
     grid.cell_data.set_array(np.tile(degrees, (len(cells), 1)).astype(np.float64), "HigherOrderDegrees")
@@ -95,13 +96,15 @@ def _sampled(
 
     u, v, w = (divided_spans(knots, samples) for knots in volume.knots)
     points = Points.on(volume, u, v, w)  # (3, m_u, m_v, m_w)
-    jacobians = volume.grid_jacobian(u, v, w)
-    fields = {"arap": arap(jacobians / UnitFrame.of(volume).length), "det J": np.linalg.det(jacobians)}
+    distortion = arap_on(volume, u, v, w, 1.0 / UnitFrame.of(volume).length)
+    fields = {"arap": distortion, "det J": np.linalg.det(volume.grid_jacobian(u, v, w))}
     if solution is not None:
         fields["u"] = solution.grid(u, v, w)
         if problem is not None and problem.exact is not None:
             fields["error"] = error_at(fields["u"], problem.on(volume), points)
     grid = pyvista.StructuredGrid(*np.asarray(points)).cast_to_unstructured_grid()
+    if orientation(volume) < 0:  # bottom and top of each cell change places
+        grid.cells = grid.cells.reshape(-1, 9)[:, [0, 5, 6, 7, 8, 1, 2, 3, 4]].ravel()
     for name, values in fields.items():
         grid.point_data[name] = values.reshape((-1, *values.shape[3:]), order="F")  # VTK counts the first index fastest
     return grid
@@ -129,8 +132,11 @@ def _span_matrix(knots: Array, degree: int, raised: int) -> csr_array:
     return sparse_rows(blocks[owned], columns[owned], len(knots) - degree - 1)
 
 
-def _cells(spans: Sequence[int], degrees: Sequence[int]) -> NDArray[np.int64]:
-    """Return the numbers (s, nodes) of the points of every Bezier cell in VTK's order; cells count u fastest."""
+def _cells(spans: Sequence[int], degrees: Sequence[int], left_handed: bool) -> NDArray[np.int64]:
+    """Return the numbers (s, nodes) of the points of every Bezier cell in VTK's order; cells count u fastest.
+
+    left_handed: whether the cells of a right-handed volume would be inside out: then each has w reversed.
+    """
     from vtkmodules.vtkCommonDataModel import vtkHigherOrderHexahedron
 
     shape = [s * q + 1 for s, q in zip(spans, degrees, strict=True)]
@@ -138,6 +144,8 @@ def _cells(spans: Sequence[int], degrees: Sequence[int]) -> NDArray[np.int64]:
     local = np.stack(np.unravel_index(np.arange(np.prod(np.add(degrees, 1))), np.add(degrees, 1)), axis=1)
     order = [vtkHigherOrderHexahedron.PointIndexFromIJK(i, j, k, degrees) for i, j, k in local.tolist()]
     corners = np.stack(np.unravel_index(np.arange(np.prod(spans)), spans, order="F"), axis=1) * degrees  # (s, 3)
+    if left_handed:
+        local[:, 2] = degrees[2] - local[:, 2]
     nodes = corners[:, None, :] + local[np.argsort(order)]
     return lattice[tuple(np.moveaxis(nodes, -1, 0))]
 

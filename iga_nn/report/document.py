@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from parameterize.certificate.jacobian import CLAIMS
 from parameterize.files import save_text
 
 from ..levels import ESTIMATES, EXACT_ERRORS
@@ -75,9 +76,14 @@ def is_finished(report: Report | None) -> bool:
 
 
 def is_certified(report: Report) -> bool:
-    """Return whether det J > 0 is proved on the whole cube and the boundary was not found to meet itself."""
+    """Return whether the sign of det J is proved on the whole cube and the boundary was not found to meet itself."""
     section = report["parameterization"]
     return section["bijective"] == "certified" and section.get("boundary_injective") is not False
+
+
+def claim(report: Report) -> str:
+    """Return what a certificate proves: "det J > 0", of a left-handed volume "det J < 0"."""
+    return CLAIMS[report["parameterization"].get("orientation", "right-handed")]
 
 
 def is_converged(report: Report) -> bool:
@@ -106,7 +112,8 @@ def solved(report: Report) -> Report:
 def one_to_one(report: Report) -> str:
     """Return whether the map is one-to-one: "yes", "no" or "undecided".
 
-    "yes" takes both proofs, det J > 0 and a boundary that does not meet itself; a fold or a meeting place is a "no".
+    "yes" takes both proofs, that det J has one sign and that the boundary does not meet itself; a fold or a meeting
+    place is a "no".
     """
     quality = report["parameterization"]
     if quality["bijective"] == "folded" or quality.get("boundary_injective") is False:
@@ -148,6 +155,7 @@ def verdict(report: Report, folder: Path) -> Report:
     """Return what decides whether a result is used: what `--json` prints."""
     quality = report["parameterization"]
     short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
+    short |= {"orientation": quality["orientation"]} if "orientation" in quality else {}
     short |= {"boundary_injective": quality.get("boundary_injective"), "one_to_one": one_to_one(report)}
     if "arap" in quality:
         short["arap"] = quality["arap"]

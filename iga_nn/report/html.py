@@ -30,9 +30,9 @@ ERRORS = (  # keys of a level: the absolute error, and the relative one that sta
 )
 
 MEANINGS = {
-    "certified": "det J > 0 is proved on the whole cube, rounding errors included.",
-    "folded": "The map folds: det J is negative somewhere. Do not trust what is solved on it.",
-    "undecided": "Neither det J > 0 on the whole cube nor a fold could be proved.",
+    "certified": "{claim} is proved on the whole cube, rounding errors included.",
+    "folded": "The map folds: det J has the wrong sign somewhere. Do not trust what is solved on it.",
+    "undecided": "Neither {claim} on the whole cube nor a fold could be proved.",
 }
 ORIGINS = {
     "network": ("the network", "trained on the surface"),
@@ -94,7 +94,10 @@ def filled(template: str, **content: Any) -> str:
 def _verdicts(report: Report) -> list[tuple[str, str, str]]:
     """Return what decides whether the result is used: the colour, the heading and the meaning of each verdict."""
     quality, answer = report["parameterization"], reports.one_to_one(report)
-    meaning = MEANINGS[quality["bijective"]]
+    claim = reports.claim(report)
+    meaning = MEANINGS[quality["bijective"]].format(claim=claim)
+    if quality.get("orientation") == "left-handed":
+        meaning += " The parameters u, v, w are a left-handed system, which changes no result."
     if meeting := quality.get("boundary_meeting"):
         meaning += f" Two parts of the boundary meet at x, y, z = {_point(meeting['point'])}."
     elif answer == "yes":
@@ -102,7 +105,7 @@ def _verdicts(report: Report) -> list[tuple[str, str, str]]:
     if quality.get("witness"):
         meaning += f" The worst place is u, v, w = {_point(quality['witness'])}."
     color = "good" if reports.is_certified(report) else "bad" if answer == "no" else "unsure"
-    found = [(color, f"det J > 0: {quality['bijective']}; one-to-one: {answer}", meaning)]
+    found = [(color, f"{claim}: {quality['bijective']}; one-to-one: {answer}", meaning)]
     if "not_solved" in report:
         found.append(("bad", "The problem was not solved", report["not_solved"]))
     if not reports.is_meaningful(report):

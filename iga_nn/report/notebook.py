@@ -54,11 +54,13 @@ def _certificate(certificate: Certificate) -> str:
     facts = [("volume", f"{certificate.mean_det:.6g}")]
     if certificate.verdict == "certified":
         facts.append(("det J is at least", f"{certificate.lower_bound:.3g} of its mean"))
+    if certificate.left_handed:
+        facts.append(("u, v, w", certificate.orientation))
     if len(certificate.unproved):
         facts.append(("not proved", f"on {len(certificate.unproved)} knot spans"))
     if certificate.witness is not None:
         facts.append(("folded at u, v, w", in_brackets(certificate.witness)))
-    return _table(f"det J > 0: {certificate.verdict}", facts)
+    return _table(f"{certificate.claim}: {certificate.verdict}", facts)
 
 
 @as_html.register
@@ -71,7 +73,7 @@ def _quality(quality: QualityReport) -> str:
         ("spline to mesh: rms, mean, max", *_both(quality.spline_to_mesh)),
         ("both ways: rms, mean, max", *_both(quality.surface_distance)),
     ]
-    title = f"det J > 0: {quality.certificate.verdict}; one-to-one: {answer}"
+    title = f"{quality.certificate.claim}: {quality.certificate.verdict}; one-to-one: {answer}"
     return _table(title, rows, head=("", "at volume 1", "as given"))
 
 

@@ -1,5 +1,7 @@
 """Certificate: a proof that det J of a trivariate spline is positive on the whole cube, or a point where it is not.
 
+Of a left-handed volume, whose det J is negative on the whole, the proof is that of its mirror image: -det J > 0.
+
 The Bernstein coefficients of det J bound it on every span, those at its corners are values (docs/method.md, section 6;
 Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys. 233, 2013, section
 3). "Positive" and "negative" mean by more than a bound of all rounding errors (determinant.py).
@@ -13,8 +15,11 @@ import numpy as np
 from ..arrays import Array, IntArray, Mask
 from ..display import Shown
 from ..spline.bernstein import split
+from ..spline.orientation import mirrored, orientation
 from ..spline.volume import BSplineVolume, demand_volume
 from .determinant import CHUNK, DeterminantForm, corners_of
+
+CLAIMS = {"right-handed": "det J > 0", "left-handed": "det J < 0"}
 
 _PIECES = 64  # pieces at a time
 _TIGHT = 0.5  # a proved bound below this share of the least known value of det J is refined
@@ -27,15 +32,18 @@ class Certificate(Shown):
     Attributes
     ----------
     verdict : str
-        "certified" (det J > 0 on the whole cube), "folded" (det J < 0 at `witness`), or "undecided".
+        "certified" (det J > 0 on the whole cube), "folded" (det J < 0 at `witness`), or "undecided". Of a left-handed
+        volume -det J takes the place of det J.
     lower_bound : float
         Proved lower bound of det J over the cube, divided by the magnitude of its mean.
     mean_det : float
-        Integral of det J over the cube, which is the signed volume, in the volume's own units.
+        Integral of det J over the cube, which is the signed volume, in the volume's own units; negative if left-handed.
     witness : three float or None
-        The parameters of a point where det J is negative; None unless folded.
+        The parameters of a point where det J has the wrong sign; None unless folded.
     unproved : (k, 3) array of int
-        Span numbers (i, j, l) on which det J was not proved positive.
+        Span numbers (i, j, l) on which the sign of det J was not proved.
+    left_handed : bool
+        Whether det J is negative on the whole: u, v, w are a left-handed system.
 
     Examples
     --------
@@ -50,10 +58,21 @@ class Certificate(Shown):
     mean_det: float
     witness: tuple[float, float, float] | None
     unproved: IntArray
+    left_handed: bool = False
+
+    @property
+    def orientation(self) -> str:
+        """Return "right-handed" or "left-handed": that of u, v, w in space."""
+        return "left-handed" if self.left_handed else "right-handed"
+
+    @property
+    def claim(self) -> str:
+        """Return what the verdict is about: "det J > 0", of a left-handed volume "det J < 0"."""
+        return CLAIMS[self.orientation]
 
 
 def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
-    """Decide whether det J > 0 on the whole cube, cutting doubtful spans at most `max_depth` times in eight.
+    """Decide whether det J has one sign on the whole cube, cutting doubtful spans at most `max_depth` times in eight.
 
     Parameters
     ----------
@@ -84,6 +103,9 @@ def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
     demand_volume(volume)
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
+    left_handed = orientation(volume) < 0
+    if left_handed:
+        volume = mirrored(volume)
     form = DeterminantForm(volume)
     bounds, corners, means = form.survey()
     search = _Search(form, max_depth, float(corners.min()))
@@ -100,9 +122,10 @@ def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
     return Certificate(
         verdict=verdict,
         lower_bound=lowest / abs(mean) if mean != 0.0 else -np.inf,
-        mean_det=float(np.ldexp(mean, form.exponent)),
+        mean_det=float(np.ldexp(-mean if left_handed else mean, form.exponent)),
         witness=search.witness(volume),
         unproved=form.numbers(failed),
+        left_handed=left_handed,
     )
 
 

@@ -13,6 +13,7 @@ from ..certificate.jacobian import Certificate
 from ..cube.boundary_map import BoundaryMap
 from ..display import Shown
 from ..spline.bspline import gauss_points
+from ..spline.orientation import mirrored, orientation
 from ..spline.volume import BSplineVolume
 from .distances import Distances
 from .rotations import closest_rotations
@@ -148,6 +149,7 @@ def proved(
         "control_points": list(shape),
         "degrees": list(degrees),
         "bijective": certificate.verdict,
+        "orientation": certificate.orientation,
         **check.as_dict(),
         "det_lower_bound": bound if isfinite(bound) else None,
         "witness": None if certificate.witness is None else list(certificate.witness),
@@ -226,10 +228,23 @@ def arap_grid(
     step = max(1, _SLAB_POINTS // (len(v) * len(w)))
     for start in range(0, len(u), step):  # slabs bound the memory
         slab = slice(start, start + step)
-        for row, found in zip(values, _arap(volume.grid_jacobian(u[slab], v, w), scales), strict=True):
+        for row, found in zip(values, _arap(_unmirrored(volume, u[slab], v, w), scales), strict=True):
             row[slab] = found
     weights = np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
     return (u, v, w), values, weights
+
+
+def arap_on(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike, scale: float = 1.0) -> Array:
+    """Return the ARAP distortion of scale * F on a tensor grid: (len(u), len(v), len(w)).
+
+    A left-handed volume is as distorted as its mirror image.
+    """
+    return _arap(_unmirrored(volume, u, v, w), (scale,))[0]
+
+
+def _unmirrored(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
+    """Return the Jacobian on a tensor grid, of a left-handed volume that of its mirror image."""
+    return (volume if orientation(volume) > 0 else mirrored(volume)).grid_jacobian(u, v, w)
 
 
 def arap(jacobians: ArrayLike) -> Array:

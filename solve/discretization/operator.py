@@ -14,6 +14,7 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import collocation
+from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
@@ -46,8 +47,8 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    threads: of a product. folded: at how many of the points of all processes det J < 0. robin: the rules of the faces
-    that have Robin's term, as far as this process integrates.
+    threads: of a product. folded: at how many of the points of all processes det J has the wrong sign.
+    robin: the rules of the faces that have Robin's term, as far as this process integrates.
     """
 
     space: TrialSpace
@@ -189,20 +190,20 @@ def assemble(
     component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
     threads: of this pass and of the operator; the functions must then be safe to call from several at a time.
 
-    Where the map is folded, |det J| takes the place of det J: the form stays positive, an answer to show if not to
-    trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
+    |det J| takes the place of det J: right for a left-handed volume, and where a map is folded the form stays positive,
+    an answer to show if not to trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
     Raises ValueError where det J is zero at a point, naming it.
     """
     rule = rule or operator_rule(space)
     parts = space, rule, threads
     basis, part = MatrixFree(*parts), component or 0
     load = np.zeros((form.components, *space.shape))
-    folded = []
+    negative = []
     factors = kept = None
 
     def fill(points: IntArray) -> None:
         for q, rows, measure, x in geometry_planes(volume, rule, points):
-            folded.append(_count_folded(measure, rule, q))
+            negative.append(_count_negative(measure, rule, q))
             size = np.abs(measure)
             if kept is not None:
                 kept[q] = rows
@@ -220,10 +221,12 @@ def assemble(
         elif form.constant:
             kept = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
         basis.on_planes(fill)
-    total = space.total(sum(folded))
+    folded = space.total(sum(negative))
+    if folded and orientation(volume) < 0:
+        folded = space.total(int(np.prod(rule.shape))) - folded
     if factors is None:
-        return FormOperator(*parts, volume, form, kept, folded=total), load
-    return Operator(*parts, factors, folded=total), load
+        return FormOperator(*parts, volume, form, kept, folded=folded), load
+    return Operator(*parts, factors, folded=folded), load
 
 
 def add_integrals(
@@ -241,7 +244,7 @@ def add_integrals(
     result[first[q] : first[q] + u.shape[2]] += np.multiply.outer(u[kinds[0], q], plane)
 
 
-def _count_folded(measure: Array, rule: GaussRule, q: int) -> int:
+def _count_negative(measure: Array, rule: GaussRule, q: int) -> int:
     """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J."""
     if measure.min() > 0.0:
         return 0

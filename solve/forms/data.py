@@ -15,6 +15,7 @@ from .frame import UnitFrame
 from .parser import Expression, ExpressionError
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
+SMALLEST = 1.0 / LARGEST  # of a law's coefficients, by which data are divided
 WORDS = {2: "two", 3: "three"}
 USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
@@ -151,10 +152,17 @@ def demand(good: NDArray[np.bool_], name: str, must: str, x: Array) -> None:
 
 def demand_definite(tensor: Array, name: str, x: Array) -> None:
     """Raise ExpressionError at the first point (3, ...) where a symmetric tensor (6, ...) is not positive definite."""
-    xx, xy, xz, yy, yz, zz = tensor
+    size = np.abs(tensor).max(axis=0)
+    xx, xy, xz, yy, yz, zz = tensor / np.where(size > 0.0, size, 1.0)
     minor = xx * yy - xy * xy
     determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
     demand((xx > 0.0) & (minor > 0.0) & (determinant > 0.0), name, "positive definite", x)
+    demand_size(size, name, x)
+
+
+def demand_size(size: Array, name: str, x: Array) -> None:
+    """Raise ExpressionError at the first point (3, ...) where a law's coefficient is smaller than SMALLEST."""
+    demand(size >= SMALLEST, name, f"{SMALLEST:g} or more", x)
 
 
 def _first(bad: NDArray[np.bool_], x: Array) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 
-from .data import LARGEST, Data
+from .data import LARGEST, SMALLEST, Data
 from .problem import LawWithData, Natural
 
 
@@ -65,9 +65,9 @@ class Elasticity(LawWithData):
     labels = {"source": "force", "boundary": "displacement", "neumann": "traction"}  # noqa: RUF012
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.young, Real) and 1.0 / LARGEST <= self.young <= LARGEST):
+        if not (isinstance(self.young, Real) and SMALLEST <= self.young <= LARGEST):
             raise ValueError(
-                f"young must be a positive number from {1.0 / LARGEST:g} to {LARGEST:g}, got {self.young!r:.80}"
+                f"young must be a positive number from {SMALLEST:g} to {LARGEST:g}, got {self.young!r:.80}"
             )
         if not (isinstance(self.poisson_ratio, Real) and -1.0 < self.poisson_ratio < 0.5):
             raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {self.poisson_ratio!r:.80}")

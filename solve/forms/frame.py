@@ -2,18 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.bspline import divided_spans, gauss_points
+from parameterize.spline.bspline import divided_spans
+from parameterize.spline.orientation import FACES, enclosed_volume, face_vectors, orientation
 from parameterize.spline.volume import BSplineVolume
 
 from ..field import Points
 
-FACES = tuple(product(range(3), (0, 1)))  # axis and side
 BOX_SAMPLES = 8  # intervals a span and direction in which the boundary is sampled for its bounding box
 
 
@@ -36,10 +35,10 @@ class UnitFrame:
         Raises ValueError where the volume encloses nothing.
         """
         rows = [divided_spans(knots, BOX_SAMPLES) for knots in volume.knots]
-        samples = (np.asarray(face_geometry(volume, rows, *face)[0]) for face in FACES)
+        samples = (face_vectors(volume, rows, *face)[0] for face in FACES)
         ends = np.array([(points.min(axis=(1, 2)), points.max(axis=(1, 2))) for points in samples])  # (6, 2, 3)
         middle = (ends[:, 0].min(axis=0) + ends[:, 1].max(axis=0)) / 2.0
-        enclosed = abs(sum(_flux(volume, middle, *face) for face in FACES))
+        enclosed = abs(enclosed_volume(volume, middle))
         if enclosed == 0.0:
             raise ValueError("X, Y, Z have no scale here: the volume encloses nothing; check it with `iga-nn check`")
         x, y, z = middle.tolist()
@@ -54,25 +53,13 @@ class UnitFrame:
         return {"center": list(self.center), "length": self.length}
 
 
-def _flux(volume: BSplineVolume, middle: Array, axis: int, side: int) -> float:
-    """Return the integral of (x - middle) . n / 3 over a face: its share of the enclosed volume."""
-    rules = [
-        gauss_points(knots, (3 * degree + 1) // 2)  # exact for a product of three splines, two differentiated
-        for knots, degree in zip(volume.knots, volume.degrees, strict=True)
-    ]
-    x, area = face_geometry(volume, [points.ravel() for points, _ in rules], axis, side)
-    b, c = (rules[a][1].ravel() for a in range(3) if a != axis)
-    return float(b @ ((np.moveaxis(x, 0, -1) - middle) * np.moveaxis(area, 0, -1)).sum(axis=-1) @ c / 3.0)
-
-
 def face_geometry(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Points, Array]:
     """Return points on a face and the outward normals, as long as the surface element: (3, q_b, q_c) each.
 
-    rows: parameters of a tensor grid in the cube. Where the map is folded normals point inward.
+    rows: parameters of a tensor grid in the cube. The volume may be left-handed. Where a map is folded, normals point
+    inward.
     """
+    x, area = face_vectors(volume, rows, axis, side)
     u, v, w = (np.array([float(side)]) if a == axis else row for a, row in enumerate(rows))
     b, c = (a for a in range(3) if a != axis)
-    points = np.moveaxis(np.squeeze(volume.grid(u, v, w), axis), -1, 0)
-    jacobian = np.squeeze(volume.grid_jacobian(u, v, w), axis)  # (q_b, q_c, 3, 3)
-    area = np.moveaxis(np.cross(jacobian[..., (axis + 1) % 3], jacobian[..., (axis + 2) % 3]), -1, 0)
-    return Points.of(points, (u, v, w), (b, c)), area if side else -area
+    return Points.of(x, (u, v, w), (b, c)), orientation(volume) * area

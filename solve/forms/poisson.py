@@ -11,7 +11,7 @@ import numpy as np
 from parameterize.arrays import Array
 
 from ..field import SplineField
-from .data import Data, Datum, Scalar, demand, demand_definite
+from .data import Data, Datum, Scalar, demand, demand_definite, demand_size
 from .jets import PAIRS, SYMMETRIC, Jet
 from .problem import LawWithData, Natural, Robin
 
@@ -37,9 +37,9 @@ class Poisson(LawWithData):
         f; overrides the one that follows from `exact`.
     boundary : entry, optional
         Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
-    kappa : entry, six or nine of them, or a 3 x 3 array, optional
-        A scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz or nine by rows; default 1. Positive
-        definite.
+    kappa : entry, six or nine of them, or three rows of three, optional
+        A scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz, as nine by rows, or as three rows: lists
+        or a 3 x 3 array; default 1. Positive definite.
     reaction : entry, optional
         c, not negative; default 0.
     neumann : dict of face name to entry or None
@@ -111,6 +111,7 @@ class Poisson(LawWithData):
         found = self.data["kappa"](x) if "kappa" in self.data else np.ones((1, *x.shape[1:]))
         if len(found) == 1:
             demand(found[0] > 0.0, "kappa", "positive", x)
+            demand_size(found[0], "kappa", x)
             return found * np.reshape(IDENTITY, (6, *(1,) * (x.ndim - 1)))
         demand_definite(found, "kappa", x)
         return found
@@ -123,12 +124,18 @@ class Poisson(LawWithData):
 
 
 def _six(kappa: Data | None) -> Data | None:
-    """Return the six entries of a symmetric tensor in place of its nine. Raises ValueError for any other number."""
-    if isinstance(kappa, np.ndarray):
-        kappa = kappa.ravel().tolist()
+    """Return the six entries of a symmetric tensor in place of its nine, or of three rows of three.
+
+    Raises ValueError for any other number.
+    """
+    kappa = kappa.tolist() if isinstance(kappa, np.ndarray) else kappa
     if kappa is None or not isinstance(kappa, Sequence) or isinstance(kappa, str):
         return kappa
-    entries = list(kappa)
+    entries: list[Any] = [row.tolist() if isinstance(row, np.ndarray) else row for row in kappa]
+    if any(isinstance(row, list | tuple) for row in entries):
+        if [len(row) if isinstance(row, list | tuple) else 0 for row in entries] != [3, 3, 3]:
+            raise ValueError("kappa as rows must be three rows of three entries each")
+        entries = [entry for row in entries for entry in row]
     if len(entries) == 9:
         if any(entries[3 * i + j] != entries[3 * j + i] for i, j in PAIRS):
             raise ValueError("kappa is not symmetric: its entries above and below the diagonal must be the same")

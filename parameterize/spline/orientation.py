@@ -1,0 +1,64 @@
+"""The orientation of a volume: whether its parameter lines u, v, w form a right-handed or a left-handed system.
+
+It follows from the volume that the six faces enclose, by the divergence theorem: no point inside is asked, and a fold
+somewhere does not change it.
+"""
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from ..arrays import Array
+from .bspline import gauss_points
+from .volume import BSplineVolume
+
+FACES = tuple(product(range(3), (0, 1)))  # axis and side
+
+
+def face_vectors(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Array, Array]:
+    """Return points on a face, and normals as long as the surface element: (3, q_b, q_c) each.
+
+    rows: parameters of a tensor grid in the cube, of which that of `axis` is not read. The normals point outward on a
+    right-handed volume, inward on a left-handed one.
+    """
+    u, v, w = (np.array([float(side)]) if a == axis else row for a, row in enumerate(rows))
+    points = np.moveaxis(np.squeeze(volume.grid(u, v, w), axis), -1, 0)
+    jacobian = np.squeeze(volume.grid_jacobian(u, v, w), axis)  # (q_b, q_c, 3, 3)
+    area = np.moveaxis(np.cross(jacobian[..., (axis + 1) % 3], jacobian[..., (axis + 2) % 3]), -1, 0)
+    return points, area if side else -area
+
+
+def enclosed_volume(volume: BSplineVolume, middle: Array) -> float:
+    """Return the integral of det J over the cube, exactly, from the six faces: negative on a left-handed volume.
+
+    middle: a point (3,) near the body, about which the integrals are taken.
+    """
+    rules = [
+        gauss_points(knots, (3 * degree + 1) // 2)  # exact for a product of three splines, two differentiated
+        for knots, degree in zip(volume.knots, volume.degrees, strict=True)
+    ]
+    rows = [points.ravel() for points, _ in rules]
+    total = 0.0
+    for axis, side in FACES:
+        x, area = face_vectors(volume, rows, axis, side)
+        b, c = (rules[a][1].ravel() for a in range(3) if a != axis)
+        total += float(b @ ((np.moveaxis(x, 0, -1) - middle) * np.moveaxis(area, 0, -1)).sum(axis=-1) @ c / 3.0)
+    return total
+
+
+def orientation(volume: BSplineVolume) -> int:
+    """Return 1 for a right-handed volume, -1 for a left-handed one, whose det J is negative.
+
+    Of a folded volume it is the sign of the larger part.
+    """
+    points = volume.control_points.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float((high - low).max()) or 1.0
+    middle = (low + high) / 2.0  # size and place do not change the sign, but rounding and underflow would
+    return -1 if enclosed_volume(volume.transformed(1.0 / size, -middle / size), np.zeros(3)) < 0.0 else 1
+
+
+def mirrored(volume: BSplineVolume) -> BSplineVolume:
+    """Return the mirror image in x, whose det J is the negative of the volume's, exactly."""
+    return BSplineVolume(volume.degrees, volume.knots, volume.control_points * [-1.0, 1.0, 1.0])
