@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
+from parameterize.quality.distances import SampledBoundary, nearest_on_boundary
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
@@ -81,6 +82,26 @@ class SplineField(Brief):
     def __call__(self, points: ArrayLike) -> Array:
         """Return values (m,) or (m, c) at parameters (m, 3)."""
         return evaluate_at(self.degrees, self.knots, self.coefficients, points)
+
+    def probe(self, points: ArrayLike, *, clip: bool = False) -> Array:
+        """Return values (m,) or (m, c) at points (m, 3) in space, in the units of the volume; NaN outside of it.
+
+        clip: take the value at the nearest point of the boundary for points outside.
+        Raises ValueError for points that are not finite or of another shape, and for a field without a volume.
+        """
+        if self.geometry is None:
+            raise ValueError(
+                "points in space need a volume, which this field lacks: dataclasses.replace(field, geometry=volume)"
+            )
+        where = self.geometry.locate(points)
+        outside = np.isnan(where[:, 0])
+        if clip and outside.any():
+            beyond = np.atleast_2d(np.asarray(points, dtype=np.float64))[outside]
+            where[outside], _ = nearest_on_boundary(beyond, self.geometry, SampledBoundary.of(self.geometry))
+            outside[:] = False
+        values = np.full((len(where), *self.coefficients.shape[3:]), np.nan)
+        values[~outside] = self(where[~outside])
+        return values
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Return values (len(u), len(v), len(w)) or (.., c) on a tensor grid of parameters."""
