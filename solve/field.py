@@ -20,16 +20,25 @@ class Points(np.ndarray[Any, Any]):
 
     rows: the parameters of a tensor grid, an array a direction; None where unknown, as for a part of the array.
     order: the directions along which the axes (...) run.
+    places: the parameters (m, 3) of points (3, m) that are no grid.
     """
 
     rows: Sequence[ArrayLike] | None = None
     order: tuple[int, ...] = (0, 1, 2)
+    places: Array | None = None
 
     @classmethod
     def of(cls, x: Array, rows: Sequence[ArrayLike], order: tuple[int, ...] = (0, 1, 2)) -> Self:
         """Return the points x (3, ...) that lie at the parameters `rows`."""
         points = x.view(cls)
         points.rows, points.order = rows, order
+        return points
+
+    @classmethod
+    def at(cls, x: Array, places: Array) -> Self:
+        """Return the points x (3, m) that lie at the parameters `places` (m, 3)."""
+        points = x.view(cls)
+        points.places = places
         return points
 
     @classmethod
@@ -112,6 +121,8 @@ class SplineField(Brief):
 
         Raises ValueError for points whose parameters are not known.
         """
+        if isinstance(x, Points) and x.places is not None:
+            return np.moveaxis(self(x.places), 0, -1)
         if not isinstance(x, Points) or x.rows is None:
             raise ValueError("a field has values at the points x that the solver hands out, whole and unchanged")
         values = np.moveaxis(self.grid(*x.rows), -1, 0) if self.coefficients.ndim == 4 else self.grid(*x.rows)[None]
