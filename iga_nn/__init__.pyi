@@ -14,6 +14,8 @@ from solve import SplineField as SplineField
 from solve import System as System
 from solve import convergence as convergence
 from solve import discretize as discretize
+from solve import integrate as integrate
+from solve import resultant as resultant
 from solve import solve_problem
 
 from .batch.run import run_batch as run_batch

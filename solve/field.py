@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
+from parameterize.quality.distances import SampledBoundary, nearest_on_boundary
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
@@ -19,16 +20,25 @@ class Points(np.ndarray[Any, Any]):
 
     rows: the parameters of a tensor grid, an array a direction; None where unknown, as for a part of the array.
     order: the directions along which the axes (...) run.
+    places: the parameters (m, 3) of points (3, m) that are no grid.
     """
 
     rows: Sequence[ArrayLike] | None = None
     order: tuple[int, ...] = (0, 1, 2)
+    places: Array | None = None
 
     @classmethod
     def of(cls, x: Array, rows: Sequence[ArrayLike], order: tuple[int, ...] = (0, 1, 2)) -> Self:
         """Return the points x (3, ...) that lie at the parameters `rows`."""
         points = x.view(cls)
         points.rows, points.order = rows, order
+        return points
+
+    @classmethod
+    def at(cls, x: Array, places: Array) -> Self:
+        """Return the points x (3, m) that lie at the parameters `places` (m, 3)."""
+        points = x.view(cls)
+        points.places = places
         return points
 
     @classmethod
@@ -82,6 +92,26 @@ class SplineField(Brief):
         """Return values (m,) or (m, c) at parameters (m, 3)."""
         return evaluate_at(self.degrees, self.knots, self.coefficients, points)
 
+    def probe(self, points: ArrayLike, *, clip: bool = False) -> Array:
+        """Return values (m,) or (m, c) at points (m, 3) in space, in the units of the volume; NaN outside of it.
+
+        clip: take the value at the nearest point of the boundary for points outside.
+        Raises ValueError for points that are not finite or of another shape, and for a field without a volume.
+        """
+        if self.geometry is None:
+            raise ValueError(
+                "points in space need a volume, which this field lacks: dataclasses.replace(field, geometry=volume)"
+            )
+        where = self.geometry.locate(points)
+        outside = np.isnan(where[:, 0])
+        if clip and outside.any():
+            beyond = np.atleast_2d(np.asarray(points, dtype=np.float64))[outside]
+            where[outside], _ = nearest_on_boundary(beyond, self.geometry, SampledBoundary.of(self.geometry))
+            outside[:] = False
+        values = np.full((len(where), *self.coefficients.shape[3:]), np.nan)
+        values[~outside] = self(where[~outside])
+        return values
+
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Return values (len(u), len(v), len(w)) or (.., c) on a tensor grid of parameters."""
         return evaluate_grid(self.degrees, self.knots, self.coefficients, (u, v, w))
@@ -91,6 +121,8 @@ class SplineField(Brief):
 
         At parameters a field is called: `field(uvw)`. Raises ValueError for points whose parameters are not known.
         """
+        if isinstance(x, Points) and x.places is not None:
+            return np.moveaxis(self(x.places), 0, -1)
         if not isinstance(x, Points) or x.rows is None:
             raise ValueError(
                 "a field is a function of the parameters u, v, w: call field(uvw), uvw of shape (m, 3) with numbers "

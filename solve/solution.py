@@ -5,12 +5,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
+
+from parameterize.arrays import Array
 from parameterize.display import Shown, above
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.errors import Errors
 from .field import SplineField
+from .forms.form import Quantity
 from .forms.problem import BoundaryValueProblem
+from .quantities import Extremes, at_points, extremes, on_grid
 
 if TYPE_CHECKING:
     import pyvista
@@ -138,6 +143,24 @@ class Solution(SplineField, Shown):
     def field(self) -> SplineField:
         """The spline without the report: a datum for another problem on the same volume."""
         return SplineField(self.degrees, self.knots, self.coefficients, self.geometry)
+
+    def quantity(self, what: str | Quantity, points: ArrayLike) -> Array:
+        """Return a quantity (m, ...) at parameters (m, 3), NaN at those that are NaN (points outside of the volume).
+
+        what: a name that the law gives, as "gradient", "flux", of elasticity "stress", "von_mises" and others
+        (`problem.form.quantities`); or a function of u (c, m), grad (c, 3, m) and x (3, m) that returns (..., m).
+        For points in space: solution.quantity(what, solution.geometry.locate(points)).
+        Raises ValueError for another name, and a function that fails or returns another shape.
+        """
+        return at_points(self, self.problem.form, what, points)
+
+    def quantity_grid(self, what: str | Quantity, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
+        """Return a quantity (len(u), len(v), len(w), ...) on a tensor grid of parameters; else as `quantity`."""
+        return on_grid(self, self.problem.form, what, u, v, w)
+
+    def extremes(self, what: str | Quantity) -> Extremes:
+        """Return the least and the largest value of a quantity of one number a point, and where they are."""
+        return extremes(self, self.problem.form, what)
 
     def to_pyvista(self, samples: int | None = None) -> "pyvista.UnstructuredGrid":
         """Return the volume as a grid of pyvista with the solution as point data `u`.

@@ -192,6 +192,16 @@ class BSplineVolume(Brief, Shown):
         """Return F at points (m, 3) of the unit cube: (m, 3)."""
         return self._at(points, (0, 0, 0))
 
+    def locate(self, points: ArrayLike) -> Array:
+        """Return the parameters (m, 3) of points (m, 3) in space, NaN for points outside.
+
+        A point closer to the volume than 1e-10 of its size counts as inside.
+        Raises ValueError for points of another shape or that are not finite.
+        """
+        from .location import locate
+
+        return locate(self, points)
+
     def jacobian(self, points: ArrayLike) -> Array:
         """Return J[i, a, b] = dF_a / du_b at points (m, 3): (m, 3, 3)."""
         units = np.eye(3, dtype=int)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from parameterize.arrays import Array
 
 from .data import LARGEST, SMALLEST, Data
+from .form import Quantity
 from .problem import LawWithData, Natural
 
 
@@ -99,7 +101,37 @@ class Elasticity(LawWithData):
             stress[i, i] += pressure
         return stress
 
+    @property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """Also |u|, strain and stress (3, 3, ...), von Mises' stress and the principal stresses (3, ...)."""
+        return {
+            **super().quantities,
+            "magnitude": lambda u, grad, x: np.sqrt((u * u).sum(axis=0)),
+            "strain": lambda u, grad, x: 0.5 * (grad + np.swapaxes(grad, 0, 1)),
+            "stress": self.flux,
+            "von_mises": lambda u, grad, x: von_mises(self.flux(u, grad, x)),
+            "principal": lambda u, grad, x: principal(self.flux(u, grad, x)),
+        }
+
     def symbol(self, wave: Array, x: Array) -> Array:
         """Return the factor mu (k . k) of shear waves, the least, for wave vectors k (3, ...)."""
         found: Array = self.constants[1] * (wave * wave).sum(axis=0)
         return found
+
+
+def von_mises(stress: Array) -> Array:
+    """Return von Mises' equivalent stress (...) of a stress tensor (3, 3, ...): sqrt(3/2 s : s), s its deviator."""
+    deviator = stress - _mean_pressure(stress)
+    return np.asarray(np.sqrt(1.5 * (deviator * deviator).sum(axis=(0, 1))))
+
+
+def principal(stress: Array) -> Array:
+    """Return the principal stresses (3, ...) of a stress tensor (3, 3, ...), the largest first."""
+    values = np.linalg.eigvalsh(np.moveaxis(stress, (0, 1), (-2, -1)))
+    return np.asarray(np.moveaxis(values[..., ::-1], -1, 0), dtype=np.float64)
+
+
+def _mean_pressure(stress: Array) -> Array:
+    """Return a third of the trace times the unit tensor, (3, 3, ...)."""
+    third = (stress[0, 0] + stress[1, 1] + stress[2, 2]) / 3.0
+    return np.multiply.outer(np.eye(3), third)

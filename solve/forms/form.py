@@ -1,6 +1,6 @@
 """Form: the law of a linear second-order PDE, from which all else follows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,8 @@ from parameterize.arrays import Array
 
 from .data import demand_definite
 from .jets import PAIRS, SYMMETRIC, Jet, Number, coordinates, stacked
+
+Quantity = Callable[[Any, Any, Any], Any]  # of u (c, ...), grad (c, 3, ...) and x (3, ...)
 
 ROUNDING = 1e-8  # share of a law's size by which it may differ from a linear or symmetric one
 
@@ -57,6 +59,11 @@ class Form:
     def react(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the term (c, ...) without derivatives of the test, linear in u and grad; none here."""
         return 0.0
+
+    @property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """What can be asked of a solution of this law, by name; a law of one's own may add to it."""
+        return {"u": lambda u, grad, x: u, "gradient": lambda u, grad, x: grad, "flux": self.flux}
 
     @property
     def has_reaction(self) -> bool:

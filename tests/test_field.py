@@ -1,0 +1,48 @@
+"""A field at points in space."""
+
+import numpy as np
+import pytest
+
+import iga_nn
+from solve import benchmark_volume
+from solve.field import SplineField
+
+
+@pytest.fixture(scope="module")
+def solution():
+    return iga_nn.solve(benchmark_volume(4), iga_nn.Poisson(exact="1+x+2*y-z"), refine=1)
+
+
+def plane(x):
+    return 1.0 + x[..., 0] + 2.0 * x[..., 1] - x[..., 2]
+
+
+def test_values_at_points_in_space(solution):
+    points = solution.geometry(np.random.default_rng(0).random((200, 3)))
+    np.testing.assert_allclose(solution.probe(points), plane(points), atol=1e-6)
+    far = [[9.0, 9.0, 9.0], points[0]]
+    values = solution.probe(far)
+    assert np.isnan(values[0]) and values[1] == pytest.approx(plane(points[0]), abs=1e-6)
+
+
+def test_points_outside_take_the_nearest_value(solution):
+    volume = solution.geometry
+    on_face = volume([[1.0, 0.5, 0.5]])
+    normal = np.cross(volume.jacobian([[1.0, 0.5, 0.5]])[0, :, 1], volume.jacobian([[1.0, 0.5, 0.5]])[0, :, 2])
+    outside = on_face + 0.05 * normal / np.linalg.norm(normal)
+    assert np.isnan(solution.probe(outside)).all()
+    assert solution.probe(outside, clip=True) == pytest.approx(plane(on_face), abs=1e-6)
+
+
+def test_vectors_have_rows():
+    volume = benchmark_volume(2)
+    field = SplineField(volume.degrees, volume.knots, volume.control_points, volume)
+    points = volume([[0.2, 0.4, 0.6], [0.5, 0.5, 0.5]])
+    np.testing.assert_allclose(field.probe(points), points, atol=1e-13)
+    assert field.probe([[5.0, 5.0, 5.0]]).shape == (1, 3) and np.isnan(field.probe([[5.0, 5.0, 5.0]])).all()
+
+
+def test_a_field_without_a_volume_says_so():
+    volume = benchmark_volume(2)
+    with pytest.raises(ValueError, match="geometry=volume"):
+        SplineField(volume.degrees, volume.knots, volume.control_points[..., 0]).probe([[0.0, 0.0, 0.0]])
