@@ -66,6 +66,13 @@ def test_polygons_are_cut_and_tetrahedra_give_their_boundary():
     quads = load_surface(polydata(faces=QUADS))
     assert quads.notices == ("6 polygons cut into 12 triangles",) and quads.volume == pytest.approx(1.0)
     assert load_surface(polydata(faces=MIXED)).notices == ("9 polygons cut into 12 triangles",)
+    strips = load_surface(polydata().strip())
+    assert strips.volume == pytest.approx(1.0) and len(strips.faces) == 12
+    marked = polydata()
+    marked.verts, marked.lines = [1, 0], [2, 0, 1]
+    assert load_surface(marked).notices == ("left out cells without area: 1 vertex, 1 line",)
+    voxel = load_surface(meshio.Mesh(CUBE, [("voxel", np.arange(8)[None])]))
+    assert voxel.volume == pytest.approx(1.0)
     solid = load_surface(meshio.Mesh(TETRAHEDRON[0], [("tetra", np.array([[0, 1, 2, 3]]))]))
     assert len(solid.faces) == 4 and solid.volume == pytest.approx(1.0 / 6.0)
 

@@ -7,6 +7,7 @@ import pytest
 import pyvista
 from mesh_files import CUBE, QUADS, TRIANGLES
 from reader_files import grid, save
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from iga_nn.io.vtk import write_bezier
 from parameterize.spline.volume import BSplineVolume
@@ -154,7 +155,7 @@ def test_points_and_lines_are_left_out_with_a_notice(tmp_path):
     cells += [(TYPES.QUADRATIC_EDGE, [0, 1, 2]), (TYPES.LAGRANGE_CURVE, [0, 1, 2])]
     surface = load_surface(save(grid([*SOLIDS["quads"][0], *cells]), tmp_path / "body.vtu"))
     assert surface.volume == pytest.approx(1.0)
-    said = "left out cells without area: 1 vertex, 1 poly_vertex, 1 line, 1 poly_line, 1 line3, 1 line0"
+    said = "left out cells without area: 1 vertex, 1 poly_vertex, 1 line, 2 poly_line, 1 line3"
     assert surface.notices[0] == said
 
 
@@ -233,3 +234,31 @@ def test_a_damaged_block_is_refused_in_one_line(compressor, tmp_path, capfd):
     with pytest.raises(MeshError) as caught:
         load_surface(path)
     assert "\n" not in str(caught.value) and capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("mode", ["ascii", "binary", "appended"])
+@pytest.mark.parametrize("compressor", [None, "ZLib"])
+def test_empty_pieces_and_arrays_are_nothing(mode, compressor, tmp_path):
+    empty = save(pyvista.UnstructuredGrid(), tmp_path / "body.vtu", mode, compressor)
+    with pytest.raises(MeshError, match="has no faces and no solid cells"):
+        load_surface(empty)
+    if mode != "appended":
+        held = [pyvista.UnstructuredGrid(), grid(SOLIDS["quads"][0])]
+        assert load_surface(pieces(tmp_path / "body.vtu", held)).volume == pytest.approx(1.0)
+
+
+def test_the_first_time_step_is_taken_with_a_notice(tmp_path):
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(tmp_path / "body.vtu"))
+    writer.SetDataModeToAppended()
+    writer.SetNumberOfTimeSteps(3)
+    mesh = grid(SOLIDS["quads"][0])
+    writer.SetInputData(mesh)
+    writer.Start()
+    for time in (1.0, 2.0, 4.0):
+        mesh.points = CUBE * time
+        writer.WriteNextTime(time)
+    writer.Stop()
+    surface = load_surface(tmp_path / "body.vtu")
+    assert surface.volume == pytest.approx(1.0)
+    assert "the first of 3 time steps read" in surface.notices

@@ -144,8 +144,8 @@ def load_surface(
     Parameters
     ----------
     mesh : str or Path, or a trimesh.Trimesh, pyvista.PolyData or meshio.Mesh
-        The path of a surface (.obj, .stl, .ply, .off) or of tetrahedra (.mesh, .msh, .vtu), each also as .gz, or a mesh
-        in memory. The boundary of tetrahedra is taken.
+        The path of a surface (.obj, .stl, .ply, .off) or of cells (.mesh, .msh, .vtu), each also as .gz, or a mesh in
+        memory. Of solid cells the boundary is taken.
     component : int, optional
         Which one to take where there are several, 0 the largest.
     max_faces : int

@@ -107,13 +107,7 @@ def _elements_2(source: Source) -> Iterator[tuple[int, IntArray]]:
     """
     left = source.count()
     if isinstance(source, Text):
-        rows: dict[int, list[list[int]]] = {}
-        for _ in range(left):
-            _, number, tags = source.whole(3)
-            _check_tags(tags)
-            size = _kind(number)[1]
-            rows.setdefault(number, []).append(source.whole(tags + size)[tags:])
-        yield from ((number, np.array(found, dtype=np.int64)) for number, found in rows.items())
+        yield from _text_elements_2(source, left)
         return
     while left > 0:
         number, count, tags = source.whole(3)
@@ -122,6 +116,22 @@ def _elements_2(source: Source) -> Iterator[tuple[int, IntArray]]:
             raise MeshError(f"a block of {count} elements where {left} are left; {DAMAGED}")
         yield number, source.table(count, [("i4", 1 + tags), ("i4", _kind(number)[1])])[1]
         left -= count
+
+
+def _text_elements_2(source: Text, count: int) -> Iterator[tuple[int, IntArray]]:
+    """Read rows `number type tags ... nodes`."""
+    rows: dict[int, list[list[int]]] = {}
+    numbers, at = source.whole(source.left), 0
+    for _ in range(count):
+        if at + 3 > len(numbers):
+            raise MeshError(f"$Elements of the .msh ends before the last of {count} elements; {DAMAGED}")
+        number, tags = numbers[at + 1 : at + 3]
+        _check_tags(tags)
+        start, at = at + 3 + tags, at + 3 + tags + _kind(number)[1]
+        rows.setdefault(number, []).append(numbers[start:at])
+    if at > len(numbers):
+        raise MeshError(f"$Elements of the .msh ends within its last element; {DAMAGED}")
+    yield from ((number, np.array(found, dtype=np.int64)) for number, found in rows.items())
 
 
 def _check_tags(count: int) -> None:

@@ -7,6 +7,7 @@ import re
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..errors import MeshError, check_face_count
@@ -63,7 +64,7 @@ def _binary(body: bytes, elements: list[Element], order: str) -> Found:
         if element.name == "vertex":
             places = np.stack(columns, axis=1).astype(np.float64)
         elif element.name in READ and element.count:
-            rows = [_whole(row) for row in columns[0]]
+            rows = _whole(columns[0])
             polygons += rows if element.name == "face" else triangles_of_strips(_parted(rows))
     return places, polygons
 
@@ -123,12 +124,14 @@ def _words(words: list[str], element: Element, wanted: list[int], line: int) -> 
     raise MeshError(f"line {line}: no {element.name} as the header promises; {DAMAGED}")
 
 
-def _whole(row: Any) -> list[int]:
-    """Return the corners of a face; raise MeshError where they are no whole numbers."""
-    values = row.tolist() if isinstance(row, np.ndarray) else row
-    if any(value != value or abs(value) == np.inf or value != int(value) for value in values):
+def _whole(rows: NDArray[Any] | list[tuple[float, ...]]) -> list[list[int]]:
+    """Return the corners of faces; raise MeshError where they are no whole numbers."""
+    if isinstance(rows, np.ndarray) and rows.dtype.kind in "iu":
+        return rows.tolist()
+    found = [list(row) for row in rows]
+    if any(value % 1 != 0 for row in found for value in row):  # of nan and infinities, nan
         raise MeshError(f"a face of the PLY has corners that are no whole numbers; {DAMAGED}")
-    return [int(value) for value in values]
+    return [[int(value) for value in row] for row in found]
 
 
 def _parted(strips: list[list[int]]) -> list[list[int]]:

@@ -24,6 +24,8 @@ def read_vtu(data: bytes, max_faces: int) -> Content:
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise MeshError("the .vtu declares a document type, whose entities are not expanded: remove the declaration")
     root, decoder = _opened(data, most_bytes(max_faces))
+    steps = [grid.get("TimeValues", "").split() for grid in root.iter("UnstructuredGrid")]
+    notices = tuple(f"the first of {len(times)} time steps read" for times in steps if len(times) > 1)
     points, cells = [np.empty((0, 3))], []
     for piece in root.iter("Piece"):
         first = sum(map(len, points))
@@ -31,8 +33,8 @@ def read_vtu(data: bytes, max_faces: int) -> Content:
         points.append(found)
         cells += [(kind, _shifted(rows, first)) for kind, rows in held]
     if len(points) <= 2:
-        return from_cells(points[-1], cells)
-    return _joined(np.concatenate(points), cells, len(points) - 1)
+        return from_cells(points[-1], cells, notices)
+    return _joined(np.concatenate(points), cells, (*notices, f"{len(points) - 1} pieces joined"))
 
 
 def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
@@ -56,14 +58,14 @@ def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
 
 
 def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tuple[str, Rows]]]:
-    """Return points (n, 3) and cells of a piece, by kind."""
+    """Return points (n, 3) and cells of a piece, by kind; of one without cells, nothing."""
     n, m = (header_count(piece.get(name, "")) for name in ("NumberOfPoints", "NumberOfCells"))
+    if not m:
+        return np.empty((0, 3)), []
     points = _array(piece, "Points", None)
     if points.get("NumberOfComponents", "3") != "3":
         raise MeshError("points of the .vtu have not three coordinates each: export three")
     places = decoder.numbers(points, 3 * n).astype(np.float64).reshape(n, 3)
-    if not m:
-        return places, []
     types = decoder.numbers(_array(piece, "Cells", "types"), m).astype(np.int64)
     ends = decoder.numbers(_array(piece, "Cells", "offsets"), m).astype(np.int64)
     sizes = np.diff(ends, prepend=0)
@@ -96,21 +98,21 @@ def _by_kind(types: IntArray, sizes: IntArray, ends: IntArray, corners: IntArray
 
 
 def _name(number: int) -> str:
-    """Return VTK's name of a cell type; those of curves are `line` as far as `from_cells` is concerned."""
+    """Return VTK's name of a cell type, for every kind of curve that of a line."""
     import pyvista
 
     try:
         name = pyvista.CellType(number).name.lower()
     except ValueError:
         return f"VTK {number}"
-    return "line0" if name.endswith("_curve") else name
+    return "poly_line" if name.endswith(("_curve", "_edge")) else name
 
 
 def _shifted(rows: Rows, first: int) -> Rows:
     return rows + first if isinstance(rows, np.ndarray) else [[i + first for i in row] for row in rows]
 
 
-def _joined(points: Array, cells: list[tuple[str, Rows]], pieces: int) -> Content:
+def _joined(points: Array, cells: list[tuple[str, Rows]], notices: tuple[str, ...]) -> Content:
     """Return the content of several pieces, whose cells share points that are in exactly the same place."""
     _, first, label = np.unique(points, axis=0, return_index=True, return_inverse=True)
     number = first[label.ravel()]
@@ -121,4 +123,4 @@ def _joined(points: Array, cells: list[tuple[str, Rows]], pieces: int) -> Conten
         (kind, number[rows] if isinstance(rows, np.ndarray) else [number[row].tolist() for row in rows])
         for kind, rows in cells
     ]
-    return from_cells(points, same, (f"{pieces} pieces joined",))
+    return from_cells(points, same, notices)

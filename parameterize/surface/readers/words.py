@@ -24,6 +24,11 @@ class Text:
         """Return the number that a table begins with."""
         return header_count(self._next(1)[0])
 
+    @property
+    def left(self) -> int:
+        """Return how many words are left."""
+        return len(self._words) - self._at
+
     def whole(self, count: int) -> list[int]:
         """Return the next whole numbers."""
         words = self._next(count)
@@ -48,8 +53,8 @@ class Text:
         return parts
 
     def _next(self, count: int) -> list[str]:
-        if not 0 <= count <= len(self._words) - self._at:
-            raise _too_few(self._what, count, len(self._words) - self._at, "numbers")
+        if not 0 <= count <= self.left:
+            raise _too_few(self._what, count, self.left, "numbers")
         self._at += count
         return self._words[self._at - count : self._at]
 
