@@ -71,8 +71,8 @@ def test_polygons_are_cut_and_tetrahedra_give_their_boundary():
     marked = polydata()
     marked.verts, marked.lines = [1, 0], [2, 0, 1]
     assert load_surface(marked).notices == ("left out cells without area: 1 vertex, 1 line",)
-    voxel = load_surface(meshio.Mesh(CUBE, [("voxel", np.arange(8)[None])]))
-    assert voxel.volume == pytest.approx(1.0)
+    hexahedron = load_surface(meshio.Mesh(CUBE, [("hexahedron", np.array([[0, 1, 3, 2, 4, 5, 7, 6]]))]))
+    assert hexahedron.volume == pytest.approx(1.0)
     solid = load_surface(meshio.Mesh(TETRAHEDRON[0], [("tetra", np.array([[0, 1, 2, 3]]))]))
     assert len(solid.faces) == 4 and solid.volume == pytest.approx(1.0 / 6.0)
 
