@@ -36,7 +36,22 @@ import formulas
 import meshio
 import numpy as np
 import torch
-from mesh_files import CUBE, MIXED, QUADS, TETRAHEDRON, ball, binary_stl, flagged_ply, medit, obj, off, ply, text_stl
+from mesh_files import (
+    CUBE,
+    MIXED,
+    QUADS,
+    TETRAHEDRON,
+    TRIANGLES,
+    ball,
+    binary_stl,
+    flagged_ply,
+    medit,
+    obj,
+    off,
+    ply,
+    text_stl,
+)
+from reader_files import Ply, beside, faces, grid, msh2, msh2_binary, msh41, msh41_binary, save, vertices
 
 from iga_nn.errors import InputError, input_errors, one_line
 from iga_nn.io import splinepy as spline_files
@@ -302,6 +317,32 @@ def meshio_reader(name, suffix, *options):
     return surface_reader(name, suffix, *seeds)
 
 
+FORMS = ("ascii", "binary_little_endian", "binary_big_endian")
+
+
+def any_plies():
+    """Properties beside the corners, lists on vertices, triangle strips, other elements."""
+    flags = ["uchar flags", "list char float more"]
+    yield Ply(("edge", ["int a"], [(0,)]), vertices(), beside(faces(), after=flags, values_after=[7, (0.5,)]))
+    yield Ply(beside(vertices(), before=["list short double w"], values_before=[(1.0,)]), faces())
+    strips = [((0, 1, 4, 5, 6, 7, 2, 3, 0, 1, -1, 0, 4, 2, 6),)]
+    yield Ply(vertices(), ("tristrips", ["list int int vertex_index"], strips), faces(TRIANGLES[10:]))
+
+
+def any_mshs():
+    """Parametric nodes, version 4.0, either byte order."""
+    yield from (msh2(), msh41(parametric=1), msh41(parametric=1, version="4"))
+    yield from (write(order, 1) for write in (msh2_binary, msh41_binary) for order in "<>")
+
+
+def vtk_files():
+    """Cells of several kinds in every encoding that VTK writes."""
+    cells = [(12, [0, 1, 3, 2, 4, 5, 7, 6]), *((9, quad) for quad in QUADS), (6, [0, 1, 2, 3]), (3, [0, 1])]
+    for mode, packing in (("ascii", None), ("binary", "LZMA"), ("appended", "ZLib"), ("appended", "LZ4")):
+        for order, header in (("little", 32), ("big", 64)):
+            yield written(partial(save, grid(cells), mode=mode, compressor=packing, order=order, header=header), ".vtu")
+
+
 def npz_reader(name, read, *things):
     """The arrays are the pieces: spoiled, they are packed again with the right checksums."""
     archives = [zipfile.ZipFile(io.BytesIO(written(thing.save, ".npz"))) for thing in things]
@@ -366,11 +407,15 @@ def readers() -> tuple[Reader, ...]:
         surface_reader("stl, binary", ".stl", binary_stl(*TETRAHEDRON), binary_stl(header=b"solid"), binary_stl()),
         surface_reader("ply, text", ".ply", ply(), ply(faces=MIXED), flagged_ply()),
         surface_reader("ply, binary", ".ply", ply(binary=True), ply(faces=MIXED, binary=True)),
+        surface_reader("ply, any", ".ply", *(plies.content(form) for plies in any_plies() for form in FORMS)),
         surface_reader("off", ".off", off(), off(faces=MIXED).replace("OFF\n", "OFF\n# a cube\n\n")),
+        surface_reader("off, words", ".off", off().replace("\n", " "), off().replace("\n4 ", " 1 0 0 1\n4\n")),
         meshio_reader(".mesh", ".mesh", {}),
         surface_reader(".mesh, sections", ".mesh", medit(), medit(more="RequiredTriangles 2\n1 2\n")),
         meshio_reader("msh, text", ".msh", *({"file_format": f, "binary": False} for f in ("gmsh", "gmsh22"))),
         meshio_reader("msh, binary", ".msh", *({"file_format": f, "binary": True} for f in ("gmsh", "gmsh22"))),
+        surface_reader("msh, any", ".msh", *any_mshs()),
+        surface_reader("vtu of VTK", ".vtu", *vtk_files()),
         meshio_reader("vtu", ".vtu", {"binary": False}, {"compression": None}, {"compression": "zlib"}),
         npz_reader("volume.npz", check, *volumes),
         npz_reader("solution.npz", given(SplineField.load), *fields),

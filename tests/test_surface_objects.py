@@ -66,6 +66,13 @@ def test_polygons_are_cut_and_tetrahedra_give_their_boundary():
     quads = load_surface(polydata(faces=QUADS))
     assert quads.notices == ("6 polygons cut into 12 triangles",) and quads.volume == pytest.approx(1.0)
     assert load_surface(polydata(faces=MIXED)).notices == ("9 polygons cut into 12 triangles",)
+    strips = load_surface(polydata().strip())
+    assert strips.volume == pytest.approx(1.0) and len(strips.faces) == 12
+    marked = polydata()
+    marked.verts, marked.lines = [1, 0], [2, 0, 1]
+    assert load_surface(marked).notices == ("left out cells without area: 1 vertex, 1 line",)
+    hexahedron = load_surface(meshio.Mesh(CUBE, [("hexahedron", np.array([[0, 1, 3, 2, 4, 5, 7, 6]]))]))
+    assert hexahedron.volume == pytest.approx(1.0)
     solid = load_surface(meshio.Mesh(TETRAHEDRON[0], [("tetra", np.array([[0, 1, 2, 3]]))]))
     assert len(solid.faces) == 4 and solid.volume == pytest.approx(1.0 / 6.0)
 
@@ -87,9 +94,8 @@ NAN = np.where(np.arange(24).reshape(8, 3) == 4, np.nan, CUBE)
         (trimesh.Trimesh(), "has no faces"),
         (polydata(NAN), "NaN or infinite"),
         (pyvista.PolyData(CUBE), "has no faces"),
-        (polydata().strip(), "triangle strips"),
         (meshio.Mesh(CUBE, [("triangle", np.array([[0, 1, 99]]))]), "vertex numbers out of range, the first is 99"),
-        (meshio.Mesh(CUBE, [("hexahedron", np.arange(8)[None])]), "cells of type hexahedron"),
+        (meshio.Mesh(np.eye(6, 3), [("triangle6", np.arange(6)[None])]), "1 cells of type triangle6: save linear"),
         (meshio.Mesh(CUBE[:, :2], [("triangle", np.array(TRIANGLES))]), "points must have shape"),
         (meshio.Mesh(CUBE, [("triangle", np.array([["a", "b", "c"]]))]), "invalid literal"),
     ],

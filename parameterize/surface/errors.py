@@ -38,24 +38,37 @@ def check_face_limit(max_faces: int) -> None:
         raise MeshError(f"max_faces must be a whole number, at least 4, got {max_faces!r:.80}")
 
 
-def check_finite(vertices: Array) -> None:
-    """Raise MeshError for coordinates that are NaN, infinite or too large to compute volumes with."""
-    broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+def check_finite(vertices: Array, faces: IntArray) -> None:
+    """Raise MeshError where faces use coordinates that are NaN, infinite or too large to compute volumes with."""
+    used = np.unique(faces)
+    places = vertices[used]
+    broken = used[~np.isfinite(places).all(axis=1)]
     if len(broken):
         raise MeshError(
             f"{len(broken)} vertices with NaN or infinite coordinates, the first is vertex {broken[0]} (from 0): "
             "export the surface again"
         )
-    if abs(vertices).max(initial=0.0) > LARGEST:
+    if abs(places).max(initial=0.0) > LARGEST:
         raise MeshError(f"coordinates must not exceed {LARGEST:g} in magnitude: choose a larger unit of length")
 
 
-def check_indices(vertices: Array, faces: IntArray) -> None:
-    """Raise MeshError where faces name vertices that do not exist."""
+def without_unused_defects(vertices: Array, faces: IntArray) -> tuple[Array, tuple[str, ...]]:
+    """Return vertices (n, 3) with zeros for those that no face uses and that have no valid place, and a notice."""
+    wrong = ~np.all(abs(vertices) <= LARGEST, axis=1)
+    wrong[faces.ravel()] = False
+    if not wrong.any():
+        return vertices, ()
+    return np.where(wrong[:, None], 0.0, vertices), (
+        f"{np.count_nonzero(wrong)} vertices without a valid place (NaN, infinite) are used by no face",
+    )
+
+
+def check_indices(vertices: Array, faces: IntArray, *, first: int = 0) -> None:
+    """Raise MeshError where faces name vertices that do not exist; `first`: the number of the file's first vertex."""
     numbers = faces.ravel()
     wrong = np.flatnonzero((numbers < 0) | (numbers >= len(vertices)))
     if len(wrong):
         raise MeshError(
-            f"{len(wrong)} vertex numbers out of range, the first is {numbers[wrong[0]]} (counted from 0) "
-            f"where there are {len(vertices)} vertices; export the file again"
+            f"{len(wrong)} vertex numbers out of range, the first is {numbers[wrong[0]] + first} (counted from {first})"
+            f" where there are {len(vertices)} vertices; export the file again"
         )

@@ -12,7 +12,14 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, IntArray, in_brackets
 from ..display import Brief, Shown
 from . import topology
-from .errors import LARGEST, MeshError, check_face_count, check_finite, check_indices
+from .errors import (
+    LARGEST,
+    MeshError,
+    check_face_count,
+    check_finite,
+    check_indices,
+    without_unused_defects,
+)
 from .geometry import deepest_point, signed_volume
 from .readers.file import RawMesh, read_mesh
 from .readers.objects import READERS, class_of, read_object
@@ -137,8 +144,8 @@ def load_surface(
     Parameters
     ----------
     mesh : str or Path, or a trimesh.Trimesh, pyvista.PolyData or meshio.Mesh
-        The path of a surface (.obj, .stl, .ply, .off) or of tetrahedra (.mesh, .msh, .vtu), each also as .gz, or a mesh
-        in memory. The boundary of tetrahedra is taken.
+        The path of a surface (.obj, .stl, .ply, .off) or of cells (.mesh, .msh, .vtu), each also as .gz, or a mesh in
+        memory. Of solid cells the boundary is taken.
     component : int, optional
         Which one to take where there are several, 0 the largest.
     max_faces : int
@@ -231,9 +238,10 @@ def surface_from_arrays(
             raise MeshError(f"faces must be integers of shape (m, 3), got {triangles.dtype} of shape {triangles.shape}")
         triangles = triangles.astype(np.int64)
         digest = hashlib.sha256(points.tobytes() + triangles.tobytes()).hexdigest()
-        check_finite(points)
         check_indices(points, triangles)
-        return _gate(RawMesh(points, triangles, digest, ()), name, "", component, max_faces)
+        check_finite(points, triangles)
+        points, notices = without_unused_defects(points, triangles)
+        return _gate(RawMesh(points, triangles, digest, notices), name, "", component, max_faces)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
 

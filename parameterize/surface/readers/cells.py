@@ -1,62 +1,91 @@
-"""Cells of volume formats: triangles and polygons as they are, or the boundary of tetrahedra."""
+"""Cells of every format by their kind: surface cells as polygons, solid cells as their boundary, no other is lost.
 
-import tempfile
-from collections.abc import Callable
-from pathlib import Path
+Kinds are called as meshio calls them, their corners ordered as VTK orders them (The VTK User's Guide, "Cell types").
+"""
+
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...arrays import Array, IntArray
 from ..errors import MeshError, check_finite, check_indices
-from .common import DAMAGED, Content, library
+from .boundary import FACES, boundary_and_inner
+from .common import DAMAGED, Content
 
-POLYGONS = ("triangle", "quad", "polygon")
-OUTWARD_FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # of a tetrahedron of positive volume
-
-
-def read_by_meshio(data: bytes, suffix: str, read: Callable[[str], Any]) -> Content:
-    """Read a file by one of meshio's readers, which take a file's name."""
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder, f"mesh{suffix}")
-        copy.write_bytes(data)
-        with library(suffix):
-            vertices, cells = arrays_of(read(str(copy)))
-    return from_cells(vertices, cells)
+Rows = IntArray | Sequence[Sequence[int]]  # the corners of cells of one kind; (k, corners), or of several lengths
+BY_AXES = {"pixel": ("quad", [0, 1, 3, 2]), "voxel": ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6])}  # numbered as x, y, z go
+CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8, "pixel": 4, "voxel": 8}
+CORNERS |= {"penta_prism": 10, "hexa_prism": 12}
+SURFACES = ("triangle", "quad", "polygon", "pixel", "triangle_strip")
+WITHOUT_AREA = ("empty", "vertex", "poly_vertex", "poly_line", "line")  # and line3, line4, ...: curved ones
 
 
-def arrays_of(mesh: Any) -> tuple[Array, list[tuple[str, IntArray]]]:
+def arrays_of(mesh: Any) -> tuple[Array, list[tuple[str, Rows]]]:
     """Return points and cells of a meshio.Mesh as `from_cells` takes them."""
-    cells = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
+    cells: list[tuple[str, Rows]] = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
     return np.asarray(mesh.points, dtype=np.float64), cells
 
 
-def from_cells(vertices: Array, cells: list[tuple[str, IntArray]]) -> Content:
-    """Return vertices and polygons of cells given by their kind, as meshio calls it, and corners (k, corners)."""
+def from_cells(vertices: Array, cells: Sequence[tuple[str, Rows]], notices: tuple[str, ...] = ()) -> Content:
+    """Return vertices and polygons of cells, given by their kind and their corners.
+
+    Solid cells give their boundary, and the surface cells that are none of their faces are kept beside it. Points and
+    lines are left out with a notice. Raises MeshError for every other kind, and where solid cells overlap.
+    """
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise MeshError(f"points must have shape (n, 3), got {vertices.shape}: export three coordinates each")
-    check_finite(vertices)
-    cells = [(kind, rows) for kind, rows in cells if len(rows)]
+    left_out: Counter[str] = Counter()
+    solids: list[tuple[str, IntArray]] = []
+    polygons: list[list[int]] = []
     for kind, rows in cells:
-        if kind not in (*POLYGONS, "tetra", "vertex", "line"):
-            raise MeshError(f"holds {len(rows)} cells of type {kind}: save linear tetrahedra or triangles")
-        check_indices(vertices, rows)
-    tetrahedra = [rows for kind, rows in cells if kind == "tetra"]
-    if any(rows.shape[1:] != (4,) for rows in tetrahedra):
-        raise MeshError(f"a tetrahedron has fewer corners than 4; {DAMAGED}")
-    if tetrahedra:
-        return Content(vertices, tetrahedra_boundary(vertices, np.concatenate(tetrahedra)).tolist())
-    polygons = [polygon for kind, rows in cells if kind in POLYGONS for polygon in rows.tolist()]
+        if not len(rows):
+            continue
+        if kind in WITHOUT_AREA or (kind.startswith("line") and kind[4:].isdecimal()):
+            left_out[kind] += len(rows)
+        elif kind in CORNERS:
+            same, table = _as_table(kind, rows, vertices)
+            if same in FACES:
+                solids.append((same, table))
+            else:
+                polygons += table.tolist()
+        elif kind in SURFACES:
+            polygons += triangles_of_strips(rows) if kind == "triangle_strip" else [list(map(int, row)) for row in rows]
+        else:
+            raise MeshError(f"holds {len(rows)} cells of type {kind}: save linear cells, tetrahedra or triangles")
+    if left_out:
+        said = ", ".join(f"{count} {kind}" for kind, count in left_out.items())
+        notices = (*notices, f"left out cells without area: {said}")
+    if solids:
+        outer, polygons, told = boundary_and_inner(vertices, solids, polygons)
+        polygons, notices = outer + polygons, (*notices, *told)
     if not polygons:
-        raise MeshError("no tetrahedra and no triangles: export the volume or its surface")
-    return Content(vertices, polygons)
+        raise MeshError("has no faces and no solid cells: export the volume or its surface")
+    return Content(vertices, polygons, notices)
 
 
-def tetrahedra_boundary(vertices: Array, tetrahedra: IntArray) -> IntArray:
-    """Return the boundary triangles (m, 3), oriented outward, of tetrahedra (k, 4) in either orientation."""
-    a, b, c, d = (vertices[tetrahedra[:, i]] for i in range(4))
-    inverted = np.sum(np.cross(b - a, c - a) * (d - a), axis=1) < 0
-    corners = np.where(inverted[:, None], tetrahedra[:, [1, 0, 2, 3]], tetrahedra)
-    faces = corners[:, OUTWARD_FACES].reshape(-1, 3)
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return faces[np.sort(first[count == 1])]
+def _as_table(kind: str, rows: Rows, vertices: Array) -> tuple[str, IntArray]:
+    """Return cells with a fixed number of corners, checked, and their kind: pixels become quads, voxels hexahedra."""
+    try:
+        table = np.asarray(rows, dtype=np.int64)
+    except ValueError:
+        table = np.empty((0, 0), dtype=np.int64)
+    if table.ndim != 2 or table.shape[1] != CORNERS[kind]:
+        raise MeshError(f"a cell of type {kind} has not its {CORNERS[kind]} corners; {DAMAGED}")
+    same, order = BY_AXES.get(kind, (kind, list(range(CORNERS[kind]))))
+    if same in FACES:
+        check_indices(vertices, table)
+        check_finite(vertices, table)
+    return same, table[:, order]
+
+
+def triangles_of_strips(rows: Rows) -> list[list[int]]:
+    """Return the triangles of strips, every second one turned, so that all are wound as the first."""
+    found = []
+    for row in rows:
+        if len(row) < 3:
+            raise MeshError(f"a triangle strip has {len(row)} corners, expected at least 3; {DAMAGED}")
+        for k, (a, b, c) in enumerate(zip(row, row[1:], row[2:], strict=False)):
+            found.append([int(b), int(a), int(c)] if k % 2 else [int(a), int(b), int(c)])
+    return found

@@ -6,6 +6,10 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..errors import MeshError
@@ -64,6 +68,13 @@ def corners(words: Sequence[str], line: int) -> list[int]:
     if len(words) < 3:
         raise MeshError(f"line {line}: a face has {len(words)} corners, expected at least 3; export it again")
     return [int(word) for word in words]
+
+
+def number_array(words: Sequence[str], what: str, *, whole: bool = False) -> NDArray[Any]:
+    """Return words as float64 or, where they are whole numbers, as int64 (n,); raise MeshError for other words."""
+    if words and not (WHOLE_NUMBERS if whole else NUMBERS).fullmatch(" ".join(words)):
+        raise MeshError(f"{what} has a word that is no {'whole ' * whole}number; {DAMAGED}")
+    return np.array(words, dtype=np.str_).astype(np.int64 if whole else np.float64)
 
 
 @contextmanager

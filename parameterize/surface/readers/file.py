@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...arrays import Array, IntArray
-from ..errors import MeshError, check_face_count, check_finite, check_indices
+from ..errors import MeshError, check_face_count, check_finite, check_indices, without_unused_defects
 from ..triangulation import triangulate
 from .common import DAMAGED, Content, most_bytes
 from .gmsh import read_gmsh
@@ -47,7 +47,7 @@ class RawMesh:
 
 
 def read_mesh(path: Path, max_faces: int) -> RawMesh:
-    """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (tetrahedra: their boundary), each also as .gz."""
+    """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (solids: their boundary), each also as .gz."""
     if path.is_dir():
         raise MeshError("is a directory: name the surface file in it")
     if path.exists() and not path.is_file():
@@ -62,24 +62,26 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     if not data.strip():
         raise MeshError("the file is empty: export it again")
     content = READERS[suffix](data, max_faces)
-    faces, notices = triangles_of(content, max_faces)
+    vertices, faces, notices = triangles_of(content, max_faces)
     unpacked = ("unpacked from .gz",) * packed
-    return RawMesh(content.vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices)
+    return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices)
 
 
-def triangles_of(content: Content, max_faces: int) -> tuple[IntArray, tuple[str, ...]]:
-    """Check vertices and polygons; return the triangles (m, 3) that the polygons are cut into, and all notices."""
-    check_finite(content.vertices)
+def triangles_of(content: Content, max_faces: int) -> tuple[Array, IntArray, tuple[str, ...]]:
+    """Check vertices and polygons; return vertices, the triangles (m, 3) that polygons are cut into, all notices."""
     corners = np.fromiter(chain.from_iterable(content.polygons), dtype=np.int64)
     check_indices(content.vertices, corners)
+    check_finite(content.vertices, corners)
+    vertices, unused = without_unused_defects(content.vertices, corners)
+    notices = content.notices + unused
     fewest = min(map(len, content.polygons), default=0)
     if fewest < 3:
         raise MeshError(f"a face has {fewest} corners, expected at least 3; {DAMAGED}")
     check_face_count(len(corners) - 2 * len(content.polygons), max_faces)  # before the time is spent on them
-    faces = triangulate(content.vertices, content.polygons)
-    if len(faces) == len(content.polygons):
-        return faces, content.notices
-    return faces, (*content.notices, f"{len(content.polygons)} polygons cut into {len(faces)} triangles")
+    faces = triangulate(vertices, content.polygons)
+    if len(faces) > len(content.polygons):
+        notices = (*notices, f"{len(content.polygons)} polygons cut into {len(faces)} triangles")
+    return vertices, faces, notices
 
 
 def _read_bytes(path: Path, limit: int) -> bytes:

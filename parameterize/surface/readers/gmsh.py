@@ -1,82 +1,194 @@
-"""Gmsh files, read by meshio once the sections that hold the mesh, and its node numbers, are checked.
+"""Gmsh .msh of the versions 2 to 4.1, text and binary: nodes and elements; other sections are skipped.
 
-meshio allocates up to the highest node number, so one damaged digit would take all memory.
+Source: the Gmsh reference manual, "MSH file format" and "Legacy formats".
 """
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
-from ...arrays import IntArray
+from ...arrays import Array, IntArray
 from ..errors import MeshError
-from .cells import read_by_meshio
-from .common import Content
+from .cells import Rows, from_cells
+from .common import DAMAGED, Content
+from .words import Binary, Text
 
-NUMBERS_PER_NODE = 100  # the highest node number, over the number of nodes
-NUMBERS_AT_LEAST = 10_000_000
+# Of Gmsh's element types: their kind, and their number of nodes.
+KINDS = {1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4), 4: ("tetra", 4), 5: ("hexahedron", 8), 6: ("wedge", 6)}
+KINDS |= {7: ("pyramid", 5), 8: ("line3", 3), 9: ("triangle6", 6), 10: ("quad9", 9), 11: ("tetra10", 10)}
+KINDS |= {12: ("hexahedron27", 27), 13: ("wedge18", 18), 14: ("pyramid14", 14), 15: ("vertex", 1), 16: ("quad8", 8)}
+KINDS |= {17: ("hexahedron20", 20), 18: ("wedge15", 15), 19: ("pyramid13", 13)}
+KINDS |= {26: ("line4", 4), 27: ("line5", 5), 28: ("line6", 6)}
+VERSIONS = ("2", "2.0", "2.1", "2.2", "4", "4.0", "4.1")
+BEGIN = re.compile(rb"^[ \t]*\$(\w+)[ \t]*\r?\n?", re.MULTILINE)
+FORMAT = re.compile(rb"\s*(\S+)\s+([01])\s+(\d+)[ \t]*(?:\r?\n|$)")
+
+Source = Text | Binary
+Found = tuple[IntArray, Array]  # numbers (n,) and places (n, 3) of nodes
 
 
 def read_gmsh(data: bytes, _: int) -> Content:
-    """Read the sections $MeshFormat, $Nodes and $Elements of a .msh file of version 2.2 or 4.1, text or binary."""
-    import meshio.gmsh
-
-    form = re.match(rb"\s*\$MeshFormat\s+(\S+)\s+([01])\s+8", data)
+    """Read nodes and elements; nodes may be numbered in any way."""
+    sections = dict(_sections(data))
+    form = FORMAT.match(sections.get(b"MeshFormat", b""))
     if not form:
+        if re.search(rb"^\$NOD\b", data, re.MULTILINE):
+            raise MeshError("Gmsh format 1 is not supported: save as Gmsh 4.1 or 2.2")
         raise MeshError("not a .msh: no $MeshFormat; save as Gmsh 4.1")
-    version = form.group(1).decode("latin-1")
-    if version not in ("2", "2.1", "2.2", "4.1"):
-        raise MeshError(f"Gmsh format {version!r} is not supported: save as Gmsh 4.1 or 2.2")
-    number_rows = _block_numbers if version == "4.1" else _row_numbers
-    nodes = _section(data, b"Nodes")
-    try:
-        numbers = number_rows(nodes, binary=form.group(2) == b"1")
-    except (ValueError, IndexError, OverflowError, MemoryError):
-        raise MeshError("damaged node rows in the .msh: export it again") from None
-    highest = max(NUMBERS_AT_LEAST, NUMBERS_PER_NODE * len(numbers))
-    if not len(numbers) or numbers.min() < 1 or numbers.max() > highest:
-        raise MeshError(f"node numbers of the .msh must be 1 to {highest}: renumber the nodes, or export it again")
-    parts = [(name, _section(data, name)) for name in (b"MeshFormat", b"Nodes", b"Elements")]
-    trimmed = b"".join(b"$%b\n%b$End%b\n" % (name, content, name) for name, content in parts)
-    return read_by_meshio(trimmed, ".msh", meshio.gmsh.read)
+    version = form[1].decode("latin-1")
+    if version not in VERSIONS:
+        raise MeshError(f"Gmsh format {version[:20]!r} is not supported: save as Gmsh 4.1 or 2.2")
+    for name in (b"Nodes", b"Elements"):
+        if name not in sections:
+            raise MeshError(f"the section ${name.decode()} of the .msh is missing or cut off: export it again")
+    read_nodes, read_elements = READERS[version if version == "4.1" else version[0]]
+    nodes, elements = (_opened(sections, form, name) for name in (b"Nodes", b"Elements"))
+    numbers, places = read_nodes(nodes)
+    cells = [(KINDS[kind][0], rows) for kind, rows in read_elements(elements)]
+    return from_cells(places, _renumbered(cells, numbers))
 
 
-def _section(data: bytes, name: bytes) -> bytes:
-    """Return the bytes between the lines $name and $Endname."""
-    start = re.search(rb"\$%b\r?\n" % name, data)
-    stop = data.find(b"$End" + name, start.end()) if start else -1
-    if not start or stop < 0:
-        raise MeshError(f"the section ${name.decode()} of the .msh is missing or cut off: export it again")
-    return data[start.end() : stop]
+def _opened(sections: dict[bytes, bytes], form: re.Match[bytes], name: bytes) -> Source:
+    """Return the numbers of a section; a binary file says by a number 1 in which order its bytes stand."""
+    what = f"${name.decode()} of the .msh"
+    if form[2] == b"0":
+        return Text(sections[name], what)
+    if form[3] != b"8":
+        raise MeshError(f"numbers of {form[3].decode()[:20]} bytes in the .msh, expected 8: save as Gmsh 4.1 or 2.2")
+    is_big = sections[b"MeshFormat"][form.end() :][:4] == b"\0\0\0\1"
+    return Binary(sections[name], ">" if is_big else "<", what)
 
 
-def _row_numbers(body: bytes, *, binary: bool) -> IntArray:
-    """Return the node numbers of version 2: the count, then rows `number x y z`, 28 bytes each when binary."""
-    head, _, rows = body.partition(b"\n")
-    count = int(head)
-    if binary:
-        return np.frombuffer(rows, dtype=[("number", "<i4"), ("x", "<f8", 3)], count=count)["number"].astype(np.int64)
-    words = rows.split()
-    if len(words) != 4 * count:
-        raise ValueError("not four words a row")
-    return np.array([int(word) for word in words[::4]], dtype=np.int64)
+def _sections(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Yield name and content of each section, from the line $Name to $EndName; one that is cut off ends the file."""
+    at = 0
+    while begin := BEGIN.search(data, at):
+        stop = data.find(b"$End" + begin[1], begin.end())
+        if stop < 0:
+            return
+        yield begin[1], data[begin.end() : stop]
+        at = stop + len(b"$End" + begin[1])
 
 
-def _block_numbers(body: bytes, *, binary: bool) -> IntArray:
-    """Return those of version 4.1: counts, then blocks `dimension entity parametric count`, numbers, coordinates."""
-    words = [] if binary else body.split()
-    blocks = int(np.frombuffer(body, "<u8", 1)[0]) if binary else int(words[0])
-    at, found = (32 if binary else 4), [np.empty(0, dtype=np.int64)]
+def _renumbered(cells: list[tuple[str, IntArray]], numbers: IntArray) -> list[tuple[str, Rows]]:
+    """Return cells with the rows of their nodes in place of their numbers."""
+    order = np.argsort(numbers, kind="stable")
+    ordered = numbers[order]
+    if np.any(ordered[1:] == ordered[:-1]):
+        twice = ordered[1:][ordered[1:] == ordered[:-1]]
+        raise MeshError(f"node {twice[0]} is given twice in the .msh; {DAMAGED}")
+    found: list[tuple[str, Rows]] = []
+    for kind, rows in cells:
+        place = np.minimum(np.searchsorted(ordered, rows), len(numbers) - 1)
+        absent = rows[ordered[place] != rows] if len(numbers) else rows.ravel()
+        if len(absent):
+            raise MeshError(f"an element has node {absent[0]}, which the .msh does not hold; {DAMAGED}")
+        found.append((kind, order[place]))
+    return found
+
+
+def _kind(number: int) -> tuple[str, int]:
+    if number not in KINDS:
+        raise MeshError(f"holds elements of Gmsh type {number}: save linear tetrahedra or triangles")
+    return KINDS[number]
+
+
+def _nodes_2(source: Source) -> Found:
+    """Read the count, then rows `number x y z`."""
+    table = source.table(source.count(), [("i4", 1), ("f8", 3)])
+    return table[0].ravel(), table[1]
+
+
+def _elements_2(source: Source) -> Iterator[tuple[int, IntArray]]:
+    """Read the count; in text then rows `number type tags ... nodes`, in binary blocks of rows of the same kind.
+
+    Tags are counted where they begin.
+    """
+    left = source.count()
+    if isinstance(source, Text):
+        yield from _text_elements_2(source, left)
+        return
+    while left > 0:
+        number, count, tags = source.whole(3)
+        _check_tags(tags)
+        if not 0 < count <= left:
+            raise MeshError(f"a block of {count} elements where {left} are left; {DAMAGED}")
+        yield number, source.table(count, [("i4", 1 + tags), ("i4", _kind(number)[1])])[1]
+        left -= count
+
+
+def _text_elements_2(source: Text, count: int) -> Iterator[tuple[int, IntArray]]:
+    """Read rows `number type tags ... nodes`."""
+    rows: dict[int, list[list[int]]] = {}
+    numbers, at = source.whole(source.left), 0
+    for _ in range(count):
+        if at + 3 > len(numbers):
+            raise MeshError(f"$Elements of the .msh ends before the last of {count} elements; {DAMAGED}")
+        number, tags = numbers[at + 1 : at + 3]
+        _check_tags(tags)
+        start, at = at + 3 + tags, at + 3 + tags + _kind(number)[1]
+        rows.setdefault(number, []).append(numbers[start:at])
+    if at > len(numbers):
+        raise MeshError(f"$Elements of the .msh ends within its last element; {DAMAGED}")
+    yield from ((number, np.array(found, dtype=np.int64)) for number, found in rows.items())
+
+
+def _check_tags(count: int) -> None:
+    if count < 0:
+        raise MeshError(f"an element with {count} tags in the .msh; {DAMAGED}")
+
+
+def _nodes_4(source: Source) -> Found:
+    """Read of version 4.0 the counts, then blocks `entity dimension parametric count` of rows `number x y z`."""
+    blocks, _ = source.large(2)
+    found = [(np.empty(0, dtype=np.int64), np.empty((0, 3)))]
     for _ in range(blocks):
-        if binary:
-            parametric = int(np.frombuffer(body, "<i4", 3, at)[2])
-            count = int(np.frombuffer(body, "<u8", 1, at + 12)[0])
-            numbers = np.frombuffer(body, "<u8", count, at + 20) if count else found[0]
-            at += 20 + 32 * count
-        else:
-            parametric, count = int(words[at + 2]), int(words[at + 3])
-            numbers = np.array([int(word) for word in words[at + 4 : at + 4 + count]], dtype=np.int64)
-            at += 4 + 4 * count
-        if parametric or count < 0 or at > (len(body) if binary else len(words)):
-            raise ValueError("parametric nodes, or more promised than there are")
-        found.append(numbers.astype(np.int64))
-    return np.concatenate(found)
+        _, dimension, parametric = source.whole(3)
+        extra = _parameters(dimension, parametric)
+        table = source.table(source.large(1)[0], [("i4", 1), ("f8", 3 + extra)])
+        found.append((table[0].ravel(), table[1][:, :3]))
+    return _together(found)
+
+
+def _elements_4(source: Source) -> Iterator[tuple[int, IntArray]]:
+    """Read of version 4.0 the counts, then blocks `entity dimension type count` of rows `number nodes`."""
+    for _ in range(source.large(2)[0]):
+        number = source.whole(3)[2]
+        yield number, source.table(source.large(1)[0], [("i4", 1), ("i4", _kind(number)[1])])[1]
+
+
+def _nodes_41(source: Source) -> Found:
+    """Read the counts, then blocks `dimension entity parametric count`, their node numbers, their places.
+
+    The place of a parametric node is followed by as many parameters as its entity has dimensions.
+    """
+    found = [(np.empty(0, dtype=np.int64), np.empty((0, 3)))]
+    for _ in range(source.large(4)[0]):
+        dimension, _, parametric = source.whole(3)
+        count = source.large(1)[0]
+        extra = _parameters(dimension, parametric)
+        numbers = source.table(count, [("i8", 1)])[0].ravel()
+        found.append((numbers, source.table(count, [("f8", 3 + extra)])[0][:, :3]))
+    return _together(found)
+
+
+def _elements_41(source: Source) -> Iterator[tuple[int, IntArray]]:
+    """Read the counts, then blocks `dimension entity type count` of rows `number nodes`."""
+    for _ in range(source.large(4)[0]):
+        number = source.whole(3)[2]
+        yield number, source.table(source.large(1)[0], [("i8", 1 + _kind(number)[1])])[0][:, 1:]
+
+
+def _parameters(dimension: int, parametric: int) -> int:
+    """Return how many parameters follow the place of a node."""
+    if not 0 <= dimension <= 3:
+        raise MeshError(f"nodes on an entity of dimension {dimension} in the .msh; {DAMAGED}")
+    return dimension if parametric else 0
+
+
+def _together(found: list[Found]) -> Found:
+    return np.concatenate([numbers for numbers, _ in found]), np.concatenate([places for _, places in found])
+
+
+READERS = {"2": (_nodes_2, _elements_2), "4": (_nodes_4, _elements_4), "4.1": (_nodes_41, _elements_41)}

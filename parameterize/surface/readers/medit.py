@@ -1,4 +1,4 @@
-"""Medit text: the sections that hold vertices and cells; others are skipped, and so are reference numbers."""
+"""Medit text: the sections that hold vertices and cells; marks on them are skipped, and so are reference numbers."""
 
 import re
 
@@ -6,14 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import IntArray
-from ..errors import MeshError
+from ..errors import MeshError, check_indices
 from .cells import from_cells
 from .common import DAMAGED, NUMBERS, WHOLE_NUMBERS, Content, header_count, text_lines
 
 ASIDE = re.compile(r'#[^\n]*|"[^"\n]*"')  # comments, and names of other files
-KEYWORD = re.compile(r"(?<!\S)([A-Z][A-Za-z]{3,})(?!\S)")
+KEYWORD = re.compile(r"(?<!\S)([A-Z][A-Za-z]{2,}\d?)(?!\S)")
 CELLS = {"Triangles": ("triangle", 3), "Quadrilaterals": ("quad", 4), "Tetrahedra": ("tetra", 4)}
-CELLS |= {"Pyramids": ("pyramid", 5), "Prisms": ("prism", 6), "Hexahedra": ("hexahedron", 8)}  # named by the refusal
+CELLS |= {"Pyramids": ("pyramid", 5), "Prisms": ("wedge", 6), "Hexahedra": ("hexahedron", 8), "Edges": ("line", 2)}
+CELLS |= {"Hexaedra": CELLS["Hexahedra"]}  # so written by some programs
+CURVED = re.compile(r"(Triangle|Quadrilateral|Tetrahedra|Pyramid|Prism|Hexahedra)s?[PQ]\d")
 
 
 def read_medit(data: bytes, _: int) -> Content:
@@ -31,7 +33,14 @@ def read_medit(data: bytes, _: int) -> Content:
             vertices = _table(name, words, 3, NUMBERS).astype(np.float64)
         elif name in CELLS:
             kind, size = CELLS[name]
-            cells.append((kind, _table(name, words, size, WHOLE_NUMBERS).astype(np.int64) - 1))
+            rows = _table(name, words, size, WHOLE_NUMBERS).astype(np.int64) - 1
+            cells.append((kind, rows))
+        elif CURVED.fullmatch(name) and words[:1] != ["0"]:
+            raise MeshError(
+                f"holds {' '.join(words[:1])[:20]} curved cells, {name}: save linear tetrahedra or triangles"
+            )
+    for _kind, table in cells:
+        check_indices(vertices, table, first=1)
     return from_cells(vertices, cells)
 
 

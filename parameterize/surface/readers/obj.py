@@ -1,9 +1,11 @@
 """Wavefront OBJ: vertices and faces alone, each word checked, so that errors name the line.
 
-References to texture coordinates and normals are dropped: at a seam they would split a vertex.
+References to texture coordinates and normals are dropped: at a seam they would split a vertex. Records that are no part
+of the surface, such as lines, are left out with a notice.
 """
 
 from array import array
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,6 +14,11 @@ from ..errors import MeshError
 from .common import Content, coordinates, corners, text_lines
 
 FACES = ("f", "fo")
+PATCHES = ("surf", "bsp", "bzp", "call")  # free-form surfaces, and other files
+BESIDE = ("p", "l", "curv", "curv2")  # points, lines, curves
+SKIPPED = {"vt", "vn", "vp", "g", "s", "o", "mg", "usemtl", "mtllib", "usemap", "maplib", "bevel", "lod", "shadow_obj"}
+SKIPPED |= {"trace_obj", "c_interp", "d_interp", "ctech", "stech", "cstype", "deg", "bmat", "step", "parm", "end"}
+LISTED = 5  # kinds of records left out
 
 
 def read_obj(data: bytes, _: int) -> Content:
@@ -21,6 +28,8 @@ def read_obj(data: bytes, _: int) -> Content:
     places = array("d")
     polygons: list[list[int]] = []
     relative = False
+    highest, highest_line = 0, 0
+    left_out: Counter[str] = Counter()
     for line, words in _records(text_lines(data)):
         if words[:1] == ["v"]:
             places.extend(coordinates(words[1:], line))
@@ -28,24 +37,44 @@ def read_obj(data: bytes, _: int) -> Content:
             numbers = corners([word.split("/", 1)[0] for word in words[1:]], line)
             if 0 in numbers:
                 raise MeshError(f"line {line}: vertex number 0, OBJ counts from 1; export the file again")
+            if -min(numbers) > len(places) // 3:
+                raise _out_of_range(min(numbers), line, len(places) // 3)
             relative = relative or min(numbers) < 0
+            if max(numbers) > highest:
+                highest, highest_line = max(numbers), line
             polygons.append([i - 1 if i > 0 else i + len(places) // 3 for i in numbers])
+        elif words and words[0] in PATCHES:
+            raise MeshError(f"line {line}: a record {words[0]!r}, which is not read: export the surface as polygons")
+        elif words and words[0] not in SKIPPED:
+            left_out[words[0]] += 1
     vertices = np.array(places).reshape(-1, 3)
     if not len(vertices) or not polygons:
         raise MeshError(
             f"{len(vertices)} vertices and {len(polygons)} faces are no surface: the file is not an OBJ, or it is empty"
         )
+    if highest > len(vertices):
+        raise _out_of_range(highest, highest_line, len(vertices))
     notices = ["byte order mark skipped"] if data.startswith(b"\xef\xbb\xbf") else []
     notices += ["negative (relative) vertex numbers resolved"] if relative else []
+    if left_out:
+        listed = ", ".join(f"{count} {ascii(word[:20])}" for word, count in left_out.most_common(LISTED))
+        more = f" and {len(left_out) - LISTED} more kinds" if len(left_out) > LISTED else ""
+        notices.append(f"left out records that are no vertices or faces: {listed}{more}")
     return Content(vertices, polygons, tuple(notices))
 
 
+def _out_of_range(number: int, line: int, present: int) -> MeshError:
+    return MeshError(
+        f"line {line}: vertex number {number} is out of range, there are {present} vertices; export it again"
+    )
+
+
 def _records(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
-    """Yield number and words of each line; a vertex or face that ends in a backslash goes on in the next line."""
+    """Yield number and words of each line; a record of numbers that ends in a backslash goes on in the next line."""
     numbered = enumerate(lines, 1)
     for number, line in numbered:
         words = _words(line)
-        while words and words[-1][-1] == "\\" and words[0].rstrip("\\") in ("v", *FACES):
+        while words and words[-1][-1] == "\\" and words[0].rstrip("\\") in ("v", *FACES, *BESIDE, *PATCHES):
             words[-1] = words[-1].rstrip("\\")
             words = [word for word in words if word] + _words(next(numbered, (0, ""))[1])
         yield number, words

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import MeshError
-from .cells import arrays_of, from_cells
+from .cells import Rows, arrays_of, from_cells
 from .common import Content
 from .file import RawMesh, triangles_of
 
@@ -31,16 +31,24 @@ def read_object(mesh: Any, kind: str, max_faces: int) -> RawMesh:
         raise MeshError(" ".join(str(error).split())) from None
     if not content.polygons:
         raise MeshError("has no faces: give a closed surface")
-    faces, notices = triangles_of(content, max_faces)
-    digest = hashlib.sha256(content.vertices.tobytes() + faces.tobytes()).hexdigest()
-    return RawMesh(content.vertices, faces, digest, notices)
+    vertices, faces, notices = triangles_of(content, max_faces)
+    digest = hashlib.sha256(vertices.tobytes() + faces.tobytes()).hexdigest()
+    return RawMesh(vertices, faces, digest, notices)
 
 
 def _read_pyvista(mesh: Any) -> Content:
-    """Return the polygons; vertices and lines, which a PolyData may hold besides, are left out."""
-    if mesh.n_strips:
-        raise MeshError(f"holds {mesh.n_strips} triangle strips: give mesh.triangulate()")
-    return Content(np.array(mesh.points, dtype=np.float64), [row.tolist() for row in mesh.irregular_faces])
+    """Return polygons and strips; vertices and lines, which a PolyData may hold besides, are left out with a notice."""
+    ends, strips = mesh.GetStrips().GetOffsetsArray(), mesh.GetStrips().GetConnectivityArray()
+    cells: list[tuple[str, Rows]] = [
+        ("polygon", [row.tolist() for row in mesh.irregular_faces]),
+        (
+            "triangle_strip",
+            [row.tolist() for row in np.split(np.array(strips), np.array(ends)[1:-1])] * bool(mesh.n_strips),
+        ),
+        ("vertex", [()] * mesh.n_verts),
+        ("line", [()] * mesh.n_lines),
+    ]
+    return from_cells(np.array(mesh.points, dtype=np.float64), cells)
 
 
 READERS: dict[str, Callable[[Any], Content]] = {

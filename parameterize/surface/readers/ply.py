@@ -1,123 +1,152 @@
-"""PLY, text and binary: the places of its vertices and the corners of its faces; other properties are skipped.
+"""PLY, text and binary: the places of its vertices, the corners of its faces and its triangle strips.
 
-Text is read here. Binary files are read by meshio where faces have their corners alone, whose number may differ, and
-by trimesh where faces have further properties, all faces then with the same number of corners.
+Other elements are left out with a notice; other properties are skipped.
 """
 
-import io
 import re
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...arrays import Array
 from ..errors import MeshError, check_face_count
-from .common import DAMAGED, Content, coordinates, corners, header_count, library, text_lines
+from .cells import triangles_of_strips
+from .common import DAMAGED, Content, coordinates, corners, header_count, text_lines
+from .ply_elements import Element, binary_rows, elements_of
 
-SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
-SIZES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
-FOR_MESHIO = {"uchar", "uint8", "int", "int32", "uint", "uint32", "float", "float32", "double"}
+NEWLINE = rb"(\r\n|\r|\n)"
+BEGIN = re.compile(rb"ply[ \t]*" + NEWLINE)
+END = re.compile(NEWLINE + rb"[ \t]*end_header[ \t]*(?=[\r\n]|$)")
+ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 CORNERS = ("vertex_index", "vertex_indices")
-
-
-@dataclass(frozen=True)
-class Element:
-    """An element that the header names.
-
-    properties: name and types of each in order: one type for a number, those of the length and the items for a list.
-    """
-
-    name: str
-    count: int
-    properties: list[tuple[str, list[str]]]
+Found = tuple[Array, list[list[int]]]  # places (n, 3) and polygons
+READ = ("vertex", "face", "tristrips")
 
 
 def read_ply(data: bytes, max_faces: int) -> Content:
-    """Read a PLY; one that promises more than it holds is refused before a library reads it."""
+    """Read a PLY; one that promises more than it holds is refused before its rows are read."""
     data = data.removeprefix(b"\xef\xbb\xbf")
-    head, mark, body = data.partition(b"end_header")
-    if not data.startswith(b"ply") or not mark:
+    begin, end = BEGIN.match(data), END.search(data)
+    if not begin or not end:
         raise MeshError(f"not a PLY: no header from 'ply' to 'end_header'; {DAMAGED}")
-    lines = [line.split() for line in text_lines(head)]
-    is_text = ["format", "ascii"] in [words[:2] for words in lines]
-    elements = _elements(lines)
+    header = [line.split() for line in text_lines(data[: end.start()])]
+    forms = [words[1] for words in header if words[:1] == ["format"] and len(words) > 1]
+    if not forms or forms[0] not in ORDERS:
+        raise MeshError(f"the PLY has the format {' '.join(forms[:1])[:40]!r}, expected one of {', '.join(ORDERS)}")
+    elements = elements_of(header)
     counts = {element.name: element.count for element in elements}
-    if counts.get("tristrips"):
-        raise MeshError("the PLY holds triangle strips (element tristrips): save its faces as triangles")
-    if not counts.get("vertex") or not counts.get("face"):
+    if not counts.get("vertex") or not (counts.get("face") or counts.get("tristrips")):
         found = f"{counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces"
         raise MeshError(f"the PLY holds {found}, a surface needs both: export the faces too")
-    check_face_count(counts["face"], max_faces)
-    if is_text:
-        rows = [(line, text.split()) for line, text in enumerate(text_lines(body), len(lines)) if text.strip()]
-        present, needed, unit = len(rows), sum(counts.values()), "rows"
+    check_face_count(counts.get("face", 0), max_faces)
+    ends = re.match(begin[1] + b"|" + NEWLINE + b"|", data[end.end() : end.end() + 2])  # first as the first line
+    body = data[end.end() + (ends.end() if ends else 0) :]
+    if ORDERS[forms[0]]:
+        places, polygons = _binary(body, elements, ORDERS[forms[0]])
     else:
-        least = {element.name: sum(SIZES.get(types[0], 1) for _, types in element.properties) for element in elements}
-        present, needed, unit = len(body), sum(least[name] * count for name, count in counts.items()), "bytes"
-    if present < needed:
-        promised = " and ".join(f"{count} {name}" for name, count in counts.items())
-        raise MeshError(f"the header promises {promised}, at least {needed} {unit}, where {present} follow; {DAMAGED}")
-    return _read_rows(rows, elements) if is_text else _read_binary(data, elements)
+        places, polygons = _text(body, elements, len(header) + 2)
+    besides = ", ".join(f"{e.count} {e.name[:20]!r}" for e in elements if e.count and e.name not in READ)
+    return Content(places, polygons, (f"left out other elements: {besides}",) if besides else ())
 
 
-def _elements(lines: list[list[str]]) -> list[Element]:
-    """Return the elements that the words of the header's lines name, in order."""
-    elements: list[Element] = []
-    for words in lines:
-        if words[:1] == ["element"] and len(words) == 3:
-            elements.append(Element(words[1], header_count(words[2]), []))
-        elif words[:1] == ["property"] and len(words) > 2 and elements:
-            is_list = words[1] == "list" and len(words) > 4
-            elements[-1].properties.append((words[-1], words[2:4] if is_list else words[1:2]))
-    return elements
-
-
-def _read_rows(rows: list[tuple[int, list[str]]], elements: list[Element]) -> Content:
-    """Return what the rows of a text hold, each given by its line number and its words."""
-    places, polygons = [], []
+def _binary(body: bytes, elements: list[Element], order: str) -> Found:
+    """Return places and polygons of the rows of a binary file."""
+    least = sum(element.least for element in elements)
+    if len(body) < least:
+        raise _too_few(elements, least, len(body), "bytes")
+    places: Array = np.empty((0, 3))
+    polygons: list[list[int]] = []
+    at = 0
     for element in elements:
-        mine, rows = rows[: element.count], rows[element.count :]
-        for line, words in mine:
+        wanted = _wanted(element)
+        columns, at = binary_rows(body, at, element, order, wanted)
+        if element.name == "vertex":
+            places = np.stack(columns, axis=1).astype(np.float64)
+        elif element.name in READ and element.count:
+            rows = _whole(columns[0])
+            polygons += rows if element.name == "face" else triangles_of_strips(_parted(rows))
+    return places, polygons
+
+
+def _text(body: bytes, elements: list[Element], first: int) -> Found:
+    """Return places and polygons of the rows of a text, whose first line has the number `first`."""
+    rows = [(line, text.split()) for line, text in enumerate(text_lines(body), first) if text.strip()]
+    needed = sum(element.count for element in elements if element.properties)
+    if len(rows) < needed:
+        raise _too_few(elements, needed, len(rows), "rows")
+    places: list[list[float]] = []
+    polygons: list[list[int]] = []
+    at = 0
+    for element in elements:
+        wanted = _wanted(element)
+        for line, words in rows[at : at + element.count] if wanted else []:
+            found = _words(words, element, wanted, line)
             if element.name == "vertex":
-                places.append(coordinates(_wanted(words, element, line), line))
+                places.append(coordinates(found, line))
             elif element.name == "face":
-                polygons.append(corners(_wanted(words, element, line), line))
-    return Content(np.array(places), polygons)
+                polygons.append(corners(found, line))
+            else:
+                polygons += triangles_of_strips(_parted([corners(found, line)]))
+        at += element.count if element.properties else 0
+    return np.array(places), polygons
 
 
-def _wanted(words: list[str], element: Element, line: int) -> list[str]:
-    """Return the words of x, y and z in a vertex's row, or of the corners in a face's row."""
-    held: dict[str, list[str]] = {}
+def _wanted(element: Element) -> list[int]:
+    """Return the numbers of the properties that are read: x, y and z of vertices, the corners of others."""
+    if element.name not in READ or not element.count:
+        return []
+    names = [name if len(types) == 1 + (name in CORNERS) else "" for name, types in element.properties]
+    if element.name == "vertex":
+        found = [names.index(name) for name in ("x", "y", "z") if name in names]
+    else:
+        found = [k for k, name in enumerate(names) if name in CORNERS][:1]
+    if len(found) != (3 if element.name == "vertex" else 1):
+        lacking = "coordinates x, y and z" if element.name == "vertex" else "a list vertex_indices"
+        raise MeshError(f"the PLY's elements {element.name} lack {lacking}: export them")
+    return found
+
+
+def _words(words: list[str], element: Element, wanted: list[int], line: int) -> list[str]:
+    """Return the words of the wanted properties in a row."""
+    held: list[list[str]] = []
     at = 0
     try:
-        for name, types in element.properties:
+        for _, types in element.properties:
             size = header_count(words[at]) if len(types) > 1 else 1
             at += len(types) - 1
-            held[name] = words[at : at + size]
+            held.append(words[at : at + size])
             at += size
-        names = ["x", "y", "z"] if element.name == "vertex" else [name for name in held if name in CORNERS][:1]
         if at <= len(words):
-            return [word for name in names for word in held[name]]
+            return [word for k in wanted for word in held[k]]
     except (LookupError, MeshError):
         pass
     raise MeshError(f"line {line}: no {element.name} as the header promises; {DAMAGED}")
 
 
-def _read_binary(data: bytes, elements: list[Element]) -> Content:
-    """Read a binary file whose header names these elements."""
-    import meshio
-    import trimesh.exchange.ply
+def _whole(rows: NDArray[Any] | list[tuple[float, ...]]) -> list[list[int]]:
+    """Return the corners of faces; raise MeshError where they are no whole numbers."""
+    if isinstance(rows, np.ndarray) and rows.dtype.kind in "iu":
+        return rows.tolist()
+    found = [list(row) for row in rows]
+    if any(value % 1 != 0 for row in found for value in row):  # of nan and infinities, nan
+        raise MeshError(f"a face of the PLY has corners that are no whole numbers; {DAMAGED}")
+    return [[int(value) for value in row] for row in found]
 
-    faces = next(element for element in elements if element.name == "face")
-    used = {kind for element in elements for _, types in element.properties for kind in types}
-    only_corners = [name in CORNERS for name, _ in faces.properties] == [True]
-    with library(".ply"):
-        if only_corners and used <= FOR_MESHIO and [element.name for element in elements] == ["vertex", "face"]:
-            renamed = re.sub(rb"\bvertex_index\b", b"vertex_indices", data, count=1)
-            mesh = meshio.read(io.BytesIO(renamed), file_format="ply")
-            places, polygons = mesh.points, [row for block in mesh.cells for row in block.data.tolist()]
-        else:
-            held = trimesh.exchange.ply.load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
-            places, polygons = held["vertices"], held["faces"].astype(np.int64).tolist()
-    if len(polygons) < faces.count:
-        raise MeshError(f"{faces.count} faces promised, {len(polygons)} read; {DAMAGED}")
-    return Content(np.asarray(places, dtype=np.float64), polygons)
+
+def _parted(strips: list[list[int]]) -> list[list[int]]:
+    """Return strips, of which a -1 parts two."""
+    parted: list[list[int]] = [[]]
+    for strip in strips:
+        for number in strip:
+            if number == -1:
+                parted.append([])
+            else:
+                parted[-1].append(number)
+        parted.append([])
+    return [strip for strip in parted if strip]
+
+
+def _too_few(elements: list[Element], needed: int, present: int, unit: str) -> MeshError:
+    promised = " and ".join(f"{element.count} {element.name[:20]}" for element in elements)
+    return MeshError(f"the header promises {promised}, at least {needed} {unit}, where {present} follow; {DAMAGED}")

@@ -1,83 +1,126 @@
-"""VTK's .vtu, read by meshio once what it declares, and what its compressed arrays unpack to, is within the limits.
+"""VTK's .vtu: points and cells of all its pieces; point data, cell data and field data are skipped."""
 
-A few kilobytes can hold gigabytes of zeros; what a block really unpacks to is known only while it is unpacked.
-"""
-
-import lzma
 import re
-import zlib
-from base64 import b64decode
-from collections.abc import Callable, Iterator
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from ..errors import MeshError
-from .cells import read_by_meshio
-from .common import DAMAGED, Content, library, most_bytes
+from ...arrays import Array, IntArray
+from ..errors import MeshError, check_indices
+from .cells import Rows, from_cells
+from .common import DAMAGED, Content, header_count, most_bytes
+from .vtk_arrays import WORDS, Decoder
 
-UNPACKERS: dict[str, Callable[[], Any]] = {
-    "vtkZLibDataCompressor": zlib.decompressobj,
-    "vtkLZMADataCompressor": lzma.LZMADecompressor,
-}
+KINDS = {0: "empty", 1: "vertex", 2: "poly_vertex", 3: "line", 4: "poly_line", 5: "triangle", 6: "triangle_strip"}
+KINDS |= {7: "polygon", 8: "pixel", 9: "quad", 10: "tetra", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid"}
+KINDS |= {15: "penta_prism", 16: "hexa_prism", 21: "line3", 35: "line4"}
+APPENDED = re.compile(rb"<AppendedData\b([^>]*)>\s*_?")
 
 
 def read_vtu(data: bytes, max_faces: int) -> Content:
-    """Read a .vtu of one piece."""
-    import meshio.vtu
-
+    """Read a .vtu of any version of the format; where it has several pieces, points in the same place are joined."""
     if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
         raise MeshError(f"not a whole .vtu: no <VTKFile> ... </VTKFile>; {DAMAGED}")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise MeshError("the .vtu declares a document type, whose entities are not expanded: remove the declaration")
-    pieces = len(re.findall(rb"<Piece\b", data))
-    if pieces > 1:
-        raise MeshError(
-            f"the .vtu holds {pieces} pieces: merge them into one, in ParaView with Merge Blocks, and save it"
-        )
-    _check_unpacked(data, most_bytes(max_faces))
-    return read_by_meshio(data, ".vtu", meshio.vtu.read)
+    root, decoder = _opened(data, most_bytes(max_faces))
+    steps = [grid.get("TimeValues", "").split() for grid in root.iter("UnstructuredGrid")]
+    notices = tuple(f"the first of {len(times)} time steps read" for times in steps if len(times) > 1)
+    points, cells = [np.empty((0, 3))], []
+    for piece in root.iter("Piece"):
+        first = sum(map(len, points))
+        found, held = _piece(piece, decoder)
+        points.append(found)
+        cells += [(kind, _shifted(rows, first)) for kind, rows in held]
+    if len(points) <= 2:
+        return from_cells(points[-1], cells, notices)
+    return _joined(np.concatenate(points), cells, (*notices, f"{len(points) - 1} pieces joined"))
 
 
-def _check_unpacked(data: bytes, limit: int) -> None:
-    """Raise MeshError where the compressed arrays unpack to more than `limit` bytes in all."""
-    left = limit
-    with library(".vtu"):
-        head, _, rest = data.partition(b"<AppendedData")
-        root = ElementTree.fromstring(head + b"</VTKFile>" if rest else data)  # noqa: S314 - it has no entities
-        if "compressor" not in root.attrib:
-            return
-        tag, _, appended = rest.rpartition(b"</AppendedData")[0].partition(b"_")
-        order = ">" if root.get("byte_order") == "BigEndian" else "<"
-        word = np.dtype(order + ("u8" if root.get("header_type") == "UInt64" else "u4"))
-        for array in root.iter("DataArray"):
-            if array.get("format") == "appended":
-                packed, is_raw = appended[int(array.attrib["offset"]) :], b"raw" in tag
-            elif array.get("format") == "binary":
-                packed, is_raw = (array.text or "").strip().encode(), False
-            else:
-                continue
-            for block in _blocks(packed, word, is_raw=is_raw):
-                unpacker = UNPACKERS[root.attrib["compressor"]]()
-                left -= len(unpacker.decompress(block, max_length=left + 1))
-                if left < 0:
-                    raise ValueError(f"unpacks to more than {limit} bytes")
-                if unpacker.unused_data:
-                    raise ValueError("an array holds more than its blocks")
+def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
+    """Return the tree of the file without its appended data, and what decodes its arrays."""
+    mark = APPENDED.search(data)
+    text = data[: mark.start()] + b"</VTKFile>" if mark else data
+    try:
+        root = ElementTree.fromstring(text)  # noqa: S314 - it has no entities
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise MeshError(f"not readable as XML ({error}); {DAMAGED}") from None
+    if root.get("type") != "UnstructuredGrid":
+        raise MeshError(f"the .vtu holds {root.get('type')!r:.40}, expected UnstructuredGrid: save it as one")
+    word = WORDS.get(root.get("header_type", "UInt32"))
+    if word is None:
+        raise MeshError(f"the header_type is {root.get('header_type')!r:.40}, expected UInt32 or UInt64; {DAMAGED}")
+    order = ">" if root.get("byte_order") == "BigEndian" else "<"
+    appended = data[mark.end() :].rpartition(b"</AppendedData")[0] if mark else b""
+    is_raw = mark is not None and b"base64" not in mark[1]
+    decoder = Decoder(order, np.dtype(order + word), root.get("compressor", ""), appended, is_raw, limit)
+    return root, decoder
 
 
-def _blocks(packed: bytes, word: np.dtype[Any], *, is_raw: bool) -> Iterator[bytes]:
-    """Yield the compressed blocks of an array, raw or base64; before them stand their number and their sizes."""
+def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tuple[str, Rows]]]:
+    """Return points (n, 3) and cells of a piece, by kind; of one without cells, nothing."""
+    n, m = (header_count(piece.get(name, "")) for name in ("NumberOfPoints", "NumberOfCells"))
+    if not m:
+        return np.empty((0, 3)), []
+    points = _array(piece, "Points", None)
+    if points.get("NumberOfComponents", "3") != "3":
+        raise MeshError("points of the .vtu have not three coordinates each: export three")
+    places = decoder.numbers(points, 3 * n).astype(np.float64).reshape(n, 3)
+    types = decoder.numbers(_array(piece, "Cells", "types"), m).astype(np.int64)
+    ends = decoder.numbers(_array(piece, "Cells", "offsets"), m).astype(np.int64)
+    sizes = np.diff(ends, prepend=0)
+    if sizes.min() < 0:
+        raise MeshError(f"the offsets of the .vtu's cells decrease; {DAMAGED}")
+    corners = decoder.numbers(_array(piece, "Cells", "connectivity"), int(ends[-1])).astype(np.int64)
+    return places, _by_kind(types, sizes, ends, corners)
 
-    def place(size: int) -> int:
-        return size if is_raw else -(-size // 3) * 4
 
-    decode = bytes if is_raw else b64decode
-    count = int(np.frombuffer(decode(packed[: place(word.itemsize)])[: word.itemsize], word)[0])
-    table = (3 + count) * word.itemsize
-    sizes = np.frombuffer(decode(packed[: place(table)])[:table], word)[3:]
-    body = decode(packed[place(table) :])
-    ends = np.cumsum(sizes, dtype=word)
-    for start, end in zip([0, *ends], ends, strict=False):
-        yield body[start:end]
+def _array(piece: ElementTree.Element, part: str, name: str | None) -> ElementTree.Element:
+    """Return the DataArray of that name in a part of a piece, any where the name is None."""
+    for array in piece.iterfind(f"{part}/DataArray"):
+        if name is None or array.get("Name") == name:
+            return array
+    raise MeshError(f"the .vtu lacks the array {name or 'of points'} in <{part}>; {DAMAGED}")
+
+
+def _by_kind(types: IntArray, sizes: IntArray, ends: IntArray, corners: IntArray) -> list[tuple[str, Rows]]:
+    """Return cells by kind; raise MeshError naming a type that is not read."""
+    cells: list[tuple[str, Rows]] = []
+    for number in np.unique(types).tolist():
+        mine = np.flatnonzero(types == number)
+        kind = KINDS.get(number) or _name(number)
+        if np.all(sizes[mine] == sizes[mine[0]]):
+            places = ends[mine, None] - sizes[mine[0]] + np.arange(sizes[mine[0]])
+            cells.append((kind, corners[places]))
+        else:
+            cells.append((kind, [corners[ends[i] - sizes[i] : ends[i]].tolist() for i in mine]))
+    return cells
+
+
+def _name(number: int) -> str:
+    """Return VTK's name of a cell type, for every kind of curve that of a line."""
+    import pyvista
+
+    try:
+        name = pyvista.CellType(number).name.lower()
+    except ValueError:
+        return f"VTK {number}"
+    return "poly_line" if name.endswith(("_curve", "_edge")) else name
+
+
+def _shifted(rows: Rows, first: int) -> Rows:
+    return rows + first if isinstance(rows, np.ndarray) else [[i + first for i in row] for row in rows]
+
+
+def _joined(points: Array, cells: list[tuple[str, Rows]], notices: tuple[str, ...]) -> Content:
+    """Return the content of several pieces, whose cells share points that are in exactly the same place."""
+    _, first, label = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    number = first[label.ravel()]
+    for _, rows in cells:
+        for row in [rows] if isinstance(rows, np.ndarray) else rows:
+            check_indices(points, np.asarray(row, dtype=np.int64))
+    same: list[tuple[str, Rows]] = [
+        (kind, number[rows] if isinstance(rows, np.ndarray) else [number[row].tolist() for row in rows])
+        for kind, rows in cells
+    ]
+    return from_cells(points, same, notices)
