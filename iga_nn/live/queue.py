@@ -36,7 +36,7 @@ class Job:
     """Hold the file of a surface, or of a volume to solve on, in a folder of its own, and its state.
 
     problem: what is solved on a volume; None for a surface, whose problem is that of the page's options. parent: number
-    of the job that the volume is of. text: why it was refused or failed. mapped: where the training maps the surface's
+    of the job that made the volume. text: why it was refused or failed. mapped: where the training maps the surface's
     vertices, (n, 3) in the cube. losses: those of the training that were reported. log: the lines of the run. begun:
     when the run began, in seconds of the system's clock.
     """
@@ -151,7 +151,7 @@ class Jobs:
             job.state = "refused"
             self.delete(job)
             raise
-        job.problem, job.parent, job.state = problem, done.number, "ready"
+        job.problem, job.parent, job.state = problem, done.parent or done.number, "ready"
         self.start(job)
         return job
 

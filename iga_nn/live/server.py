@@ -134,9 +134,8 @@ class Page:
             jobs = list(self.jobs)
             state.jobs = [row(job, self.jobs.before(job), self._poisson) for job in jobs]
             state.latest = self.jobs.latest
-            state.current = next((job.number for job in reversed(jobs) if job.state == "running"), 0) or max(
-                (job.number for job in jobs), default=0
-            )
+            running = [job.number for job in jobs if job.state == "running"]
+            state.current = max(running or [job.number for job in jobs], default=0)
             if changed in jobs:
                 self._draw(state, changed)
             elif self._drawn.pop(changed.number, None) is not None:

@@ -50,7 +50,7 @@ def row(job: Job, before: int, problem: PoissonOptions) -> dict[str, Any]:
         "label": LABELS.get(job.state, job.state) + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
         "what": f"{form.in_words(job.problem)}; on the volume of {job.parent}" if job.problem else "",
         "text": job.text,
-        "starts": job.state in STARTS,
+        "starts": job.state in STARTS and not (job.problem and job.state == "failed"),  # that one would fail again
         "deletes": job.state in DELETED,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",
@@ -79,29 +79,24 @@ def is_solvable(job: Job) -> bool:
 
 def _facts(job: Job, now: Progress) -> list[list[str]]:
     """Return what the page shows of a run: what each fact is, its value and a remark."""
-    if job.is_mapped:
-        stage = [LAST, "the volume is made"]
-    else:
-        stage = [
-            STAGES.get(now.stage, now.stage),
-            f"step {now.step}" if now.stage == "spline" else f"step {now.step} of {now.steps}",
-        ]
-    left = job.course.left
-    if left is None:
-        time_left = ["not known", "longer than usual"]
-    else:
-        minutes, seconds = divmod(math.ceil(left), 60)
-        time_left = [
-            f"{minutes}:{seconds:02d}",
-            "about, until the report" if now.seconds_after else "about, of this stage",
-        ]
-    aim = "between them the proof decides" if now.stage == "spline" else "0 is the aim"
-    return [
+    is_spline = now.stage == "spline"
+    step = f"step {now.step}" if is_spline else f"step {now.step} of {now.steps}"  # how many it takes is not known
+    stage = [LAST, "the volume is made"] if job.is_mapped else [STAGES.get(now.stage, now.stage), step]
+    aim = "between them the proof decides" if is_spline else "0 is the aim"
+    facts = [
         ["Stage", *stage],
-        ["Time left", *time_left],
         ["Loss", f"{now.loss:.2e}", "minimised by the training"],
         ["Folds at samples", f"{now.folded:,}", aim],
     ]
+    if job.state == "running":
+        facts.insert(1, ["Time left", *_time_left(job.course.left)])
+    return facts
+
+
+def _time_left(seconds: float | None) -> list[str]:
+    if seconds is None:
+        return ["not known", "longer than usual"]
+    return ["{}:{:02d}".format(*divmod(math.ceil(seconds), 60)), "about, until the report"]
 
 
 def _files(job: Job) -> list[dict[str, Any]]:
