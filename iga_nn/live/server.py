@@ -44,6 +44,7 @@ POLICY = (  # the browser itself refuses to fetch anything from elsewhere; Vue c
 
 TICK = 1.0  # seconds between two looks at a running job
 NUMBER = "{number:[1-9][0-9]{0,8}}"  # of a job, in a route: digits of ASCII
+LONGEST = 255  # bytes of a path that is asked for
 ARRAYS = ("polys", "colors", "points")  # of a job, that vtk.js draws
 ENDED = "trame_error_report_msg"  # trame's client sets it when the connection is lost
 
@@ -257,6 +258,8 @@ def _guard(port: Callable[[], int]) -> Any:
         asks = reads if origin is None else origin in {f"http://{name}" for name in own}
         if request.host not in own or not asks:
             raise web.HTTPForbidden(text=f"this page answers at http://{HOST}:{port()}/ only")
+        if len(request.path.encode()) > LONGEST or "\0" in request.path:  # no file can be called that
+            raise web.HTTPNotFound
         if request.path == "/ws" and not web.WebSocketResponse().can_prepare(request):  # wslink would fail on it
             raise web.HTTPBadRequest(text="this address takes web sockets only")
         return await handler(request)
