@@ -19,6 +19,7 @@ class Progress:
 
     mapped: while the network is trained, computes where it maps the surface as it is now, (n, 3) with the cube at
     0..1; the first rows are the surface's own vertices. Costs one evaluation, changes nothing.
+    seconds_after: what a usual run takes after that, to its end, where this is known.
     """
 
     stage: str
@@ -28,6 +29,7 @@ class Progress:
     folded: int
     seconds_left: float
     mapped: Callable[[], Array] | None = field(default=None, compare=False, repr=False)
+    seconds_after: float | None = None
 
 
 ProgressCallback = Callable[[Progress], None]

@@ -10,7 +10,10 @@ import re
 import socket
 import subprocess
 import sys
+import time
+from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -33,30 +36,47 @@ PATIENCE = 200.0  # seconds; on an idle machine a job takes some 15
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
-    """Port of a running page; uploads up to 1 MB. Its terminal stays silent, whatever it is asked."""
+    """Port of a running page."""
+    with served(tmp_path_factory.mktemp("page")) as (port, _):
+        yield port
+
+
+@contextmanager
+def served(folder):
+    """Port and process of a page; uploads up to 1 MB. Its terminal stays silent, whatever it is asked."""
     pytest.importorskip("trame")
     environment = os.environ | {
         "PYTHONPATH": str(Path(iga_nn.__file__).parents[1]),
         "TRAME_DEFAULT_HOST": "0.0.0.0",
         "TRAME_ARGS": "--host 0.0.0.0",
+        "TMPDIR": str(folder),
     }
     command = [sys.executable, "-m", "iga_nn", "app", "--port", "0", "--max-upload", "1", *QUICK]
-    terminal = tmp_path_factory.mktemp("page") / "stderr"
+    terminal = folder / "stderr"
     with (
         terminal.open("w") as stderr,
         subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=stderr, text=True) as server,
     ):
         try:
             said = server.stdout.readline()
-            yield int(re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\n", said)[1])
+            yield int(re.fullmatch(r"http://127\.0\.0\.1:(\d+)/\n", said)[1]), server
         finally:
             server.terminate()
             assert server.wait(timeout=30) == 0
             assert terminal.read_text() == ""
 
 
+@pytest.fixture
+def root(page, tmp_path_factory):
+    """The folder of the running page's jobs."""
+    return next(tmp_path_factory.getbasetemp().glob("page*/iga-nn-*"))
+
+
 def ask(port, method, path, body=None, **headers):
-    """Status and text of an answer."""
+    """Status and text of an answer; as a browser does, the page that posts is named."""
+    if method == "POST":
+        headers = {"Origin": f"http://127.0.0.1:{port}"} | headers
+    headers = {name: value for name, value in headers.items() if value is not None}
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
     connection.request(method, path, body, {name.replace("_", "-"): value for name, value in headers.items()})
     answer = connection.getresponse()
@@ -92,6 +112,15 @@ CLICKED = """(() => {
   const middle = {clientX: box.left + box.width / 2, clientY: box.top + box.height / 2, bubbles: true};
   view.dispatchEvent(new MouseEvent("click", middle));
 })()"""
+TYPED = """(() => {
+  const field = document.querySelector("form [name=%s]");
+  field.value = "%s";
+  field.dispatchEvent(new Event("input", {bubbles: true}));
+})()"""
+RELOADED = "window.reloaded = false; location.reload()"
+SHOWN = """[document.querySelector("h2").innerText,
+  [...document.querySelectorAll("form .field input")].map((one) => one.value),
+  [...document.querySelectorAll("form :checked[type=checkbox]")].map((one) => one.name)]"""
 REPORT = "document.querySelector('iframe')?.contentDocument?.body?.innerText"
 
 
@@ -105,13 +134,15 @@ async def walk(chromium, port, folder, capsys):
         await refused(first, folder, capsys)
         await dropped_and_started(first, folder)
         second = await browser.open(f"http://127.0.0.1:{port}/")
-        await seen_by_another_tab(second)
+        await seen_by_another_tab(second, folder)
         await trained(first, folder)
         await finished(first, folder)
+        assert ask(port, "GET", "/files/3/report.json")[0] == 200
+        assert ask(port, "GET", "/files/%D9%A3/report.json")[0] == 404  # an Arabic three
         await another_problem(first)
         await stopped(second)
-        await first.click("cube.obj\nstopped")  # away from the report
-        await first.sees("Resume continues")
+        await kept(first)
+        await deleted(first, second)
         for tab in (first, second):
             await asyncio.sleep(0.5)
             await tab.text()  # whatever it has to say by now
@@ -143,9 +174,19 @@ async def dropped_and_started(tab, folder):
     await tab.click("Start")
 
 
-async def seen_by_another_tab(tab):
+async def on_paper(tab, path):
+    """The picture of a surface that was shown before the tab was opened has the page's background."""
+    x, y = await tab.value("(({x, y}) => [x, y])(document.querySelector('.drawing').getBoundingClientRect())")
+    end = asyncio.get_running_loop().time() + 30.0
+    while not np.all((await tab.picture(path))[round(y) + 9, round(x) + 9] == 1.0):
+        assert asyncio.get_running_loop().time() < end, f"not on white: {path}"
+
+
+async def seen_by_another_tab(tab, folder):
     """It shows the running job at first; its own surface has to wait."""
     await tab.sees("my ball.obj\nrunning", PATIENCE)
+    await tab.until("document.querySelector('.drawing canvas') !== null", PATIENCE)
+    await on_paper(tab, folder / "second.png")
     await tab.sees("Stop")
     await tab.click("cube")
     await tab.sees("cube.obj\naccepted", PATIENCE)
@@ -178,10 +219,40 @@ async def another_problem(tab):
     await tab.until("document.querySelectorAll('form [type=checkbox]:checked').length === 1")
     chosen = (await tab.value("document.querySelector('form [type=checkbox]:checked').name")).removeprefix("face ")
     assert f"Face {chosen}: " in await tab.value(REPORT)
-    await tab.value("document.querySelector('form [name=kappa]').value = '1+X*X'")
+    await tab.value(TYPED % ("kappa", "1+X*X"))
     await tab.click("Solve")
     await tab.until(f"{REPORT}?.includes('iga-nn solve poisson')", PATIENCE)
     assert f"--kappa '1+X*X' --neumann {chosen}\n" in await tab.value(REPORT)
+
+
+async def kept(tab):
+    """A reload keeps the job and what was typed, also into the form of a job that was left."""
+    await tab.click("3 · my ball.obj\ndone")
+    await tab.value(TYPED % ("source", "x*"))
+    await tab.click("4 · cube.obj\nstopped")
+    await tab.sees("Resume continues")
+    await tab.click("3 · my ball.obj\ndone")
+    await tab.value(RELOADED)
+    await tab.until("window.reloaded === undefined && document.querySelector('form [name=source]')?.value === 'x*'")
+    heading, values, chosen = await tab.value(SHOWN)
+    assert heading == "3 · my ball.obj" and values == ["1+X*X", "", "", "x*", ""] and len(chosen) == 1
+    await tab.call("Emulation.setDeviceMetricsOverride", width=400, height=900, deviceScaleFactor=1, mobile=False)
+    assert await tab.value("document.documentElement.scrollWidth") <= 400
+
+
+async def deleted(tab, other):
+    """A job is deleted where that is confirmed; the tab that showed it says so."""
+    for one in (tab, other):
+        await one.click("4 · cube.obj\nstopped")
+        await one.sees("Resume continues")
+    await tab.click("Delete")
+    await tab.click("Keep it")
+    await tab.click("Delete")
+    assert "cube.obj" in await other.text()
+    await tab.click("Yes, delete")
+    await other.sees("Job 4, which this tab showed, was deleted.")
+    for one in (tab, other):
+        await one.until("!document.body.innerText.includes('cube.obj')")
 
 
 async def shows_faces(tab, path, seconds=30.0):
@@ -201,24 +272,82 @@ async def stopped(tab):
     await tab.sees("Resume continues where it was stopped", PATIENCE)
 
 
+def test_what_is_read_stays_when_the_program_ends(chromium, tmp_path):
+    asyncio.run(read_on(chromium, tmp_path))
+
+
+async def read_on(chromium, folder):
+    """The page is neither drawn anew nor emptied: a frame in it would be loaded again, from nowhere."""
+    async with running(chromium, folder) as browser:
+        with served(folder) as (port, server):
+            tab = await browser.open(f"http://127.0.0.1:{port}/")
+            await tab.click("cube")
+            await tab.sees("1,538 vertices, 3,072 faces", PATIENCE)
+            await tab.value("document.querySelector('h2').marked = 'the same'")
+            server.terminate()
+            await tab.sees("The page's program has ended")
+        assert await tab.value("document.querySelector('h2').marked") == "the same"
+        text = await tab.text()
+        assert "1,538 vertices, 3,072 faces" in text and "Start\n" not in text and "Drop a surface" not in text
+
+
 def test_other_sites_and_other_computers_are_not_answered(page):
     assert ask(page, "GET", "/index.html")[0] == 200
     assert ask(page, "GET", "/index.html", Host="example.org")[0] == 403
     assert ask(page, "POST", "/upload?name=a.obj", "x", Origin="http://example.org")[0] == 403
-    assert ask(page, "GET", "/ws", Origin="http://example.org", Upgrade="websocket")[0] == 403
+    for origin in (None, "http://example.org", "null", "", f"https://127.0.0.1:{page}", f"127.0.0.1:{page}"):
+        assert ask(page, "GET", "/ws", Origin=origin, Upgrade="websocket")[0] == 403
+        assert ask(page, "POST", "/sample/cube", Origin=origin)[0] == 403
     with pytest.raises(ConnectionRefusedError):  # would be answered by a server on 0.0.0.0
         socket.create_connection(("127.0.0.2", page), timeout=5)
 
 
-@pytest.mark.parametrize(("path", "headers"), [("/ws", {}), ("/upload?name=a.obj", {"Content-Length": "-5"})])
+@pytest.mark.parametrize(
+    ("path", "headers"), [("/ws", {"Origin": "own"}), ("/upload?name=a.obj", {"Content-Length": "-5"})]
+)
 def test_what_is_no_request_is_answered_with_400(path, headers, page):
-    assert ask(page, "POST" if headers else "GET", path, **headers)[0] == 400
+    own = {"Origin": f"http://127.0.0.1:{page}"}
+    assert ask(page, "GET" if path == "/ws" else "POST", path, **(headers | own))[0] == 400
 
 
 def test_only_results_are_given_out(page):
     number = ask(page, "POST", "/upload?name=../../x.obj", OPEN)[1]
     for path in (f"{number}/x.obj", f"{number}/..%2Fx.obj", f"{number}/volume.npz", "0/report.json", "x/report.json"):
         assert ask(page, "GET", f"/files/{path}")[0] == 404
+
+
+ARABIC, WIDE = str.maketrans("0123456789", "٠١٢٣٤٥٦٧٨٩"), str.maketrans("0123456789", "０１２３４５６７８９")
+
+
+@pytest.mark.parametrize(
+    "other", [lambda n: n.translate(ARABIC), lambda n: n.translate(WIDE), lambda n: f"0{n}", lambda n: f"+{n}",
+              lambda n: n + "9" * 5000, lambda n: n + "\0", lambda n: "٣" * 200]
+)  # fmt: skip
+def test_a_job_has_one_address(other, page):
+    path = quote(other("3"))
+    assert ask(page, "GET", f"/files/{path}/report.json")[0] == 404
+    assert ask(page, "POST", f"/solve/{path}", "")[0] in (404, 405)
+
+
+@pytest.mark.parametrize(
+    ("size", "body"),
+    [
+        (3, b"#" * ((1 << 20) + 1)),
+        (2 << 20, b""),
+        (500, b"#" * 400),
+        ("٣", b"#"),
+        ("9" * 5000, b"#"),
+    ],
+)
+def test_an_upload_that_lies_about_its_size_leaves_no_file(size, body, page, root):
+    status, number = ask(page, "POST", f"/upload?name=lie.obj&size={quote(str(size))}", body)
+    assert status == 200
+    left = root / number / "lie.obj"
+    for _ in range(100):  # what is not refused at once is refused when it is checked
+        if not left.exists():
+            break
+        time.sleep(0.1)
+    assert not left.exists() and left.parent.is_dir()
 
 
 def test_a_page_without_its_packages_says_what_to_install(tmp_path):
@@ -238,13 +367,21 @@ def test_a_page_without_its_packages_says_what_to_install(tmp_path):
         (["--max-upload", "0"], "max upload 0"),
         (["--host", "0.0.0.0"], "--host"),
         (["--control-points", "2"], "control points 2"),
-        (["--resume"], "resume"),
+        (["--resume"], "Unknown option: --resume"),
+        (["--corners", "corners.json"], "Unknown option: --corners"),
     ],
 )
 def test_bad_options_are_refused_in_one_line(arguments, says, capsys):
     assert main(["app", *arguments]) == 2
     said = capsys.readouterr().err
     assert says in said and said.count("\n") == 1
+
+
+def test_help_offers_no_option_that_is_refused(capsys):
+    assert main(["app", "--help"]) == 0
+    said = capsys.readouterr().out
+    assert "--steps-factor" in said and "--max-upload" in said
+    assert "--resume" not in said and "--corners" not in said
 
 
 def test_a_taken_port_is_named(page):

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from iga_nn.errors import InputError
-from iga_nn.live.form import described, stated
+from iga_nn.live.form import described, filled, in_words, stated
 from iga_nn.options import PoissonOptions
 
 KEPT = PoissonOptions(exact="x", refine=(0,))
@@ -47,3 +47,18 @@ def test_the_form_lists_the_options_of_a_problem_and_the_faces():
     known = described()
     assert {field["name"] for field in known["fields"]} <= set(PoissonOptions.__dataclass_fields__)
     assert [face["name"] for face in known["faces"]] == ["u0", "u1", "v0", "v1", "w0", "w1"]
+
+
+def test_a_form_is_filled_with_what_it_has_stated():
+    problem = PoissonOptions(
+        kappa="1+X*X", source="1", exact="0", neumann=("u1", "v0=x*y"), robin=("w0=3:z", "w1=2"), refine=(0,)
+    )
+    assert filled(problem)["data w0"] == "z" and "boundary" not in filled(problem)
+    assert stated(filled(problem), KEPT) == problem
+    assert filled(PoissonOptions()) == {}
+
+
+def test_jobs_are_told_apart_by_their_problems():
+    problem = PoissonOptions(kappa="1+X*X", source="1", neumann=("u1=0",), robin=("w0=3:z",))
+    assert in_words(problem) == "κ = 1+X*X, f = 1, flux on u1: 0, exchange on w0: z"
+    assert in_words(PoissonOptions()) == "the problem of an empty form"

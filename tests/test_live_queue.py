@@ -91,6 +91,7 @@ def test_a_problem_is_solved_on_a_finished_volume_and_again_on_the_same(tmp_path
     second = jobs.solve(first, PoissonOptions(exact="x"))
     wait_for(second, "done")
     third = jobs.solve(second, PoissonOptions(exact="y"))
+    assert (second.parent, third.parent) == (first.number, first.number)
     wait_for(third, "done")
     assert [job.name for job in jobs] == ["my cube.obj", "my cube.npz", "my cube.npz"]
     assert third.volume == third.path and third.path.read_bytes() == b"volume"
@@ -140,6 +141,65 @@ def test_only_what_was_accepted_is_started(jobs, runs):
     jobs.start(job)
     jobs.stop(job)
     assert job.state == "refused" and job.text.startswith("broken.obj: ") and runs.order == []
+
+
+def test_what_is_refused_leaves_no_file(jobs):
+    job = jobs.add("large.obj")
+    job.path.write_bytes(b"#" * 1000)
+    jobs.refuse(job, "large.obj: larger than 1 MB")
+    assert list(job.folder.iterdir()) == []
+
+
+def test_a_deleted_job_is_gone_with_its_folder_and_its_number(jobs, runs):
+    first, second = accepted(jobs), accepted(jobs)
+    jobs.delete(second)
+    assert list(jobs) == [first] and not second.folder.exists() and first.folder.is_dir()
+    jobs.start(second)  # from a tab that does not know yet
+    jobs.delete(second)
+    assert second.state == "ready" and runs.order == []
+    assert accepted(jobs).number == 3
+
+
+def test_a_job_at_work_is_not_deleted(jobs, runs):
+    first, second = accepted(jobs), accepted(jobs)
+    jobs.start(first)
+    jobs.start(second)
+    wait_for(first, "running")
+    for job in (first, second, jobs.add("checked.obj")):
+        jobs.delete(job)
+        assert job in list(jobs) and job.folder.is_dir()
+    jobs.stop(first)
+    wait_for(first, "stopped")
+    jobs.delete(first)
+    assert first not in list(jobs)
+
+
+def test_a_problem_on_a_volume_that_is_gone_leaves_no_job(jobs):
+    first = accepted(jobs)
+    with pytest.raises(OSError, match="volume"):
+        jobs.solve(first, PoissonOptions())
+    assert list(jobs) == [first]
+
+
+def test_a_failed_job_is_tried_again_anew(tmp_path):
+    ends = iter(["failed", "done"])
+
+    def run(job):
+        seen.append((list(job.log), job.progress, job.course.share))
+        yield "started"
+        yield Step(AT, None)
+        yield Ended(next(ends), "why")
+
+    seen: list = []
+    jobs = Jobs(tmp_path, resolve_path, run, lambda job: None)
+    job = accepted(jobs)
+    jobs.start(job)
+    wait_for(job, "failed")
+    assert job.text == "why" and job.progress == AT
+    jobs.start(job)
+    wait_for(job, "done")
+    assert seen == [([], None, 0.0)] * 2
+    jobs.close()
 
 
 def test_a_run_that_breaks_fails_alone(tmp_path):

@@ -2,12 +2,15 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 
 import numpy as np
 
 from iga_nn.figures.evaluate import FACE_COLORS
+from iga_nn.live.course import Course
 from iga_nn.live.queue import Job
 from iga_nn.live.state import colors, places, row, triangles
+from iga_nn.options import PoissonOptions
 from iga_nn.samples import sample
 from parameterize.progress import Progress
 
@@ -42,9 +45,12 @@ def test_colours_are_those_of_the_cubes_faces():
 def test_a_row_says_stage_loss_and_time_left(tmp_path):
     job = Job(2, "bean.obj", tmp_path, state="running", surface=sample("bean"), losses=[10.0, 1.0, 0.1])
     job.progress = Progress("cube", 30, 300, 0.1, 4, 83.4)
-    said = row(job, before=0)
-    assert [fact[1] for fact in said["facts"]] == ["3 of 6: to a cube", "1:23", "1.00e-01", "4"]
-    assert said["share"] == 0.1 and said["curve"] == "0.0,5.0 50.0,50.0 100.0,95.0"
+    job.course = Course(lambda: 5.0)
+    job.course.tell(83.0)
+    said = row(job, 0, PoissonOptions())
+    assert [fact[1] for fact in said["facts"]] == ["3 of 7: to a cube", "1:23", "1.00e-01", "4"]
+    assert said["facts"][3][2] == "0 is the aim"
+    assert said["share"] == 0.0 and said["curve"] == "0.0,5.0 50.0,50.0 100.0,95.0"
     assert said["size"] == "2,500 vertices, 4,996 faces" and said["files"] == []
     assert json.loads(json.dumps(said)) == said
 
@@ -54,8 +60,43 @@ def test_results_are_offered_with_what_they_hold(tmp_path):
     job.results.mkdir()
     (job.results / "volume.npz").write_bytes(b"x" * 3_000_000)
     (job.results / "secret.txt").write_text("x")
-    assert row(job, 0)["files"] == [{"name": "volume.npz", "size": "2.9 MB", "shows": "the spline volume"}]
+    assert row(job, 0, PoissonOptions())["files"] == [
+        {"name": "volume.npz", "size": "2.9 MB", "shows": "the spline volume"}
+    ]
 
 
 def test_a_waiting_job_knows_its_place(tmp_path):
-    assert row(Job(1, "a.obj", tmp_path, state="waiting"), before=2)["label"] == "waiting, 2 jobs ahead"
+    said = row(Job(1, "a.obj", tmp_path, state="waiting"), 2, PoissonOptions())
+    assert said["label"] == "waiting, 2 jobs ahead" and not said["starts"] and not said["deletes"]
+
+
+def test_where_the_end_is_not_known_a_row_says_so(tmp_path):
+    job = Job(2, "bean.obj", tmp_path, state="running", progress=Progress("spline", 600, 640, 0.1, 0, 9.0))
+    _, left, _, folds = row(job, 0, PoissonOptions())["facts"]
+    assert left == ["Time left", "not known", "longer than usual"]
+    assert folds == ["Folds at samples", "0", "between them the proof decides"]
+
+
+def test_once_the_volume_of_this_run_is_made_the_last_stage_has_begun(tmp_path):
+    job = Job(2, "bean.obj", tmp_path, state="running", progress=Progress("spline", 600, 640, 0.1, 0, 9.0))
+    job.results.mkdir()
+    job.volume.write_bytes(b"of an older run")
+    os.utime(job.volume, (1000.0, 1000.0))
+    job.begun = 1001.0
+    assert row(job, 0, PoissonOptions())["facts"][0][1] == "6 of 7: the spline"
+    job.state = "failed"
+    assert [fact[0] for fact in row(job, 0, PoissonOptions())["facts"]] == ["Stage", "Loss", "Folds at samples"]
+    os.utime(job.volume, (1002.0, 1002.0))
+    assert row(job, 0, PoissonOptions())["facts"][0][1] == "7 of 7: solution and report"
+
+
+def test_a_failed_problem_has_its_form_to_correct(tmp_path):
+    options = PoissonOptions(exact="x")
+    job = Job(3, "bean.npz", tmp_path, state="failed", problem=PoissonOptions(source="log(x)"), parent=1)
+    assert "form" not in row(job, 0, options)  # no volume
+    job.path.write_bytes(b"volume")
+    said = row(job, 0, options)
+    assert said["form"] == {"source": "log(x)"} and said["deletes"] and not said["starts"]
+    assert said["what"] == "f = log(x); on the volume of 1"
+    job.state = "running"
+    assert "form" not in row(job, 0, options)

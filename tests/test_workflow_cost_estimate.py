@@ -13,10 +13,12 @@ import pytest
 import torch
 
 import iga_nn
+import parameterize.run
 from iga_nn.cli.commands import main
 from iga_nn.report import document as report
 from iga_nn.workflow.cost_estimate import Forecast, available_memory_mb, forecast
 from parameterize.config import preset
+from parameterize.progress import Progress
 
 CPU = torch.device("cpu")
 PACKAGES = str(Path(iga_nn.__file__).resolve().parents[1])
@@ -39,6 +41,10 @@ def test_more_work_takes_longer_and_more_memory():
     paper = forecast(bean, replace(preset("paper"), train=preset("fast").train), device=CPU, clock=clock)
     assert quick.seconds[1] < usual.seconds[0] < usual.seconds[1] < paper.seconds[1]
     assert quick.memory_mb < usual.memory_mb < solved.memory_mb
+    for found in (quick, usual, solved):  # the training and the spline are parts of the whole
+        assert 0.0 < found.seconds_after("spline") < found.seconds_after("edges") < found.seconds[1]
+        assert found.seconds_after("S(2)") == found.seconds_after("edges") == found.after[0]
+    assert usual.seconds_after("spline") < solved.seconds_after("spline")
 
 
 def test_the_calibration_takes_less_than_a_second_and_no_random_numbers():
@@ -102,6 +108,22 @@ def test_it_is_said_before_the_training_and_kept_in_the_report(formula_training,
     assert re.fullmatch(r"estimate: about \d+( to \d+)? (minutes|seconds), \d\.\d GB of memory", line)
     found = report.read(in_folder / "out")["estimate"]
     assert 0.0 < found["seconds"][0] < found["seconds"][1] and 300.0 < found["memory_mb"] < 3000.0
+
+
+def test_every_step_tells_what_comes_after_its_stage(formula_training, in_folder, monkeypatch):
+    formula_training()
+    trained, seen = parameterize.run.parameterize, []
+
+    def told(*given, progress, **options):
+        for stage in ("S(2)", "spline"):
+            progress(Progress(stage, 1, 2, 0.5, 0, 3.0))
+        return trained(*given, progress=progress, **options)
+
+    monkeypatch.setattr("parameterize.run.parameterize", told)
+    iga_nn.run("poisson", "cube", "out", poisson=iga_nn.PoissonOptions(refine=(0,)), progress=seen.append)
+    after = report.read(in_folder / "out")["estimate"]["after"]
+    assert [now.seconds_after for now in seen[:2]] == after and after[0] > after[1] > 0.0
+    assert [now.seconds_left for now in seen[:2]] == [3.0, 3.0]
 
 
 def test_quiet_and_json_keep_stdout_for_the_verdict(formula_training, in_folder, capsys):

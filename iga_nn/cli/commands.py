@@ -98,11 +98,20 @@ class OutputOptions:
         return {"out": self.out, "force": self.force, "vector": self.vector}
 
 
+@dataclass(frozen=True)
+class PageOptions(MapOptions):
+    """Say how surfaces of the live page become volumes: what belongs to one surface is no option there."""
+
+    corners: Annotated[Path | None, Parameter(parse=False)] = None
+    resume: Annotated[bool, Parameter(parse=False)] = False
+
+
 for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions):
     Parameter(name="*")(kind)  # each field of these options, and of those derived from them, is a flag
 
 OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
 WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
+PAGE = PageOptions()
 
 
 @run_app.command(name="poisson")
@@ -329,7 +338,7 @@ def serve_page(
     port: int = 8080,
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
     max_upload: int = 64,
-    mapping: MapOptions = MAP,
+    mapping: PageOptions = PAGE,
     poisson: PoissonOptions = POISSON,
 ) -> None:
     """Serve a page to this computer's browser: drop a surface, watch it become a volume, download the files.
@@ -341,7 +350,8 @@ def serve_page(
     """
     from ..live.app import serve
 
-    serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=mapping, poisson=poisson)
+    options = MapOptions(**vars(mapping))
+    serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=options, poisson=poisson)
 
 
 def main(argv: list[str]) -> int:

@@ -1,15 +1,41 @@
 "use strict";
 // Files come in by dropping them anywhere on the page, or by choosing one; the server's answer is the job's number.
+// What this tab keeps for itself, the job it shows and what was typed, is in its session storage: it outlives a reload.
+
+const kept = (name) => `${window.trame.state.get("page")} ${name}`;  // another server counts its jobs anew
+
+function choose(number) {
+  sessionStorage.setItem(kept("shown"), number);
+  window.trame.state.set("shown", number);
+}
 
 async function post(address, body) {
-  const answer = await fetch(address, {method: "POST", body}), said = await answer.text();
-  if (answer.ok) window.trame.state.set("shown", Number(said));
-  return answer.ok ? "" : said;
+  try {
+    const answer = await fetch(address, {method: "POST", body}), said = await answer.text();
+    if (answer.ok) choose(Number(said));
+    return answer.ok ? "" : said;
+  } catch {
+    return "The page's program does not answer.";
+  }
 }
 
 // Sends the form of a problem; what the server says against it is shown in the form.
 async function solve(number, form) {
   form.querySelector("[role=alert]").textContent = await post(`solve/${number}`, new URLSearchParams(new FormData(form)));
+}
+
+function draft(number, form) {
+  sessionStorage.setItem(kept(`form ${number}`), new URLSearchParams(new FormData(form)));
+}
+
+// Fills a form with what was typed into it before, else with the problem that the job has solved.
+function fill(number, form, given) {
+  const typed = sessionStorage.getItem(kept(`form ${number}`));
+  const values = new URLSearchParams(typed ?? given);
+  for (const field of form.elements)
+    if (field.type === "checkbox") field.checked = values.has(field.name);
+    else if (values.has(field.name)) field.value = values.get(field.name);
+  if (typed !== null) form.closest("details").open = true;
 }
 
 // A face clicked in the report's picture is chosen in the form, or no longer.
@@ -21,7 +47,6 @@ window.addEventListener("message", (event) => {
 });
 
 document.querySelector("meta[name=viewport]").content = "width=device-width, initial-scale=1";  // zooming is allowed
-window.paper = matchMedia("(prefers-color-scheme: dark)").matches ? [0.08, 0.1, 0.12] : [1, 1, 1];
 
 // A file over the limit is only announced, so that the server says the same as of any other refused one.
 function upload(file) {
@@ -53,3 +78,14 @@ function fit(frame) {
   frame.contentWindow.addEventListener("resize", grow);
   grow();
 }
+
+// The page is drawn once `paper`, the colour behind its pictures, is known: see app.html.
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const paint = () => window.trame.state.set("paper", dark.matches ? [0.08, 0.1, 0.12] : [1, 1, 1]);
+dark.addEventListener("change", paint);
+window.Vue.nextTick(() => {  // this script runs while Vue still draws, and does not yet follow the state
+  const canvas = document.createElement("canvas");
+  window.trame.state.set("webgl", Boolean(canvas.getContext("webgl2") ?? canvas.getContext("webgl")));
+  window.trame.state.set("shown", Number(sessionStorage.getItem(kept("shown"))));
+  paint();
+});

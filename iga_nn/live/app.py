@@ -25,8 +25,6 @@ def serve(
     """
     mapping.config()
     poisson.problem()
-    if mapping.resume or mapping.corners:
-        raise InputError("--resume and --corners belong to one surface: leave them out here")
     if not 0 <= port <= 65_535:
         raise InputError(f"port {port}: must lie between 0, for any free one, and 65535")
     if max_upload < 1:

@@ -17,6 +17,7 @@ FIELDS = (  # of PoissonOptions, what each is called on the page, and what holds
     ("source", "Source f", "that of the exact solution"),
     ("boundary", "Values of u on the faces", "those of the exact solution, or 0"),
 )
+SIGNS = {"kappa": "κ", "reaction": "c", "exact": "u", "source": "f", "boundary": "u on the faces"}
 EXCHANGE = "exchange"  # the other kind of data of a face is "flux"
 
 
@@ -54,3 +55,26 @@ def stated(form: Mapping[str, Any], options: PoissonOptions) -> PoissonOptions:
     found = replace(options, **given, neumann=tuple(neumann), robin=tuple(robin))
     found.problem()
     return found
+
+
+def filled(options: PoissonOptions) -> dict[str, str]:
+    """Return the form that states these options, as `stated` reads it; what is not given is left out."""
+    form = {name: value for name, _, _ in FIELDS if (value := getattr(options, name))}
+    problem = options.problem()
+    for face, data in problem.neumann.items():
+        form |= {f"face {face}": "on", f"kind {face}": "flux", f"data {face}": str(data or "")}
+    for face, (alpha, data) in problem.robin.items():
+        form |= {f"face {face}": "on", f"kind {face}": EXCHANGE, f"alpha {face}": str(alpha)}
+        form |= {f"data {face}": str(data or "")}
+    return form
+
+
+def in_words(options: PoissonOptions) -> str:
+    """Return the data of a problem in one line, by which jobs are told apart."""
+    form = filled(options)
+    said = [f"{sign} = {form[name]}" for name, sign in SIGNS.items() if name in form]
+    for face in FACE_NAMES:
+        if kind := form.get(f"kind {face}"):
+            data = form[f"data {face}"]
+            said.append(f"{kind} on {face}" + f": {data}" * bool(data))
+    return ", ".join(said) or "the problem of an empty form"

@@ -1,12 +1,13 @@
 """Keeps the jobs of the live page: surfaces are checked one by one, run one at a time, and wait in a queue.
 
-A job's states are checking -> refused | ready -> waiting -> running -> done | failed | stopped. A stopped job may be
-started again.
+A job's states are checking -> refused | ready -> waiting -> running -> done | failed | stopped. A failed or a stopped
+job may be started again. One that is neither checked, waiting nor running may be deleted, with its folder.
 """
 
 import logging
 import re
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -19,22 +20,25 @@ from parameterize.surface.surface import MeshError, Surface
 
 from ..errors import one_line
 from ..options import PoissonOptions
-from ..workflow.output_folder import default_folder
+from ..workflow.output_folder import default_folder, has_checkpoint
 from ..workflow.watched import Ended
+from .course import Course
 from .worker import Message, Step
 
 log = logging.getLogger(__name__)
 
 NAME_LENGTH = 80
+STARTS, DELETED = ("ready", "stopped", "failed"), ("refused", "ready", "done", "failed", "stopped")
 
 
 @dataclass(eq=False)
 class Job:
     """Hold the file of a surface, or of a volume to solve on, in a folder of its own, and its state.
 
-    problem: what is solved on a volume; None for a surface, whose problem is that of the page's options.
-    text: why it was refused or failed. mapped: where the training maps the surface's vertices, (n, 3) in the cube.
-    losses: those of the training that were reported. log: the lines of the run.
+    problem: what is solved on a volume; None for a surface, whose problem is that of the page's options. parent: number
+    of the job that made the volume. text: why it was refused or failed. mapped: where the training maps the surface's
+    vertices, (n, 3) in the cube. losses: those of the training that were reported. log: the lines of the run. begun:
+    when the run began, in seconds of the system's clock.
     """
 
     number: int
@@ -42,12 +46,15 @@ class Job:
     folder: Path
     state: str = "checking"
     problem: PoissonOptions | None = None
+    parent: int = 0
     text: str = ""
     surface: Surface | None = None
     progress: Progress | None = None
     mapped: Array | None = None
     losses: list[float] = field(default_factory=list)
     log: list[str] = field(default_factory=list)
+    course: Course = field(default_factory=Course)
+    begun: float = 0.0
     stop: Event = field(default_factory=Event)
     turn: Future[None] | None = None
 
@@ -66,6 +73,20 @@ class Job:
         """Return the path of the volume that was made, or that is solved on."""
         return self.path if self.problem else self.results / "volume.npz"
 
+    @property
+    def is_mapped(self) -> bool:
+        """Return whether this run has made its volume."""
+        return self.volume.is_file() and self.volume.stat().st_mtime >= self.begun
+
+    def begin(self) -> None:
+        """Forget the run before this one, unless this one goes on from its checkpoint."""
+        self.state, self.text, self.begun = "running", "", time.time()
+        self.course.pause()
+        if not has_checkpoint(self.results):
+            self.course, self.progress, self.mapped = Course(), None, None
+            self.losses.clear()
+            self.log.clear()
+
 
 Check = Callable[[Path], Surface]
 Run = Callable[[Job], Iterator[Message]]
@@ -82,6 +103,7 @@ class Jobs:
         self._root, self._check, self._run, self._changed = root, check, run, changed
         self._jobs: list[Job] = []
         self._queue: list[Job] = []  # waiting and running
+        self.latest = 0  # number of the latest job; those of deleted jobs are not given again
         self._lock = Lock()
         self._checker, self._runner = ThreadPoolExecutor(1), ThreadPoolExecutor(1)
 
@@ -100,15 +122,16 @@ class Jobs:
     def add(self, name: str) -> Job:
         """Return a new job with an empty folder; write its file, then call `check`."""
         with self._lock:
-            number = len(self._jobs) + 1
-            job = Job(number, safe_name(name), self._root / str(number))
+            self.latest += 1
+            job = Job(self.latest, safe_name(name), self._root / str(self.latest))
             job.folder.mkdir()
             self._jobs.append(job)
         self._changed(job)
         return job
 
     def refuse(self, job: Job, text: str) -> None:
-        """Refuse a job. text: the reason, in one line."""
+        """Refuse a job, and delete its file: nothing more is done with it. text: the reason, in one line."""
+        job.path.unlink(missing_ok=True)
         job.state, job.text = "refused", text
         self._changed(job)
 
@@ -117,17 +140,34 @@ class Jobs:
         self._checker.submit(self._check_now, job)
 
     def solve(self, done: Job, problem: PoissonOptions) -> Job:
-        """Put a new job into the queue, which solves a problem on the volume of a finished one; return it."""
+        """Put a new job into the queue, which solves a problem on the volume of another; return it.
+
+        Raises OSError where the volume cannot be copied, for example because the other job was just deleted.
+        """
         job = self.add(f"{default_folder(done.name)}.npz")
-        shutil.copyfile(done.volume, job.path)
-        job.problem, job.state = problem, "ready"
+        try:
+            shutil.copyfile(done.volume, job.path)
+        except OSError:
+            job.state = "refused"
+            self.delete(job)
+            raise
+        job.problem, job.parent, job.state = problem, done.parent or done.number, "ready"
         self.start(job)
         return job
 
-    def start(self, job: Job) -> None:
-        """Put an accepted or a stopped job into the queue; any other stays as it is."""
+    def delete(self, job: Job) -> None:
+        """Delete a job and its folder; one that is checked, waits or runs stays as it is."""
         with self._lock:
-            if job.state not in ("ready", "stopped"):
+            if job.state not in DELETED or job not in self._jobs:
+                return
+            self._jobs.remove(job)
+        shutil.rmtree(job.folder, ignore_errors=True)
+        self._changed(job)
+
+    def start(self, job: Job) -> None:
+        """Put an accepted, a stopped or a failed job into the queue; any other stays as it is."""
+        with self._lock:
+            if job.state not in STARTS or job not in self._jobs:
                 return
             job.state = "waiting"
             job.stop.clear()
@@ -143,7 +183,7 @@ class Jobs:
             job.stop.set()
             if job.turn.cancel():
                 self._queue.remove(job)
-                job.state = "stopped" if job.progress else "ready"
+                job.state = "stopped" if job.begun else "ready"
         self._changed(job)
 
     def close(self) -> None:
@@ -166,7 +206,7 @@ class Jobs:
             self._changed(job)
 
     def _work(self, job: Job) -> None:
-        job.state = "running"
+        job.begin()
         self._changed(job)
         state, text = "failed", "the job exited without a result"
         try:
@@ -186,7 +226,8 @@ class Jobs:
             self._changed(job)
 
     def _take(self, job: Job, step: Step) -> None:
-        job.progress = step.progress
+        job.progress = now = step.progress
+        job.course.tell(now.seconds_left + (now.seconds_after or 0.0))
         if step.mapped is not None and job.surface is not None:
             job.mapped = step.mapped[: len(job.surface.vertices)]
             job.losses.append(step.progress.loss)

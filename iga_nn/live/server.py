@@ -1,11 +1,14 @@
 """Serves the live page through trame to this computer's browser alone: takes surfaces, runs jobs, gives out files.
 
-All open tabs share the list of jobs; each tab chooses which one it shows. The browser draws the pictures, so the server
+All open tabs share the list of jobs, which is gone when the server ends. Each tab keeps for itself which job it shows
+and what was typed into its forms, also when it is loaded again. The browser draws the pictures, so the server
 needs no graphics library for them.
 """
 
 import asyncio
 import logging
+import re
+import secrets
 import webbrowser
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import replace
@@ -30,7 +33,7 @@ from ..workflow.output_folder import has_checkpoint
 from . import form
 from . import worker as job_process
 from .queue import Job, Jobs
-from .state import CONTENT, MEGABYTE, colors, places, row, triangles
+from .state import CONTENT, MEGABYTE, colors, is_solvable, places, row, triangles
 from .worker import Message
 
 HOST = "127.0.0.1"  # the page is for this computer's user: there is no option for another one
@@ -38,6 +41,12 @@ POLICY = (  # the browser itself refuses to fetch anything from elsewhere; Vue c
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
     f"connect-src 'self' ws://{HOST}:* ws://localhost:* data: blob:; frame-ancestors 'self'"
 )
+
+TICK = 1.0  # seconds between two looks at a running job
+NUMBER = "{number:[1-9][0-9]{0,8}}"  # of a job, in a route: digits of ASCII
+LONGEST = 255  # bytes of a path that is asked for
+ARRAYS = ("polys", "colors", "points")  # of a job, that vtk.js draws
+ENDED = "trame_error_report_msg"  # trame's client sets it when the connection is lost
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -56,16 +65,20 @@ class Page:
     def run(self, say: Callable[[str], None], port: int, open_browser: bool) -> None:
         """Serve until interrupted; `say` is told the address."""
         server = self._server
-        server.state.update({"jobs": [], "current": 0, "shown": 0, "trame__title": "iga-nn"})
+        server.state.update({"jobs": [], "current": 0, "latest": 0, "trame__title": "iga-nn"})
+        server.state.update(
+            {"page": secrets.token_hex(8), "shown": 0, "paper": None, "webgl": True, "asked": 0, ENDED: ""}
+        )
         server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES), **form.described()})
-        server.state.client_only("shown")
-        for name, act in {"start": self.jobs.start, "stop": self.jobs.stop}.items():
+        server.state.client_only("shown", "paper", "webgl", "asked", ENDED)
+        for name, act in {"start": self.jobs.start, "stop": self.jobs.stop, "delete": self.jobs.delete}.items():
             server.trigger(name)(partial(self._act, act))
         self._lay_out()
         server.controller.on_server_bind.add(self._bind)
 
         def ready(**_: Any) -> None:
             self._loop = asyncio.get_running_loop()
+            self._loop.call_later(TICK, self._tick)
             address = f"http://{HOST}:{server.port}/"
             say(f"{address}\nopen this address in a browser; Ctrl-C ends the page and deletes its files")
             if open_browser:
@@ -87,6 +100,8 @@ class Page:
             client.Style("".join(sheet.read_text(encoding="utf-8") for sheet in sheets))
             client.Script((here / "app.js").read_text(encoding="utf-8"))
             layout.root.add_child((here / "app.html").read_text(encoding="utf-8"))
+        # What trame's client shows in place of the page when the server has ended: the page itself, so that it stays.
+        self._server.state["trame__template_error"] = layout.html
 
     # Jobs
 
@@ -106,12 +121,26 @@ class Page:
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._show, job)
 
+    def _tick(self) -> None:
+        """Let time pass in the rows of running jobs, now and then again."""
+        if self._loop is None:
+            return
+        self._loop.call_later(TICK, self._tick)
+        for job in self.jobs:
+            if job.state == "running":
+                self._show(job)
+
     def _show(self, changed: Job) -> None:
         with self._server.state as state:
             jobs = list(self.jobs)
-            state.jobs = [row(job, self.jobs.before(job)) for job in jobs]
-            state.current = next((job.number for job in jobs if job.state == "running"), jobs[-1].number)
-            self._draw(state, changed)
+            state.jobs = [row(job, self.jobs.before(job), self._poisson) for job in jobs]
+            state.latest = self.jobs.latest
+            running = [job.number for job in jobs if job.state == "running"]
+            state.current = max(running or [job.number for job in jobs], default=0)
+            if changed in jobs:
+                self._draw(state, changed)
+            elif self._drawn.pop(changed.number, None) is not None:
+                state.update({f"{name}_{changed.number}": None for name in ARRAYS})
 
     def _draw(self, state: Any, job: Job) -> None:
         """Send the surface, or where the training maps it, when there is something new."""
@@ -138,9 +167,9 @@ class Page:
             [
                 web.post("/upload", self._upload),
                 web.post("/sample/{name}", self._sample),
-                web.post("/solve/{number}", self._solve),
+                web.post(f"/solve/{NUMBER}", self._solve),
                 web.post("/paraview/", self._session),
-                web.get("/files/{number}/{name}", self._file),
+                web.get(f"/files/{NUMBER}/{{name}}", self._file),
             ]
         )
 
@@ -152,10 +181,13 @@ class Page:
         """Take a file as the body and answer with the number of its job, whether it is refused or not."""
         job = self.jobs.add(request.query.get("name", ""))
         announced = request.query.get("size", "")
-        size = int(announced) if announced.isdecimal() else 0
+        size = int(announced) if re.fullmatch("[0-9]{1,15}", announced) else 0
         try:
             if size <= self._limit:
-                size = await self._keep(request, job.path)
+                came = await self._keep(request, job.path)
+                if came < size:
+                    raise OSError(f"{came} of {size} bytes came")
+                size = came
         except (OSError, ClientError) as error:
             self.jobs.refuse(job, f"{job.name}: the upload was incomplete ({one_line(error)}): try again")
             return web.Response(text=str(job.number))
@@ -189,17 +221,20 @@ class Page:
     async def _solve(self, request: web.Request) -> web.Response:
         """Take the form of a problem, to be solved on a job's volume; answer with the new job's number."""
         job = self._named(request)
-        if job is None or not (job.state == "done" and job.volume.is_file()):
-            raise web.HTTPNotFound
+        if job is None or not is_solvable(job):
+            raise web.HTTPNotFound(text="there is no volume of this job to solve on")
         try:
             problem = form.stated(await request.post(), self._poisson)
         except InputError as error:
             raise web.HTTPBadRequest(text=one_line(error)) from None
-        return web.Response(text=str((await asyncio.to_thread(self.jobs.solve, job, problem)).number))
+        try:
+            made = await asyncio.to_thread(self.jobs.solve, job, problem)
+        except OSError as error:
+            raise web.HTTPNotFound(text=f"the volume cannot be copied: {one_line(error)}") from None
+        return web.Response(text=str(made.number))
 
     def _named(self, request: web.Request) -> Job | None:
-        number = request.match_info["number"]
-        return self.jobs.find(int(number)) if number.isdecimal() else None
+        return self.jobs.find(int(request.match_info["number"]))
 
     async def _file(self, request: web.Request) -> web.FileResponse:
         """Give out a result of a job; only names in CONTENT are."""
@@ -210,14 +245,21 @@ class Page:
 
 
 def _guard(port: Callable[[], int]) -> Any:
-    """Return a guard that answers this page alone: a page of another site could ask through the user's browser."""
+    """Return a guard that answers this page alone: a page of another site could ask through the user's browser.
+
+    A browser names the page that asks in `Origin`, but for plain reading. Whatever changes something must name it.
+    """
 
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
         own = {f"{name}:{port()}" for name in (HOST, "localhost")}
         origin = request.headers.get("Origin")
-        if request.host not in own or (origin is not None and origin.removeprefix("http://") not in own):
+        reads = request.method in ("GET", "HEAD") and request.path != "/ws"
+        asks = reads if origin is None else origin in {f"http://{name}" for name in own}
+        if request.host not in own or not asks:
             raise web.HTTPForbidden(text=f"this page answers at http://{HOST}:{port()}/ only")
+        if len(request.path.encode()) > LONGEST or "\0" in request.path:  # no file can be called that
+            raise web.HTTPNotFound
         if request.path == "/ws" and not web.WebSocketResponse().can_prepare(request):  # wslink would fail on it
             raise web.HTTPBadRequest(text="this address takes web sockets only")
         return await handler(request)

@@ -10,61 +10,93 @@ from scipy.spatial.transform import Rotation
 
 from parameterize.arrays import Array
 from parameterize.cube.cube import nearest_faces
+from parameterize.progress import Progress
 from parameterize.surface.surface import Surface
 
 from ..figures.evaluate import FACE_COLORS
+from ..options import PoissonOptions
 from ..report.artifacts import ARTIFACTS
 from ..workflow.output_folder import has_checkpoint
-from .queue import Job
+from . import form
+from .queue import DELETED, STARTS, Job
 
 MEGABYTE = 1 << 20
 STAGES = {
-    "S(2)": "1 of 6: to a round shape",
-    "S(1)": "2 of 6: to a rounded cube",
-    "cube": "3 of 6: to a cube",
-    "corners": "4 of 6: corners fixed",
-    "edges": "5 of 6: edges fixed",
-    "spline": "6 of 6: the spline",
+    "S(2)": "1 of 7: to a round shape",
+    "S(1)": "2 of 7: to a rounded cube",
+    "cube": "3 of 7: to a cube",
+    "corners": "4 of 7: corners fixed",
+    "edges": "5 of 7: edges fixed",
+    "spline": "6 of 7: the spline",
 }
+LAST = "7 of 7: solution and report"
 LABELS = {"checking": "being checked", "ready": "accepted"}  # the other states are called by their names
 CONTENT = {artifact.file: artifact.shows for artifact in ARTIFACTS}
 VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # shows three sides of the cube
+ENDED = ("done", "failed", "stopped")
 GREY = 190  # of 255
 EDGES_UP_TO = 3_000  # edges are drawn on surfaces of at most so many faces
 
 
-def row(job: Job, before: int) -> dict[str, Any]:
-    """Return what the page shows of a job, in JSON's own types. before: jobs ahead of it in the queue."""
+def row(job: Job, before: int, problem: PoissonOptions) -> dict[str, Any]:
+    """Return what the page shows of a job, in JSON's own types.
+
+    before: jobs ahead of it in the queue. problem: that of the page's options.
+    """
     said: dict[str, Any] = {
         "number": job.number,
         "name": job.name,
         "state": job.state,
         "label": LABELS.get(job.state, job.state) + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
+        "what": f"{form.in_words(job.problem)}; on the volume of {job.parent}" if job.problem else "",
         "text": job.text,
+        "starts": job.state in STARTS and not (job.problem and job.state == "failed"),  # that one would fail again
+        "deletes": job.state in DELETED,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",
         "resumable": has_checkpoint(job.results),
         "mapped": job.mapped is not None,
-        "solvable": job.state == "done" and job.volume.is_file(),
-        "files": _files(job) if job.state in ("done", "failed", "stopped") else [],
+        "files": _files(job) if job.state in ENDED else [],
     }
+    if is_solvable(job):
+        said["form"] = form.filled(job.problem or problem)
     if job.surface is not None:
         vertices, faces = len(job.surface.vertices), len(job.surface.faces)
         said["size"] = f"{vertices:,} vertices, {faces:,} faces"
         said["edges"] = faces <= EDGES_UP_TO
         said["notices"] = list(job.surface.notices)
     if job.progress is not None:
-        now = job.progress
-        minutes, seconds = divmod(round(max(0.0, now.seconds_left)), 60)
-        said["facts"] = [
-            ["Stage", STAGES.get(now.stage, now.stage), f"step {now.step} of {now.steps}"],
-            ["Time left", f"{minutes}:{seconds:02d}", "about" if now.stage == "spline" else "until the spline"],
-            ["Loss", f"{now.loss:.2e}", "minimised by the training"],
-            ["Folded samples", f"{now.folded:,}", "0 is the aim"],
-        ]
-        said["share"] = now.step / max(now.steps, 1)
+        said["facts"] = _facts(job, job.progress)
+        said["share"] = job.course.share
         said["curve"] = _curve(job.losses)
     return said
+
+
+def is_solvable(job: Job) -> bool:
+    """Return whether another problem can be solved on the job's volume."""
+    return job.state in ENDED and job.volume.is_file()
+
+
+def _facts(job: Job, now: Progress) -> list[list[str]]:
+    """Return what the page shows of a run: what each fact is, its value and a remark."""
+    is_spline = now.stage == "spline"
+    step = f"step {now.step}" if is_spline else f"step {now.step} of {now.steps}"  # how many it takes is not known
+    stage = [LAST, "the volume is made"] if job.is_mapped else [STAGES.get(now.stage, now.stage), step]
+    aim = "between them the proof decides" if is_spline else "0 is the aim"
+    facts = [
+        ["Stage", *stage],
+        ["Loss", f"{now.loss:.2e}", "minimised by the training"],
+        ["Folds at samples", f"{now.folded:,}", aim],
+    ]
+    if job.state == "running":
+        facts.insert(1, ["Time left", *_time_left(job.course.left)])
+    return facts
+
+
+def _time_left(seconds: float | None) -> list[str]:
+    if seconds is None:
+        return ["not known", "longer than usual"]
+    return ["{}:{:02d}".format(*divmod(math.ceil(seconds), 60)), "about, until the report"]
 
 
 def _files(job: Job) -> list[dict[str, Any]]:

@@ -64,11 +64,17 @@ EVERYWHERE = 3  # an unknown: the solution, whole on every process
 class Forecast:
     """Hold the cost of one start, the section `estimate` of report.json.
 
-    seconds: for an easy and for a hard surface. memory_mb: peak of the resident memory.
+    seconds: for an easy and for a hard surface. memory_mb: peak of the resident memory. after: of the seconds for an
+    easy surface, those after the training, and those after the spline.
     """
 
     seconds: tuple[float, float]
     memory_mb: float
+    after: tuple[float, float] = (0.0, 0.0)
+
+    def seconds_after(self, stage: str) -> float:
+        """Return how long a usual run takes after the training stages, or after the stage "spline"."""
+        return self.after[stage == "spline"]
 
     def __str__(self) -> str:
         low, high = self.seconds
@@ -98,14 +104,14 @@ def forecast(
     with one_thread_an_operation():  # as the run does: a helping thread keeps what it begins with
         one_pass = _pass_seconds(config, device, clock)
         product = _product_seconds(spline, clock) + CALLS * one_pass
-    once = FIT * product + (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
+    last = (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
     step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
-    low, high = sorted(
-        once
-        + training * TRAINING_STEP * points * one_pass
-        + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
-        for training, (rounds, steps) in zip(_training_steps(config), (EASY, HARD), strict=True)
-    )
+    fits = [
+        FIT * product + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
+        for rounds, steps in (EASY, HARD)
+    ]
+    trainings = [count * TRAINING_STEP * points * one_pass for count in _training_steps(config)]
+    low, high = sorted(training + fit + last for training, fit in zip(trainings, fits, strict=True))
     most = spline.control_points
     if config.refinement is not None:  # it may end with the first spline, or go on to its limit
         most = config.refinement.max_control_points
@@ -114,7 +120,8 @@ def forecast(
         high += sum(growths) * rounds * (min(steps, spline.steps) * step + CERTIFICATE * product)
     activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
     mapped = PER_CONTROL_POINT * most**3 + PER_VERTEX * vertices
-    return Forecast((low, high), LIBRARIES + FIGURES + max(activations, mapped, PER_UNKNOWN * unknowns))
+    memory = LIBRARIES + FIGURES + max(activations, mapped, PER_UNKNOWN * unknowns)
+    return Forecast((low, high), memory, (fits[0] + last, last))
 
 
 def _training_steps(config: Config) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ import numpy as np
 from parameterize.arrays import Array, IntArray
 from parameterize.compilation import compilation_told
 from parameterize.files import save_arrays
-from parameterize.progress import ProgressCallback
+from parameterize.progress import Progress, ProgressCallback
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_normals
 from parameterize.surface.surface import Surface
@@ -204,6 +204,10 @@ def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None
     from parameterize.cube.edge_paths import PathError
     from parameterize.run import parameterize
 
+    def tell(now: Progress) -> None:
+        if progress is not None:
+            progress(replace(now, seconds_after=given.expected.seconds_after(now.stage)))
+
     try:
         return parameterize(
             given.surface,
@@ -211,7 +215,7 @@ def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None
             seed=options.seed,
             device=options.device,
             corners=given.corners,
-            progress=progress,
+            progress=tell,
             checkpoint_dir=checkpoint,
             resume=options.resume,
         )
