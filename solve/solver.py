@@ -61,7 +61,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     estimate : bool, optional
         Of the error from the residual; by default where the problem has no exact solution.
     strict : bool
-        Raise ConvergenceError where the linear solver fails; otherwise `report.converged` is False.
+        Raise ConvergenceError where the linear solver fails; otherwise `report.converged` is False. A solver that fails
+        before its first iteration has no solution to return, and raises it in any case.
 
     Returns
     -------
@@ -76,6 +77,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
         Where the data are not finite or have the wrong sign.
     TypeError
         For what is no problem or no volume.
+    ConvergenceError
+        As `strict` says.
 
     Examples
     --------

@@ -15,7 +15,7 @@ from threadpoolctl import ThreadpoolController
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .diagnostics import ConvergenceError, judge, solve_notices
+from .diagnostics import ConvergenceError, failure, judge, map_notices
 from .discretization.boundary import boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_estimate, error_norms, missing_mean
 from .discretization.operator import FormOperator, Operator, assemble
@@ -187,7 +187,7 @@ class System:
         """Solve, and return the solution with its errors and notices.
 
         how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`.
-        Raises ConvergenceError where the linear solver fails and `strict` is asked for.
+        Raises ConvergenceError where the linear solver fails before its first iteration, else only for `strict`.
         """
         options = SolverOptions(**how)
         check_device(options.device, self.problem)
@@ -196,7 +196,7 @@ class System:
         for notice in solution.report.notices if self.space.comm.rank == 0 else ():
             log.warning("%s", notice)
         if options.strict and not solution.report.converged:
-            raise ConvergenceError(solution)
+            raise ConvergenceError(solution.report.notices[-1], solution)
         return solution
 
     def _solve(self, options: SolverOptions) -> Solution:
@@ -204,6 +204,9 @@ class System:
         dofs = len(self.known) * space.dofs
         clock, sent = [time.process_time()], space.traffic()
         result = self._iterate(options)
+        failed = failure(volume, space, result)
+        if failed and result.iterations == 0:  # there is the start alone
+            raise ConvergenceError(failed)
         steps = result.iterations + (options.start is not None)  # products made
         traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in space.traffic().items() if steps}
         full = self._filled(result.x)
@@ -217,7 +220,7 @@ class System:
             estimate = error_estimate(volume, space, full, problem)
         clock.append(time.process_time())
         doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
-        failed = solve_notices(volume, self.matrix, options.certified, result)
+        of_map = map_notices(self.matrix, options.certified, [block.weakness for block in self.blocks])
         report = SolveReport(
             elements=space.elements,
             dofs=dofs,
@@ -228,7 +231,7 @@ class System:
             seconds={"setup": self.setup, "solve": clock[1] - clock[0], "errors": clock[2] - clock[1]},
             errors=errors,
             estimate=estimate,
-            notices=(*doubtful, *failed),
+            notices=(*doubtful, *of_map, *([failed] if failed else [])),
             meaningful=meaningful,
             residuals=result.residuals,
             traffic=traffic,
