@@ -29,9 +29,7 @@ ROUNDING = 1e-13  # share of the size by which a formula must vary
 AGREEMENT = 1e-6  # share of the size by which data may differ from those of `exact`
 LARGEST_ERROR = 0.5  # relative L2: beyond it more of the solution is wrong than right
 DECISIVE = ("exact", "source", "boundary")  # without these nothing is solved
-INDEFINITE_REMEDY = (
-    ", as with a negative reaction; in a law of one's own, set `symmetric = False`, and GMRES solves it"
-)
+INDEFINITE_REMEDY = ", as with a negative reaction; in a law of one's own, set `symmetric = False`, and GMRES solves it"
 EXTREME_REMEDY = ": the numbers of the law or of the map lie too far apart; scale them, or smooth their jumps"
 TWO_PROBLEMS = "the errors compare the solutions of two problems"
 

@@ -69,7 +69,7 @@ def each_level(volume: BSplineVolume, equation: Equation, options: ProblemOption
 
 @contextmanager
 def reported(state: RunFolder, volume: BSplineVolume) -> Iterator[None]:
-    """Say in the report that the block refused the problem or could not begin to solve it, and write the page of what is known without it."""
+    """Say in the report why the block did not solve the problem, and write the page of what is known without it."""
     try:
         yield
     except (InputError, ConvergenceError) as error:

@@ -28,6 +28,7 @@ PIVOT = 0.01  # least share of the diagonal that a pivot has
 SHIFTS = (0.0, *(0.01 * 2.0**k for k in range(8)))  # what the diagonal grows by, in turn, as a share of itself
 HIGHEST = 3  # degree: of degree 4 the iterations saved just pay for the factors, of degree 5 they become more
 
+
 @dataclass(frozen=True, eq=False)
 class IncompleteCholesky:
     """Solves L L^T x = r on the nodes of a grid.
