@@ -31,9 +31,10 @@ def input_errors() -> Iterator[None]:
 def expected_errors() -> tuple[type[Exception], ...]:
     """Return the exceptions that end a command with one line instead of a traceback."""
     from parameterize.surface.errors import MeshError
+    from solve.diagnostics import ConvergenceError
     from solve.forms.parser import ExpressionError
 
-    return InputError, MeshError, ExpressionError, OSError
+    return InputError, MeshError, ExpressionError, ConvergenceError, OSError
 
 
 def one_line(error: BaseException) -> str:

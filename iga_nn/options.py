@@ -199,14 +199,16 @@ class ElasticityOptions(ProblemOptions):
     """State linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
 
     A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
-    or X, Y, Z (scaled to volume 1 about the middle), separated by semicolons, in quotes: "x*y;0;sin(z)".
+    or X, Y, Z (scaled to volume 1 about the middle), separated by semicolons, in quotes: "x*y;0;sin(z)"; 0 is the zero
+    vector.
 
     Attributes:
         exact: exact displacement, a vector, from which force and boundary data follow; errors are reported. One that
             starts with a minus is written --exact="-x;0;0".
-        body_force: force per volume, a vector.
+        body_force: force per volume, a vector; zero where neither it nor exact is given.
         displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
-        traction: faces where a traction is given, each as "FACE=VECTOR", or FACE for that of the exact solution.
+        traction: faces where a traction is given, each as "FACE=VECTOR", FACE=0 for a face that is free, or FACE for
+            that of the exact solution.
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
 
@@ -230,8 +232,8 @@ class ElasticityOptions(ProblemOptions):
         from solve import Elasticity
 
         check_space(self.refine, self.degree)
-        if self.exact is None and self.body_force is None:
-            raise InputError("no force is given: --body-force '0;0;-1', '0;0;0' for none, or the solution as --exact")
+        if self.exact is None and self.body_force is None and self.displacement is None and not self.traction:
+            raise InputError("no load is given: --traction 'u1=0;0;-1', --body-force '0;0;-1' or --displacement")
         traction = _faces("traction", self.traction)
         with input_errors():
             return Elasticity(
@@ -404,10 +406,11 @@ def _faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
 
 
 def _vector(flag: str, text: str | None) -> list[str] | None:
-    """Return the formulas of a vector. Raises InputError where they are not three."""
+    """Return the formulas of a vector; "0" is the zero vector. Raises InputError where they are not three."""
     if text is None:
         return None
-    entries = text.split(";")
+    entries = ["0"] * 3 if text.strip() == "0" else text.split(";")
     if len(entries) != 3:
-        raise InputError(f"{flag} {text!r:.80}: write three formulas with semicolons between them, such as '0;0;-1'")
+        form = "write three formulas with semicolons between them, such as '0;0;-1', or 0 for none"
+        raise InputError(f"{flag} {text!r:.80}: {form}")
     return entries

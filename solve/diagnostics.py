@@ -1,6 +1,6 @@
 """When the numbers of a solve are not to be trusted: what is said of data, map, mesh and linear solver."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from .field import Points
 from .forms.data import in_scaled
 from .forms.parser import Expression, ExpressionError
 from .forms.problem import BoundaryValueProblem
-from .linear.krylov import LinearResult
+from .linear.krylov import INDEFINITE, LinearResult
 from .solution import Solution
 
 # Parameters per direction: the ends, and between them places without a pattern that a periodic formula could share.
@@ -30,11 +30,13 @@ ROUNDING = 1e-13  # share of the size by which a formula must vary
 AGREEMENT = 1e-6  # share of the size by which data may differ from those of `exact`
 LARGEST_ERROR = 0.5  # relative L2: beyond it more of the solution is wrong than right
 DECISIVE = ("exact", "source", "boundary")  # without these nothing is solved
+INDEFINITE_REMEDY = ", as with a negative reaction; in a law of one's own, set `symmetric = False`, and GMRES solves it"
+EXTREME_REMEDY = ": the numbers of the law or of the map lie too far apart; scale them, or smooth their jumps"
 TWO_PROBLEMS = "the errors compare the solutions of two problems"
 
 
 class ConvergenceError(RuntimeError):
-    """The linear solver did not reach its tolerance; the last iterate is `solution`.
+    """The linear solver did not reach its tolerance; the last iterate is `solution`, None where not one was made.
 
     Examples
     --------
@@ -46,8 +48,8 @@ class ConvergenceError(RuntimeError):
     1
     """
 
-    def __init__(self, solution: Solution) -> None:
-        super().__init__(solution.report.notices[-1])
+    def __init__(self, message: str, solution: Solution | None = None) -> None:
+        super().__init__(message)
         self.solution = solution
 
 
@@ -179,8 +181,13 @@ def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:
     return bool(np.abs(given - derived).max() <= AGREEMENT * size)
 
 
-def solve_notices(volume: BSplineVolume, matrix: MatrixFree, certified: str | None, result: LinearResult) -> list[str]:
-    """Return what is to be said of map and linear solver; the last line is that of a solver that did not converge."""
+def map_notices(
+    volume: BSplineVolume, matrix: MatrixFree, certified: str | None, weaknesses: Iterable[str]
+) -> list[str]:
+    """Return what is to be said of the map, and of a preconditioner that lacks a part.
+
+    weaknesses: of the preconditioner of each component.
+    """
     notices = []
     if certified not in (None, "certified"):
         notices.append(f"the map is {certified}, not certified: do not trust the solution")
@@ -188,24 +195,27 @@ def solve_notices(volume: BSplineVolume, matrix: MatrixFree, certified: str | No
         points = matrix.space.total(int(np.prod(matrix.rule.shape)))
         wrong = "det J < 0" if orientation(volume) > 0 else "the map is left-handed, and det J > 0"
         notices.append(f"{wrong} at {matrix.folded} of {points} Gauss points: solved with |det J| instead")
-    if result.indefinite:
-        notices.append(
-            f"no convergence: after {result.iterations} iterations the matrix turned out not to be positive definite, "
-            "as with a negative reaction; in a law of one's own, set `symmetric = False`, and GMRES solves it"
-        )
-    elif not result.converged:
-        parameters, point, scaled = worst_place(volume, matrix.space)
-        cube, where = (
-            ", ".join(f"{axis}={value:.4g}" for axis, value in zip(axes, place, strict=True))
-            for axes, place in ((AXES, parameters), ("xyz", point))
-        )
-        residuals = result.residuals
-        notices.append(
-            f"no convergence: residual {residuals[0]:.1e} at the start, {residuals[-1]:.1e} after {result.iterations} "
-            f"iterations (lowest {min(residuals):.1e}); the map is worst at {cube} ({where}): "
-            f"scaled Jacobian {scaled:.2g}"
-        )
-    return notices
+    return notices + [f"more iterations than usual: {text}" for text in dict.fromkeys(weaknesses) if text]
+
+
+def failure(volume: BSplineVolume, space: TrialSpace, result: LinearResult) -> str:
+    """Return why the linear solver did not converge, and where to look, in one line; "" where it did."""
+    if result.converged:
+        return ""
+    if result.breakdown:
+        said = f"no convergence: after {result.iterations} iterations {result.breakdown}"
+        return said + (INDEFINITE_REMEDY if result.breakdown == INDEFINITE else EXTREME_REMEDY)
+    parameters, point, scaled = worst_place(volume, space)
+    cube, where = (
+        ", ".join(f"{axis}={value:.4g}" for axis, value in zip(axes, place, strict=True))
+        for axes, place in ((AXES, parameters), ("xyz", point))
+    )
+    residuals = result.residuals
+    return (
+        f"no convergence: residual {residuals[0]:.1e} at the start, {residuals[-1]:.1e} after {result.iterations} "
+        f"iterations (lowest {min(residuals):.1e}); the map is worst at {cube} ({where}): "
+        f"scaled Jacobian {scaled:.2g}"
+    )
 
 
 def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array, float]:

@@ -60,7 +60,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     estimate : bool, optional
         Of the error from the residual; by default where the problem has no exact solution.
     strict : bool
-        Raise ConvergenceError where the linear solver fails; otherwise `report.converged` is False.
+        Raise ConvergenceError where the linear solver fails; otherwise `report.converged` is False. A solver that fails
+        before its first iteration has no solution to return, and raises it in any case.
 
     Returns
     -------
@@ -75,6 +76,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
         Where the data are not finite or have the wrong sign.
     TypeError
         For what is no problem or no volume, and for an option that there is not.
+    ConvergenceError
+        As `strict` says.
 
     Examples
     --------

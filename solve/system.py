@@ -15,7 +15,7 @@ from threadpoolctl import ThreadpoolController
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .diagnostics import ConvergenceError, judge, solve_notices
+from .diagnostics import ConvergenceError, failure, judge, map_notices
 from .discretization.boundary import boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_norms, missing_mean
 from .discretization.estimate import error_estimate
@@ -189,7 +189,7 @@ class System:
         """Solve, and return the solution with its errors and notices.
 
         how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`.
-        Raises ConvergenceError where the linear solver fails and `strict` is asked for.
+        Raises ConvergenceError where the linear solver fails before its first iteration, else only for `strict`.
         """
         options = SolverOptions(**how)
         check_device(options.device, self.problem)
@@ -198,7 +198,7 @@ class System:
         for notice in solution.report.notices if self.space.comm.rank == 0 else ():
             log.warning("%s", notice)
         if options.strict and not solution.report.converged:
-            raise ConvergenceError(solution)
+            raise ConvergenceError(solution.report.notices[-1], solution)
         return solution
 
     def _solve(self, options: SolverOptions) -> Solution:
@@ -206,6 +206,9 @@ class System:
         dofs = len(self.known) * space.dofs
         clock, sent = [time.process_time()], space.traffic()
         result = self._iterate(options)
+        failed = failure(volume, space, result)
+        if failed and result.iterations == 0:  # there is the start alone
+            raise ConvergenceError(failed)
         steps = result.iterations + (options.start is not None)  # products made
         traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in space.traffic().items() if steps}
         full = self._filled(result.x)
@@ -223,7 +226,7 @@ class System:
         doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
         if not has_norm:
             doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
-        failed = solve_notices(volume, self.matrix, options.certified, result)
+        of_map = map_notices(volume, self.matrix, options.certified, [block.weakness for block in self.blocks])
         report = SolveReport(
             elements=space.elements,
             dofs=dofs,
@@ -234,7 +237,7 @@ class System:
             seconds={"setup": self.setup, "solve": clock[1] - clock[0], "errors": clock[2] - clock[1]},
             errors=errors,
             estimate=estimate,
-            notices=(*doubtful, *failed),
+            notices=(*doubtful, *of_map, *([failed] if failed else [])),
             meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,

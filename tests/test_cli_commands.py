@@ -205,6 +205,26 @@ def test_elasticity_under_a_body_force(in_folder):
     assert "--body-force" in Path("map/report.html").read_text()
 
 
+def test_a_traction_needs_no_body_force_and_0_is_a_free_face(in_folder):
+    benchmark_volume(2).save("map.npz")
+    loads = ["u1=0;0;-2", "v0=0", "v1=0", "w0=0", "w1=0"]
+    long = [load.replace("=0", "=0;0;0") if load.endswith("=0") else load for load in loads]
+    for out, body in (("a", ["--traction", *loads]), ("b", ["--traction", *long, "--body-force", "0;0;0"])):
+        assert main(["solve", "elasticity", "map.npz", *body, "--refine", "0", "--out", out, "--quiet"]) == 0
+    with np.load("a/solution.npz") as one, np.load("b/solution.npz") as other:
+        assert np.array_equal(one["coefficients"], other["coefficients"]) and one["coefficients"].any()
+
+
+def test_a_solver_that_cannot_begin_writes_no_solution(in_folder, monkeypatch, capsys):
+    benchmark_volume(2).save("map.npz")
+    monkeypatch.setattr("solve.linear.preconditioner.FastDiagonalization.__call__", lambda _, r: r * np.nan)
+    assert main(["solve", "elasticity", "map.npz", "--traction", "u1=0;0;-2", "--refine", "0", "--quiet"]) == 4
+    assert "does not give finite numbers" in capsys.readouterr().err
+    assert not Path("map/solution.npz").exists()
+    report = json.loads(Path("map/report.json").read_text())
+    assert "no convergence" in report["not_solved"] and "elasticity" not in report
+
+
 def test_run_elasticity_and_the_faces_by_name(formula_training, in_folder, capsys):
     formula_training()
     body = ["--body-force", "0;0;-1", "--traction", "u1=0;0;0", "v0=0;0;0", "--refine", "0"]
@@ -333,7 +353,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["study", "good.npz", "--degree", "2", "2"], "distinct degrees"),
         (["study", "good.npz", "--exact", "-x"], "--exact=-x"),
         (["study", "missing.npz"], "missing.npz"),
-        (["solve", "elasticity", "good.npz"], "no force is given: --body-force"),
+        (["solve", "elasticity", "good.npz"], "no load is given: --traction"),
         (["solve", "elasticity", "good.npz", "--exact", "x;y"], "--exact 'x;y': write three formulas"),
         (["solve", "elasticity", "good.npz", "--body-force", "1"], "--body-force '1': write three formulas"),
         (["solve", "elasticity", "good.npz", "--exact", "x;y;z", "--poisson-ratio", "0.5"], "poisson_ratio"),

@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from solve.linear.krylov import conjugate_gradients, generalized_residuals
+from solve.linear.krylov import (
+    INDEFINITE,
+    NO_DIRECTION,
+    NO_PRODUCT,
+    conjugate_gradients,
+    generalized_residuals,
+)
 
 
 def identity(r):
@@ -48,12 +54,55 @@ def test_zero_right_hand_side_needs_no_iteration():
     assert result.iterations == 0
 
 
-@pytest.mark.parametrize("value", [-1.0, 0.0, np.nan])
-def test_stops_where_the_matrix_is_not_positive(value):
-    result = conjugate_gradients(lambda p: value * p, np.ones(4), identity)
-    assert not result.converged
-    assert result.iterations == 0 and result.indefinite == (value < 0.0)
+@pytest.mark.parametrize(
+    ("matrix", "inverse", "breakdown"),
+    [
+        (-1.0, 1.0, INDEFINITE),
+        (0.0, 1.0, INDEFINITE),
+        (1.0, -1.0, INDEFINITE),
+        (np.nan, 1.0, NO_PRODUCT),
+        (np.inf, 1.0, NO_PRODUCT),
+        (1.0, np.nan, NO_DIRECTION),
+        (1.0, np.inf, NO_DIRECTION),
+        (1.0, 0.0, NO_DIRECTION),
+    ],
+)
+def test_what_breaks_down_is_named(matrix, inverse, breakdown):
+    result = conjugate_gradients(lambda p: matrix * p, np.ones(4), lambda r: inverse * r)
+    assert not result.converged and result.iterations == 0
+    assert result.breakdown == breakdown
     assert np.all(result.x == 0.0)
+
+
+@pytest.mark.parametrize("method", [conjugate_gradients, generalized_residuals])
+def test_a_right_hand_side_or_a_start_that_is_not_finite_is_named(method):
+    b = np.ones((2, 2))
+    for result in (method(np.copy, b * np.nan, np.copy), method(np.copy, b, np.copy, start=b * np.nan)):
+        assert not result.converged and result.iterations == 0 and result.breakdown == NO_PRODUCT
+
+
+@pytest.mark.parametrize(
+    ("matrix", "inverse", "breakdown"), [(np.nan, 1.0, NO_PRODUCT), (1.0, np.nan, NO_DIRECTION), (1.0, 1.0, "")]
+)
+def test_what_breaks_gmres_down_is_named(matrix, inverse, breakdown):
+    result = generalized_residuals(lambda x: matrix * x, np.ones((2, 2)), lambda r: inverse * r)
+    assert result.breakdown == breakdown and result.converged == (not breakdown)
+    assert np.array_equal(result.x, np.full((2, 2), 0.0 if breakdown else 1.0))
+
+
+def test_gmres_that_breaks_down_keeps_what_it_had(case, monkeypatch):
+    monkeypatch.setattr("solve.linear.krylov.RESTART", 5)
+    matrix, _, b = case
+    products = []
+
+    def operator(x):
+        products.append(x)
+        return (matrix @ x.ravel()).reshape(b.shape) * (np.nan if len(products) > 9 else 1.0)
+
+    result = generalized_residuals(operator, b, np.copy, tolerance=1e-12)
+    left = np.linalg.norm(b.ravel() - matrix @ result.x.ravel()) / np.linalg.norm(b)
+    assert result.breakdown == NO_PRODUCT and not result.converged and result.iterations == 5
+    assert result.residuals[-1] == pytest.approx(left, rel=1e-6) and left < 1.0
 
 
 def test_starts_where_it_is_told_to():

@@ -6,10 +6,10 @@ from volumes import scalar_system
 
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
-from solve import Poisson, solve_problem
+from solve import ConvergenceError, Elasticity, Poisson, discretize, solve_problem
 from solve.discretization.boundary import face_rule
 from solve.linear.krylov import conjugate_gradients
-from solve.linear.preconditioner import fast_diagonalization
+from solve.linear.preconditioner import NO_FACTORS, fast_diagonalization
 from solve.study import benchmark_volume
 
 
@@ -93,3 +93,32 @@ def test_robin_faces_enter_the_preconditioner_exactly_on_the_cube():
     operator = replace(operator, robin={"w1": replace(face, measure=5.0 * face.measure)})
     x = np.random.default_rng(1).standard_normal((7, 6, 7))
     assert np.allclose(fast_diagonalization(operator)(operator.apply_free(x)), x, atol=1e-10)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_the_diagonal_takes_the_place_of_what_is_not_finite(bad, monkeypatch):
+    operator, usual = build(benchmark_volume(4))
+    assert usual.weakness == ""
+    monkeypatch.setattr("solve.linear.preconditioner._eigh", lambda k, m: (np.full(len(k), bad), np.full_like(k, bad)))
+    preconditioner = fast_diagonalization(operator)
+    assert preconditioner.weakness == NO_FACTORS
+    unit = np.zeros((5, 5, 5))
+    unit[2, 1, 3] = 1.0
+    entry = operator.apply_free(unit)[2, 1, 3]
+    assert np.allclose(preconditioner(unit), unit / entry)
+    assert conjugate_gradients(operator.apply_free, unit, preconditioner).converged
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_preconditioner_without_finite_numbers_is_never_a_solution(monkeypatch):
+    def broken(operator):
+        found = fast_diagonalization(operator)
+        return replace(found, inverse=np.nan * found.inverse)
+
+    monkeypatch.setattr("solve.system.fast_diagonalization", broken)
+    for problem in (Poisson(source="1", boundary="0"), Elasticity(force=("0", "0", "-1"))):
+        with pytest.raises(
+            ConvergenceError, match="after 0 iterations the preconditioner does not give finite"
+        ) as error:
+            discretize(benchmark_volume(2), problem, threads=1).solve()
+        assert error.value.solution is None

@@ -1,11 +1,14 @@
+from itertools import combinations
+
 import numpy as np
 import pytest
 from volumes import mapped, scalar_system
 
 from parameterize.spline.volume import FACE_NAMES
+from solve import Elasticity, discretize
 from solve.linear.krylov import conjugate_gradients
-from solve.linear.preconditioner import fast_diagonalization
-from solve.linear.shear import OFFSETS, _stencils, helps, incomplete_cholesky
+from solve.linear.preconditioner import NO_FACTOR, fast_diagonalization
+from solve.linear.shear import OFFSETS, SHIFTS, _factorize, _stencils, helps, incomplete_cholesky
 from solve.study import benchmark_volume
 
 
@@ -68,3 +71,45 @@ def test_symmetric_and_positive():
     a, b = np.random.default_rng(2).standard_normal((2, *preconditioner.inverse.shape))
     assert np.vdot(a, preconditioner(b)) == pytest.approx(np.vdot(b, preconditioner(a)), rel=1e-10)
     assert np.vdot(a, preconditioner(a)) > 0.0
+
+
+def kershaw(shift):
+    """Kershaw's matrix, positive definite, without an incomplete factor: its pivots are 3, 5/3, 3/5 and -5."""
+    lower, steps, places = np.zeros((4, 14)), np.zeros(14, dtype=int), np.full((13, 13), -1)
+    lower[:, 13], steps[:2] = 3.0, (-3, -1)
+    lower[3, 0], lower[1:, 1] = 2.0, -2.0
+    return _factorize(lower, 0, steps, places, shift), lower
+
+
+def test_a_pivot_below_zero_is_noticed_and_a_shift_lifts_it():
+    succeeded, factor = kershaw(0.0)
+    assert not succeeded
+    assert np.allclose(factor[:3, 13], [3.0**-0.5, 0.6**0.5, (5 / 3) ** 0.5])
+    succeeded, factor = kershaw(1.0)
+    assert succeeded and np.isfinite(factor).all() and (factor[:, 13] > 0.0).all()
+    assert kershaw(SHIFTS[-1])[0]
+
+
+@pytest.mark.parametrize("count", range(1, 6))
+def test_the_factor_is_finite_whatever_faces_are_free(count):
+    """Without a shift most factors of this map have no positive pivots, and some get numbers that are not finite."""
+    body = mapped(lambda u, v, w: (u + 3.0 * v * v + 3.0 * w, v + 4.0 * w * w, 0.2 * w), (7, 7, 7))
+    for free in combinations(FACE_NAMES, count):
+        load = Elasticity(force=("0", "0", "-1"), traction=dict.fromkeys(free, ("0", "0", "0")))
+        for block in discretize(body, load, threads=1).blocks:
+            assert block.local is not None and not block.weakness
+            residual = np.random.default_rng(3).standard_normal(block.scaling.shape)
+            found = block(residual)
+            assert np.isfinite(found).all() and np.vdot(residual, found) > 0.0
+
+
+def test_a_factor_that_gives_no_finite_numbers_is_left_out(monkeypatch):
+    operator = scalar_system(sheared(3.0))[0]
+    broken = incomplete_cholesky(operator)
+    broken.factor[:] = np.nan
+    for found in (broken, None):
+        monkeypatch.setattr("solve.linear.preconditioner.incomplete_cholesky", lambda _, found=found: found)
+        preconditioner = fast_diagonalization(operator)
+        assert preconditioner.local is None and preconditioner.weakness == NO_FACTOR
+        b = np.random.default_rng(1).standard_normal(free_shape(operator))
+        assert conjugate_gradients(operator.apply_free, b, preconditioner).converged

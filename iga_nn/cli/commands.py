@@ -30,7 +30,7 @@ from ..options import (
     WorkerOptions,
 )
 from ..version import __version__
-from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED
+from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED, NOT_SOLVED
 from .progress import shown_batch, shown_progress
 
 if TYPE_CHECKING:
@@ -363,8 +363,10 @@ def main(argv: list[str]) -> int:
         print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
     except expected_errors() + (CycloptsError,) as error:
+        from solve import ConvergenceError
+
         print(f"iga-nn: {_refusal(error, argv)}", file=sys.stderr)
-        return BAD_INPUT
+        return NOT_SOLVED if isinstance(error, ConvergenceError) else BAD_INPUT
     return code if isinstance(code, int) else DONE  # a command that only writes a file returns nothing
 
 

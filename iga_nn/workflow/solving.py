@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.spline.volume import BSplineVolume
-from solve import ConvergenceRow, Solution, SolveReport, rates, solve_problem
+from solve import ConvergenceError, ConvergenceRow, Solution, SolveReport, rates, solve_problem
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
@@ -69,10 +69,10 @@ def each_level(volume: BSplineVolume, equation: Equation, options: ProblemOption
 
 @contextmanager
 def reported(state: RunFolder, volume: BSplineVolume) -> Iterator[None]:
-    """Say in the report that the block refused the problem, and write the page of what is known without it."""
+    """Say in the report why the block did not solve the problem, and write the page of what is known without it."""
     try:
         yield
-    except InputError as error:
+    except (InputError, ConvergenceError) as error:
         state.write(not_solved=one_line(error))
         known = reports.plain(state.report | {"seconds": state.seconds})
         html.write(state.folder, known, scene_of(state, volume))

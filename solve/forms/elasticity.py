@@ -15,6 +15,8 @@ from .data import LARGEST, SMALLEST, Data
 from .form import Quantity
 from .problem import LawWithData, Natural
 
+NONE = ("0", "0", "0")  # of a vector
+
 
 @dataclass(frozen=True)
 class Elasticity(LawWithData):
@@ -29,7 +31,8 @@ class Elasticity(LawWithData):
         The displacement u, where it is known. As formulas it gives force and boundary data, and the report's errors;
         functions need them beside it, and leave the H1 seminorm out.
     force : three entries, optional
-        f, per volume; overrides what follows from `exact`.
+        f, per volume; overrides what follows from `exact`, and is zero without it where `displacement` or `traction`
+        are given.
     displacement : three entries, optional
         Values of u on the faces that are not in `traction`; default: `exact`, or zero.
     traction : dict of face name to three entries or None
@@ -73,7 +76,9 @@ class Elasticity(LawWithData):
             )
         if not (isinstance(self.poisson_ratio, Real) and -1.0 < self.poisson_ratio < 0.5):
             raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {self.poisson_ratio!r:.80}")
-        self._set({"exact": self.exact, "source": self.force, "boundary": self.displacement}, self.traction, {})
+        is_loaded = self.displacement is not None or bool(self.traction)
+        force = NONE if self.force is None and self.exact is None and is_loaded else self.force
+        self._set({"exact": self.exact, "source": force, "boundary": self.displacement}, self.traction, {})
         if not self.dirichlet:
             raise ValueError("traction on all six faces leaves the body free to move: leave one face to displacement")
 

@@ -10,6 +10,9 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from parameterize.arrays import Array
 
+INDEFINITE = "the matrix is not positive definite"
+NO_DIRECTION = "the preconditioner does not give finite numbers"
+NO_PRODUCT = "the matrix, or the right-hand side, does not give finite numbers"
 RESTART = 60  # iterations of GMRES between restarts: as many vectors are kept
 Vector = Any  # a NumPy array or a torch tensor: anything with their arithmetic, `reshape` and `@`
 
@@ -18,13 +21,13 @@ Vector = Any  # a NumPy array or a torch tensor: anything with their arithmetic,
 class LinearResult:
     """The last iterate, and |r| / |b| before the first and after every iteration.
 
-    indefinite: whether a direction has shown that the matrix, or the preconditioner, is not positive definite.
+    breakdown: why the iteration could not go on; "" where it could.
     """
 
     x: Vector
     residuals: tuple[float, ...]
     converged: bool
-    indefinite: bool = False
+    breakdown: str = ""
 
     @property
     def iterations(self) -> int:
@@ -47,7 +50,8 @@ def conjugate_gradients(
 
     b: an array or a tensor of any shape; the operator's answers are overwritten. total: the sum of a number over all
         processes, where each has a part of the vectors.
-    Stops without convergence after `max_iterations`, or as soon as a direction shows that A is not positive definite.
+    Stops without convergence after `max_iterations`, or as soon as a direction is not finite, or shows that A is not
+    positive definite.
     """
 
     def dot(one: Vector, other: Vector) -> float:
@@ -61,6 +65,8 @@ def conjugate_gradients(
         x += start
         r -= operator(x)
     residuals = [math.sqrt(dot(r, r)) / norm_b]
+    if not math.isfinite(residuals[0]):
+        return LinearResult(x, tuple(residuals), False, NO_PRODUCT)
     rz_old = 1.0
     while residuals[-1] > tolerance and len(residuals) <= max_iterations:
         z = preconditioner(r)
@@ -69,8 +75,8 @@ def conjugate_gradients(
         p += z
         product = operator(p)
         curvature = dot(p, product)
-        if not (rz > 0.0 and curvature > 0.0):  # NaN included
-            return LinearResult(x, tuple(residuals), False, rz < 0.0 or curvature < 0.0)
+        if fault := _fault(rz, curvature):
+            return LinearResult(x, tuple(residuals), False, fault)
         step = rz / curvature
         x += step * p
         product *= step
@@ -78,6 +84,19 @@ def conjugate_gradients(
         rz_old = rz
         residuals.append(math.sqrt(dot(r, r)) / norm_b)
     return LinearResult(x, tuple(residuals), residuals[-1] <= tolerance)
+
+
+def _fault(rz: float, curvature: float) -> str:
+    """Return what is wrong where r.z, or the curvature p.Ap of the direction that follows from z, is not positive."""
+    if not math.isfinite(rz) or rz == 0.0:  # r is neither
+        return NO_DIRECTION
+    if not math.isfinite(curvature):
+        return NO_PRODUCT
+    return "" if rz > 0.0 and curvature > 0.0 else INDEFINITE
+
+
+class _Breakdown(ArithmeticError):
+    """A product whose numbers are not finite; the message says whose."""
 
 
 def generalized_residuals(
@@ -98,23 +117,39 @@ def generalized_residuals(
     x = np.zeros(b.shape) if start is None else start.copy()
     rest = b if start is None else b - operator(x)
     size = float(np.linalg.norm(rest)) / norm
-    residuals, y, left = [size], np.zeros(b.size), max_iterations
-    matrix = LinearOperator(
-        (b.size, b.size), matvec=lambda y: operator(preconditioner(y.reshape(b.shape))).ravel(), dtype=np.float64
-    )
-    while left > 0 and residuals[-1] > tolerance:
-        y, _ = gmres(
-            matrix,
-            rest.ravel(),
-            x0=y,
-            rtol=0.0,
-            atol=tolerance * norm,
-            restart=min(RESTART, left),
-            maxiter=1,  # of restarts
-            callback=lambda residual: residuals.append(float(residual) * size),
-            callback_type="pr_norm",
-        )
-        left -= RESTART
-    if len(residuals) > 1:
+    residuals, y, left, made, breakdown = [size], np.zeros(b.size), max_iterations, 1, ""
+
+    def product(y: Array) -> Array:
+        direction = _finite(preconditioner(y.reshape(b.shape)), NO_DIRECTION)
+        return _finite(operator(direction), NO_PRODUCT).ravel()
+
+    matrix = LinearOperator((b.size, b.size), matvec=product, dtype=np.float64)
+    try:
+        _finite(rest, NO_PRODUCT)
+        while left > 0 and residuals[-1] > tolerance:
+            made = len(residuals)
+            y, _ = gmres(
+                matrix,
+                rest.ravel(),
+                x0=y,
+                rtol=0.0,
+                atol=tolerance * norm,
+                restart=min(RESTART, left),
+                maxiter=1,  # of restarts
+                callback=lambda residual: residuals.append(float(residual) * size),
+                callback_type="pr_norm",
+            )
+            left -= RESTART
+    except _Breakdown as error:
+        breakdown = str(error)
+        del residuals[made:]  # y is that of the last restart
+    if y.any():
         x += preconditioner(y.reshape(b.shape))
-    return LinearResult(x, tuple(residuals), residuals[-1] <= tolerance)
+    return LinearResult(x, tuple(residuals), not breakdown and residuals[-1] <= tolerance, breakdown)
+
+
+def _finite(x: Array, fault: str) -> Array:
+    """Return x. Raises _Breakdown where its numbers are not finite."""
+    if not np.isfinite(x).all():
+        raise _Breakdown(fault)
+    return x

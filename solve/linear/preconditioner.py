@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,8 @@ from ..discretization.operator import Operator
 from ..discretization.space import TrialSpace
 from .shear import IncompleteCholesky, helps, incomplete_cholesky
 
+NO_FACTOR = "an incomplete Cholesky factor of the matrix was not found, the preconditioner works without it"
+NO_FACTORS = "the coefficients are too extreme for the preconditioner, the diagonal of the matrix takes its place"
 DIAGONAL = (0, 3, 5)  # the places of uu, vv, ww among the six factors
 COLUMNS, LAYERS = 4096, 8  # in a piece of work
 
@@ -33,6 +35,7 @@ class FastDiagonalization:
     vectors: per direction (n, n), generalized eigenvectors in columns. inverse, scaling: (n_u, n_v, n_w), the diagonals
     L^-1 and D. singular: constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin face), and
     the preconditioner keeps to their orthogonal complement. local: of a sheared map, what is added (`shear`).
+    weakness: what had to be left out, a sentence of the report; "" for nothing.
     Of a slab `inverse` has the columns that `space.to_columns` gives, everything else its own rows.
     """
 
@@ -43,6 +46,7 @@ class FastDiagonalization:
     singular: bool = False
     threads: int = 1
     local: IncompleteCholesky | None = None
+    weakness: str = ""
 
     def __call__(self, residual: Array) -> Array:
         """Return the preconditioned residual, both (n_u, n_v, n_w) or (1, n_u, n_v, n_w)."""
@@ -110,23 +114,59 @@ class FastDiagonalization:
 def fast_diagonalization(operator: Operator) -> FastDiagonalization:
     """Build the preconditioner of an operator restricted to its free coefficients.
 
+    Where the local part does not give finite numbers it is left out, and where nothing does, the diagonal is taken.
     All processes that share the space call it.
     """
+    with np.errstate(all="ignore"):  # it is looked at afterwards
+        found = _without_local(operator)
+        if not _is_usable(found):
+            return _of_the_diagonal(operator, found.singular)
+        if found.singular or not helps(operator):
+            return found
+        whole = replace(found, local=incomplete_cholesky(operator))
+        return whole if whole.local is not None and _is_usable(whole) else replace(found, weakness=NO_FACTOR)
+
+
+def _is_usable(preconditioner: FastDiagonalization) -> bool:
+    """Whether a residual without pattern gives finite numbers."""
+    residual = np.random.default_rng(0).uniform(-1.0, 1.0, preconditioner.scaling.shape)
+    return all(preconditioner.space.shared(bool(np.isfinite(preconditioner(residual)).all())))
+
+
+def _without_local(operator: Operator) -> FastDiagonalization:
+    """Return fast diagonalization alone; its numbers are not finite where the coefficients are too extreme."""
     space = operator.space
     here = {name: float(face.measure.sum()) for name, face in operator.robin.items()}
     robin = {name: float(space.total(here.get(name, 0.0))) for name in FACE_NAMES}
     slopes, masses, averages = _directional_matrices(operator, robin)
     mean_mass = float(space.total(sum(plane[6:].sum() for plane in operator.factors)))  # of c |det J|, over the cube
     reaction = mean_mass / float(np.prod(averages))
-    values, vectors = zip(*(eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
+    values, vectors = zip(*(_eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
     spectrum = values[0][:, None, None] + values[1][space.columns, None] + values[2] + reaction
-    scaling = _scaling(operator, slopes, masses, reaction)
+    scaling = _scaling(operator, _diagonal(space, slopes, masses, reaction))
     singular = not space.dirichlet and reaction == 0.0 and not any(robin.values())
     if singular:
         spectrum[0, : int(space.columns.start == 0), 0] = np.inf
     u, v, w = vectors
-    local = incomplete_cholesky(operator) if not singular and helps(operator) else None
-    return FastDiagonalization(space, (u, v, w), 1.0 / spectrum, scaling, singular, operator.threads, local)
+    return FastDiagonalization(space, (u, v, w), 1.0 / spectrum, scaling, singular, operator.threads)
+
+
+def _eigh(slope: Array, mass: Array) -> tuple[Array, Array]:
+    """Return generalized eigenvalues and eigenvectors; NaN where there are none in double precision."""
+    try:
+        values, vectors = eigh(slope, mass)
+    except (np.linalg.LinAlgError, ValueError):  # a mass that is not positive, or numbers that are not finite
+        return np.full(len(slope), np.nan), np.full_like(slope, np.nan)
+    return values, vectors
+
+
+def _of_the_diagonal(operator: Operator, singular: bool) -> FastDiagonalization:
+    """Return the inverse of the operator's diagonal, as an instance whose eigenvectors are unit vectors."""
+    space = operator.space
+    u, v, w = (np.eye(free.stop - free.start) for free in space.free)
+    spectrum = np.ones((len(u), space.columns.stop - space.columns.start, len(w)))
+    scaling = _scaling(operator, 1.0)
+    return FastDiagonalization(space, (u, v, w), spectrum, scaling, singular, operator.threads, weakness=NO_FACTORS)
 
 
 def _directional_matrices(
@@ -152,19 +192,27 @@ def _directional_matrices(
     return slopes, masses, averages
 
 
-def _scaling(operator: Operator, slopes: list[Array], masses: list[Array], reaction: float) -> Array:
-    """Return D, the square root of the diagonal of P over that of the operator, on the free coefficients."""
-    place = operator.space.place, slice(None), slice(None)
+def _diagonal(space: TrialSpace, slopes: list[Array], masses: list[Array], reaction: float) -> Array:
+    """Return the diagonal of P on the own free coefficients."""
+    place = space.place, slice(None), slice(None)
     stiff, mass = (
         [np.diag(matrix)[own] for matrix, own in zip(matrices, place, strict=True)] for matrices in (slopes, masses)
     )
     terms = [(stiff[0], mass[1], mass[2]), (mass[0], stiff[1], mass[2]), (mass[0], mass[1], stiff[2])]
     diagonal = sum(np.einsum("i,j,k->ijk", *term) for term in terms)
-    diagonal += reaction * np.einsum("i,j,k->ijk", *mass)
-    wanted = operator.diagonal()
-    operator.space.add(wanted)
+    return np.asarray(diagonal + reaction * np.einsum("i,j,k->ijk", *mass))
+
+
+def _scaling(operator: Operator, diagonal: Array | float) -> Array:
+    """Return the square root of a diagonal over that of the operator, on the own free coefficients.
+
+    It is zero where the operator's is, which the law does not reach, so that nothing is sought there.
+    """
+    found = operator.diagonal()
+    operator.space.add(found)
+    wanted = found[operator.space.window]
     # A folded map has diagonal entries below zero; their size is all a scaling can use.
-    return np.asarray(np.sqrt(np.abs(diagonal / wanted[operator.space.window])))
+    return np.sqrt(np.abs(np.divide(diagonal, wanted, out=np.zeros(wanted.shape), where=wanted != 0.0)))
 
 
 def _separable_coefficients(operator: Operator) -> tuple[list[Array], list[Array]]:

@@ -4,6 +4,9 @@ Fast diagonalization knows G's diagonal alone. Where the map shears cubes flat, 
 across the shear, many and local. Trilinear elements on the Greville points see the whole of G, and their values
 correspond to spline coefficients by collocation, uniformly in the mesh width: an incomplete Cholesky factorization of
 their stiffness matrix without fill (Meijerink, van der Vorst, Math. Comp. 31 (1977)) reduces these errors.
+
+Without fill a pivot may vanish, or fall below zero, although the matrix is positive definite. The diagonal then grows
+by a share, the least of SHIFTS for which no pivot does so (Manteuffel, Math. Comp. 34 (1980)).
 """
 
 from dataclasses import dataclass
@@ -21,6 +24,8 @@ from ..forms.jets import PAIRS
 
 OFFSETS = np.array(list(product((-1, 0, 1), repeat=3)))[:14]  # to the 13 neighbours that come before a node, to itself
 SAMPLES, FLAT, SHARE = 16, 0.1, 0.02
+PIVOT = 0.01  # least share of the diagonal that a pivot has
+SHIFTS = (0.0, *(0.01 * 2.0**k for k in range(8)))  # what the diagonal grows by, in turn, as a share of itself
 HIGHEST = 3  # degree: of degree 4 the iterations saved just pay for the factors, of degree 5 they become more
 
 
@@ -78,23 +83,39 @@ def _place(space: TrialSpace, count: int) -> tuple[int, int]:
     return sum(counts[: space.comm.rank]), sum(counts)
 
 
-def incomplete_cholesky(operator: Operator) -> IncompleteCholesky:
-    """Return the factorization that belongs to an operator's free coefficients."""
+def incomplete_cholesky(operator: Operator) -> IncompleteCholesky | None:
+    """Return the factorization that belongs to an operator's free coefficients; None where no shift lets it succeed."""
     space = operator.space
-    spaces = list(zip(space.whole.knots, space.degrees, space.free, strict=True))
-    matrices = [collocation(k, p, greville(k, p)).toarray()[free, free] for k, p, free in spaces]
-    u, v, w = (np.linalg.inv(matrix) for matrix in matrices)
-    factor = _stencils(operator)
+    for shift in SHIFTS:
+        found = _factor(operator, shift)
+        if found is None:
+            continue
+        spaces = zip(space.whole.knots, space.degrees, space.free, strict=True)
+        u, v, w = (np.linalg.inv(collocation(k, p, greville(k, p)).toarray()[free, free]) for k, p, free in spaces)
+        return IncompleteCholesky(space, *found, (u, v, w))
+    return None
+
+
+def _factor(operator: Operator, shift: float) -> tuple[Array, IntArray] | None:
+    """Return `factor` and `steps` of an IncompleteCholesky; None where a pivot of any process is too small.
+
+    Processes work one after another, also behind one that has failed: what they find is dropped.
+    """
+    space, factor = operator.space, _stencils(operator)
     strides = np.array([factor.shape[1] * factor.shape[2], factor.shape[2], 1])
     row, factor = strides[0], factor.reshape(-1, len(OFFSETS))
-    sums = OFFSETS[:-1, None] + OFFSETS[:-1]  # from a node over one neighbour to the other's neighbour
-    places = np.where(np.abs(sums).max(axis=-1) > 1, -1, (sums + 1) @ (9, 3, 1))
     before = np.empty((row, len(OFFSETS)))
     start = row if space.receive(before) else 0
     factor = np.concatenate([before, factor]) if start else factor
-    _factorize(factor, start, OFFSETS @ strides, places)
+    succeeded = _factorize(factor, start, OFFSETS @ strides, _places(), shift)
     space.send(factor[-row:], after=True)
-    return IncompleteCholesky(space, factor[start:], OFFSETS @ strides, (u, v, w))
+    return (factor[start:], OFFSETS @ strides) if all(space.shared(succeeded)) else None
+
+
+def _places() -> IntArray:
+    """Return, (13, 13), which of OFFSETS leads to the neighbour of a neighbour; -1 where none does."""
+    sums = OFFSETS[:-1, None] + OFFSETS[:-1]
+    return np.where(np.abs(sums).max(axis=-1) > 1, -1, (sums + 1) @ (9, 3, 1))
 
 
 def _stencils(operator: Operator) -> Array:
@@ -161,14 +182,14 @@ def _reference() -> Array:
 
 
 @compiled
-def _factorize(lower: Array, start: int, steps: IntArray, places: IntArray) -> None:
-    """Overwrite a lower half, from the node `start` on, by its incomplete factor.
+def _factorize(lower: Array, start: int, steps: IntArray, places: IntArray, shift: float) -> bool:
+    """Overwrite a lower half, its diagonal grown by a share, from the node `start` on by its incomplete factor.
 
-    A pivot that almost vanishes stays as it was.
+    Returns False at the first pivot that is less than PIVOT of its diagonal entry, and leaves the rest as it was.
     """
     for i in range(start, len(lower)):
         row = lower[i]
-        rest = row[13]
+        rest = (1.0 + shift) * row[13]
         for a in range(13):
             if row[a] != 0.0:
                 other, entry = lower[i + steps[a]], row[a]
@@ -177,7 +198,10 @@ def _factorize(lower: Array, start: int, steps: IntArray, places: IntArray) -> N
                         entry -= row[places[a, b]] * other[b]
                 row[a] = entry * other[13]
                 rest -= row[a] ** 2
-        row[13] = 1.0 / np.sqrt(rest if rest > 1e-3 * row[13] else abs(row[13]))
+        if not rest > PIVOT * row[13]:  # NaN included
+            return False
+        row[13] = 1.0 / np.sqrt(rest)
+    return True
 
 
 @compiled
