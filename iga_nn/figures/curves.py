@@ -24,7 +24,7 @@ TERMS = {  # of the loss, as parameterize names them
     "star": "faces seen from inside",
     "surface": "spline's boundary",
 }
-TERM_COLORS = tuple(colormaps["tab10"].colors)  # a term keeps its colour where another is left out
+TERM_COLORS = tuple(colormaps["tab10"](range(10)))  # a term keeps its colour where another is left out
 LOWEST = 1e-8  # value that is drawn, over the largest loss
 SAME_NORM = 1e-3  # relative: norms of one solution on meshes of different sizes agree better
 STAGES = {"S(2)": "round cuboid S(2)", "S(1)": "sharper cuboid S(1)"}  # the other names need no explanation

@@ -45,7 +45,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Field(Samples):
-    """Hold the values of a field, their name in the controls of the view, the title of the bar, and the colour range."""
+    """Hold the values of a field, its name in the controls of the view, the title of its bar, and its range."""
 
     name: str
     title: str

@@ -26,17 +26,19 @@ def draw_faces(path: str | Path | None, volume: BSplineVolume, marks: Array | No
 
     marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    return _draw_around(path, patches_of(points_of(volume).patches)[:6], "Images of the six faces of the unit cube", marks)
+    return _draw_around(path, volume, 0, "Images of the six faces of the unit cube", marks)
 
 
 def draw_lines(path: str | Path | None, volume: BSplineVolume) -> Figure:
     """Draw lines of constant parameters, a tenth apart, on the images of the six faces, from the front and behind."""
-    return _draw_around(path, patches_of(points_of(volume).patches, EVERY)[:6], "Lines of constant u, v, w, a tenth apart")
+    return _draw_around(path, volume, EVERY, "Lines of constant u, v, w, a tenth apart")
 
 
-def _draw_around(path: str | Path | None, patches: list[Patch], title: str, marks: Array | None = None) -> Figure:
+def _draw_around(
+    path: str | Path | None, volume: BSplineVolume, every: int, title: str, marks: Array | None = None
+) -> Figure:
     figure, (panels,) = panels_of(1, 2)
-    show_around(panels, patches, marks)
+    show_around(panels, patches_of(points_of(volume).patches, every)[:6], marks)
     name_faces(figure)
     return save(figure, path, title)
 

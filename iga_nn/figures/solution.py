@@ -41,7 +41,12 @@ def draw_solution(path: str | Path | None, volume: BSplineVolume, solution: Spli
 
 
 def draw_values(
-    path: str | Path | None, volume: BSplineVolume, solution: SplineField, title: str, *, exaggerate: float | None = None
+    path: str | Path | None,
+    volume: BSplineVolume,
+    solution: SplineField,
+    title: str,
+    *,
+    exaggerate: float | None = None,
 ) -> Figure:
     """Draw u_h, or the length of a vector u_h, on the boundary, in the volume cut open, and on the mid-sections.
 

@@ -107,7 +107,9 @@ class ColorRange:
         """Return the texts at the two ends of a legend; a logarithmic one has all smaller values at its lower end."""
         if self.remark:
             return self.remark, ""
-        return (f"≤ {self.low:.1e}", f"{self.high:.1e}") if self.logarithmic else (f"{self.low:.3g}", f"{self.high:.3g}")
+        if self.logarithmic:
+            return f"≤ {self.low:.1e}", f"{self.high:.1e}"
+        return f"{self.low:.3g}", f"{self.high:.3g}"
 
 
 def even_range(values: Sequence[Array]) -> ColorRange:

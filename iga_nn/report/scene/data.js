@@ -53,14 +53,24 @@ function quarterOf(scene, axis) {
   return scene.octant.filter((_, other) => other !== axis);
 }
 
+const FACES = [0, 1, 2, 3, 4, 5], AXES = [0, 1, 2];
+
+// The parts of the three mid-sections that the cut lays open.
+function cutPlanes(scene, field) {
+  const middle = (scene.samples.lattice - 1) / 2;
+  return AXES.map((axis) => ({...sectionPatch(scene, field, axis, middle), quarter: quarterOf(scene, axis)}));
+}
+
 // What is drawn of the volume: "surface", "cut", or the section "u", "v" or "w" at `share` of the way through the cube.
 function patchesOf(scene, field, part, share) {
-  const faces = [0, 1, 2, 3, 4, 5].map((face) => facePatch(scene, field, face));
+  const faces = FACES.map((face) => facePatch(scene, field, face));
   if (part === "surface") return faces.map((patch) => ({...patch, quarter: null}));
-  const last = scene.samples.lattice - 1;
-  if (part !== "cut") return [sectionPatch(scene, field, scene.axes.indexOf(part), Math.round(share * last))];
-  const planes = [0, 1, 2].map((axis) => ({
-    ...sectionPatch(scene, field, axis, last / 2), quarter: quarterOf(scene, axis),
-  }));
-  return [...faces, ...planes];
+  if (part === "cut") return [...faces, ...cutPlanes(scene, field)];
+  return [sectionPatch(scene, field, scene.axes.indexOf(part), Math.round(share * (scene.samples.lattice - 1)))];
+}
+
+// Patches whose borders show the shape: around a section the faces, around the cut its planes.
+function outlineOf(scene, part) {
+  if (part === "surface") return [];
+  return part === "cut" ? cutPlanes(scene, null) : FACES.map((face) => ({...facePatch(scene, null, face), quarter: null}));
 }

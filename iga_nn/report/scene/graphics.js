@@ -1,6 +1,8 @@
 // Draws patches with WebGL 2, in parallel projection. Fields have the colours of their bar, without any shading.
 
 const INSIDE = "#b8bdc7";  // of sections where no field is shown
+const OUTLINE = "#7f8b97";
+const NEARER = 0.002;  // of the depth: keeps outlines before the patches they surround
 
 const VERTEX_SHADER = `#version 300 es
 in vec3 place, normal;
@@ -8,13 +10,14 @@ in float value;
 uniform vec3 extent;
 uniform mat3 turn;
 uniform vec2 scale, shift;
+uniform float nearer;
 uniform int samples;
 out vec3 facing;
 out vec2 parameters;
 out float share;
 void main() {
   vec3 seen = turn * ((place - 0.5) * extent);
-  gl_Position = vec4(seen.xy * scale + shift, -0.5 * seen.z / length(extent), 1.0);
+  gl_Position = vec4(seen.xy * scale + shift, -0.5 * seen.z / length(extent) - nearer, 1.0);
   parameters = vec2(gl_VertexID / samples, gl_VertexID % samples) / float(samples - 1);
   facing = turn * normal;
   share = value;
@@ -72,13 +75,15 @@ function triangles(n) {
   return found;
 }
 
-// The points along the border of a patch of n x n points, once around.
-function border(n) {
-  const side = [...Array(n - 1).keys()];
-  return new Uint32Array([
-    ...side.map((k) => k), ...side.map((k) => n - 1 + k * n), ...side.map((k) => n * n - 1 - k),
-    ...side.map((k) => n * (n - 1) - k * n),
-  ]);
+// The points along the border of a patch of n x n points, or of its quarter [side, side], once around.
+function border(n, quarter) {
+  const middle = (n - 1) / 2, ends = (side) => side === undefined ? [0, n - 1] : side ? [middle, n - 1] : [0, middle];
+  const [[top, bottom], [left, right]] = [ends(quarter?.[0]), ends(quarter?.[1])], found = [];
+  for (let j = left; j < right; j++) found.push(top * n + j);
+  for (let i = top; i < bottom; i++) found.push(i * n + right);
+  for (let j = right; j > left; j--) found.push(bottom * n + j);
+  for (let i = bottom; i > top; i--) found.push(i * n + left);
+  return new Uint32Array(found);
 }
 
 // Sums of the triangles' normals at their corners; the shader makes them unit vectors.
@@ -150,7 +155,7 @@ class Graphics {
       for (let i = 0; i < data.length / size; i++) found.set(data.subarray(size * i, size * (i + 1)), stride * i);
       return found;
     };
-    const corners = this.#index(patch.n, outlined);
+    const corners = this.#index(patch, outlined);
     gl.bindVertexArray(array);
     attribute("place", padded(patch.places, 3, 4), 4, gl.UNSIGNED_SHORT, true);
     attribute("value", padded(patch.values || new Uint16Array(patch.n ** 2), 1, 2), 2, gl.UNSIGNED_SHORT, true);
@@ -160,9 +165,10 @@ class Graphics {
     return {patch, array, buffers, outlined, count: corners.data.length};
   }
 
-  #index(n, outlined) {
-    const gl = this.gl, data = outlined ? border(n) : triangles(n), name = `${n} ${outlined}`;
+  #index({n, quarter}, outlined) {
+    const gl = this.gl, name = outlined ? `border ${n} ${quarter}` : `triangles ${n}`;
     if (!this.indices[name]) {
+      const data = outlined ? border(n, quarter) : triangles(n);
       this.indices[name] = {data, buffer: gl.createBuffer()};
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices[name].buffer);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, data, gl.STATIC_DRAW);
@@ -184,8 +190,9 @@ class Graphics {
     gl.uniformMatrix3fv(this.uniform("turn"), true, camera.view.flat());
     for (const {patch, array, outlined, count} of this.loaded) {
       if (numbered && outlined) continue;
-      const plain = numbered ? [(patch.face + 2) / 10, 0, 0] : rgb(outlined ? "#7f8b97" : patch.plain);
+      const plain = numbered ? [(patch.face + 2) / 10, 0, 0] : rgb(outlined ? OUTLINE : patch.plain);
       gl.uniform3fv(this.uniform("plain"), plain);
+      gl.uniform1f(this.uniform("nearer"), outlined ? NEARER : 0);
       gl.uniform1i(this.uniform("samples"), patch.n);
       gl.uniform1i(this.uniform("mapped"), !numbered && !outlined && Boolean(patch.values));
       gl.uniform1i(this.uniform("flat_color"), numbered || outlined);

@@ -13,8 +13,7 @@ function start(scene) {
     const share = Number(element("at").value), isSection = scene.axes.includes(part());
     element("moves").hidden = !isSection;
     element("where").textContent = `${part()} = ${share.toFixed(3)}`;
-    const outline = isSection ? [0, 1, 2, 3, 4, 5].map((face) => facePatch(scene, null, face)) : [];
-    graphics.load(patchesOf(scene, field(), part(), share), outline);
+    graphics.load(patchesOf(scene, field(), part(), share), outlineOf(scene, part()));
     draw();
   };
   const show = () => {
