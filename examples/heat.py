@@ -8,7 +8,7 @@ By BDF2 in time, with the system of one time step used again and again.
 `python examples/heat.py [volume.npz]`. With :math:`A` the matrix of :math:`-\Delta`, :math:`M` that of mass, and
 :math:`b(t)` source and flux,
 
-.. math:: \Bigl(A + \frac{3}{2\,\Delta t} M\Bigr) u^{n+1} = b(t^{n+1}) + M\,\frac{4 u^n - u^{n-1}}{2\,\Delta t}.
+.. math:: \left(A + \frac{3}{2\,\Delta t} M\right) u^{n+1} = b(t^{n+1}) + M\,\frac{4 u^n - u^{n-1}}{2\,\Delta t}.
 
 The exact solution :math:`u = x \cos t` is a spline on every volume, for :math:`x` is: the error is that of time alone,
 of order 2.

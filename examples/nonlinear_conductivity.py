@@ -3,7 +3,7 @@ r"""A nonlinear conductivity
 
 The conductivity depends on the solution: Picard's iteration.
 
-.. math:: -\nabla \cdot \bigl((1 + u^2) \nabla u\bigr) = 0
+.. math:: -\nabla \cdot ((1 + u^2) \nabla u) = 0
 
 `python examples/nonlinear_conductivity.py [volume.npz]`. Every step solves a linear law whose conductivity comes from
 the last solution's field. The answer is known on every volume: :math:`w = u + u^3 / 3` (Kirchhoff) has

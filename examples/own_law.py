@@ -3,7 +3,7 @@ r"""A law of your own
 
 With an exact solution, the errors fall with the rates of the degree.
 
-.. math:: -\nabla \cdot \bigl((1 + x^2) \nabla u\bigr) + 2 u = f
+.. math:: -\nabla \cdot ((1 + x^2) \nabla u) + 2 u = f
 
 The rates are :math:`p + 1` in :math:`L^2` and :math:`p` in :math:`H^1`.
 `python examples/own_law.py [volume.npz]`. The source, the flux on the face u1, the preconditioner and the errors follow

@@ -106,11 +106,8 @@ def test_scene_holds_places_and_values(result):
     inside = np.frombuffer(base64.b64decode(drawing["places"]["lattice"]), "<u2").reshape(k, k, k, 3) / 65535
     low, high = np.array(drawing["low"]), np.array(drawing["high"])
     middle, last = (n - 1) // 2, n - 1
-    for place, at in (
-        (faces[1, 0, last], (1, 0, 1)),
-        (faces[4, middle, last], (0.5, 1, 0)),
-        (inside[0, 20, 10], (0, 0.5, 0.25)),
-    ):
+    places = {(1, 0, 1): faces[1, 0, last], (0.5, 1, 0): faces[4, middle, last], (0, 0.5, 0.25): inside[0, 20, 10]}
+    for at, place in places.items():
         assert np.abs(low + place * (high - low) - volume([at])).max() < 1e-4
     assert [field["name"] for field in drawing["fields"]] == ["distortion", "solution", "error"]
     values = np.frombuffer(base64.b64decode(drawing["fields"][1]["values"]["faces"]), "<u2").reshape(6, n, n)

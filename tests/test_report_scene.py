@@ -23,13 +23,14 @@ from iga_nn.report.viewer import scene_of
 from solve.study import benchmark_volume
 
 PARTS = """(() => {  // of the canvas, read back: the box of what is drawn, in pixels, and its colours
-  const gl = document.getElementById("view").getContext("webgl2"), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+  const gl = document.getElementById("view").getContext("webgl2");
+  const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
   const data = new Uint8Array(4 * w * h), box = [w, h, 0, 0], colors = {};
   gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, data);
   for (let i = 0; i < w * h; i++) {
     if (data[4 * i + 3] < 255) continue;
     const [x, y] = [i % w, h - 1 - Math.floor(i / w)], name = data.slice(4 * i, 4 * i + 3).join();
-    [box[0], box[1], box[2], box[3]] = [Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y)];
+    box.splice(0, 4, Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y));
     colors[name] = (colors[name] || 0) + 1;
   }
   return {box, colors};
@@ -58,9 +59,7 @@ async def opened(browser, file, width=1000, before=""):
         await tab.call("Page.addScriptToEvaluateOnNewDocument", source=before)
     await tab.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
     await tab.call("Page.navigate", url=file.as_uri())
-    await tab.until(
-        "document.readyState == 'complete' && document.getElementById('scene-data') !== null || document.getElementById('surfaces') !== null"
-    )
+    await tab.until("document.readyState == 'complete' && document.querySelector('#scene-data, #surfaces') !== null")
     await tab.value("document.getElementById('scene')?.scrollIntoView()")
     return tab
 
@@ -197,7 +196,8 @@ def test_pages_fit_the_window(chromium, solved, tmp_path, width):
         for file in (solved / "report.html", tmp_path / "batch.html"):
             tab = await opened(browser, file, width)
             found.append(await tab.value("document.documentElement.scrollWidth <= innerWidth"))
-            cut = "[...document.querySelectorAll('figure, .wide:has(#surfaces)')].filter(e => e.scrollWidth > e.clientWidth).length"
+            cut = "[...document.querySelectorAll('figure, .wide:has(#surfaces)')]"
+            cut += ".filter(e => e.scrollWidth > e.clientWidth).length"
             found.append(await tab.value(cut))
         return found
 
@@ -209,7 +209,8 @@ def test_without_webgl_the_page_says_so_and_shows_a_picture(chromium, solved, tm
         tab = await opened(browser, solved / "report.html", before=WITHOUT_WEBGL)
         shown = "(e => e !== null && e.offsetParent !== null)(document.querySelector('%s'))"
         places = [await tab.value(shown % place) for place in ("p.needs", "#view", ".tools", ".how")]
-        still = "(e => !e.hidden && e.naturalWidth > 0 && e.src === document.querySelector('figure img').src)(document.getElementById('still'))"
+        still = "(e => !e.hidden && e.naturalWidth > 0 && e.src === document.querySelector('figure img').src)"
+        still += "(document.getElementById('still'))"
         pictures = await tab.value("document.querySelectorAll('figure img').length")
         return places, pictures == 0 or await tab.value(still), tab.complaints
 
@@ -221,9 +222,8 @@ def test_a_page_around_the_view_chooses_light_or_dark(chromium, solved, tmp_path
     async def work(browser):
         tab, found = await opened(browser, solved / "report.html"), []
         for theme in ("dark", "light", "dark"):
-            await tab.value(
-                f"new Promise(done => {{ addEventListener('message', done, {{once: true}}); postMessage({{theme: '{theme}'}}, '*'); }})"
-            )
+            heard = "new Promise(done => addEventListener('message', done, {once: true}))"
+            await tab.value(f"(heard => (postMessage({{theme: '{theme}'}}, '*'), heard))({heard})")
             found.append(await tab.value("getComputedStyle(document.body).backgroundColor"))
         return found
 
