@@ -1,10 +1,15 @@
-"""Boundary conditions
+r"""Boundary conditions
 ===================
 
 Heat in a quarter of a pipe, hot inside, cooled by the air outside.
 
--div(grad u) = 0; u = 1 on the inner wall (face u0), du/dn + 2 u = 0 on the outer one (u1), no flux through the cuts.
-Along a radius the answer is known: u = 1 + a log(r), with a from the outer condition.
+.. math::
+
+    -\Delta u = 0, \qquad u = 1 \text{ on the inner wall (face u0)}, \qquad
+    \frac{\partial u}{\partial n} + 2 u = 0 \text{ on the outer one (u1)},
+
+and no flux goes through the cuts. Along a radius the answer is known: :math:`u = 1 + a \log r`, with :math:`a` from the
+outer condition.
 """
 
 from __future__ import annotations

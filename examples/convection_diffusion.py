@@ -1,9 +1,12 @@
-"""Convection and diffusion
+r"""Convection and diffusion
 ========================
 
-The law -div(k grad u) + wind . grad u = f is not symmetric: GMRES solves it.
+A law that is not symmetric: GMRES solves it.
 
-`python examples/convection_diffusion.py [volume.npz]`. The solution is given, and f follows from law and solution.
+.. math:: -\nabla \cdot (k \nabla u) + b \cdot \nabla u = f \qquad \text{with the wind } b
+
+`python examples/convection_diffusion.py [volume.npz]`. The solution is given, and :math:`f` follows from law and
+solution.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
-"""h, p and k refinement
+r"""h, p and k refinement
 =====================
 
 Rates on one fixed curved map, refined exactly: the three ways to enrich a spline space.
 
 `python examples/convergence.py [--out DIR] [--levels N]` writes convergence.csv and convergence.png with h refinement
-for the degrees 2 to 5, where the errors fall as h^(p + 1) in L2 and h^p in H1, and orders.csv and orders.png, where the
-degree rises on a fixed mesh: with the smoothness kept (p refinement), and growing with the degree (k refinement).
+for the degrees 2 to 5, where the errors fall as :math:`h^{p+1}` in :math:`L^2` and :math:`h^p` in :math:`H^1`, and
+orders.csv and orders.png, where the degree rises on a fixed mesh: with the smoothness kept (p refinement), and growing
+with the degree (k refinement).
 """
 
 from __future__ import annotations

@@ -1,10 +1,13 @@
-"""Linear elasticity
+r"""Linear elasticity
 =================
 
 A beam, clamped at one end, bends under its own weight; beside beam theory.
 
-A straight beam of length L and square section h under the load f per volume sinks by 12 f L^4 / (8 E h^2) at its tip
-(Euler and Bernoulli, who leave out the shear: some percent at L = 8 h).
+A straight beam of length :math:`L` and square section :math:`h` under the load :math:`f` per volume sinks at its tip by
+
+.. math:: \frac{12 f L^4}{8 E h^2}
+
+(Euler and Bernoulli, who leave out the shear: some percent at :math:`L = 8 h`).
 """
 
 from __future__ import annotations

@@ -1,13 +1,17 @@
-"""The heat equation
+r"""The heat equation
 =================
 
-du/dt - div(grad u) = f by BDF2, with the system of one time step used again and again.
+By BDF2 in time, with the system of one time step used again and again.
 
-`python examples/heat.py [volume.npz]`. With A the matrix of -div(grad), M that of mass, and b(t) source and flux,
+.. math:: \frac{\partial u}{\partial t} - \Delta u = f
 
-    (A + 3/(2 dt) M) u_new = b(t_new) + M (4 u - u_old) / (2 dt).
+`python examples/heat.py [volume.npz]`. With :math:`A` the matrix of :math:`-\Delta`, :math:`M` that of mass, and
+:math:`b(t)` source and flux,
 
-The exact solution u = cos(t) x is a spline on every volume, for x is: the error is that of time alone, of order 2.
+.. math:: \left(A + \frac{3}{2\,\Delta t} M\right) u^{n+1} = b(t^{n+1}) + M\,\frac{4 u^n - u^{n-1}}{2\,\Delta t}.
+
+The exact solution :math:`u = x \cos t` is a spline on every volume, for :math:`x` is: the error is that of time alone,
+of order 2.
 """
 
 from __future__ import annotations

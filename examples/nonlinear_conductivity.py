@@ -1,11 +1,13 @@
-"""A nonlinear conductivity
+r"""A nonlinear conductivity
 ========================
 
-The conductivity depends on the solution, -div((1 + u^2) grad u) = 0: Picard's iteration.
+The conductivity depends on the solution: Picard's iteration.
+
+.. math:: -\nabla \cdot ((1 + u^2) \nabla u) = 0
 
 `python examples/nonlinear_conductivity.py [volume.npz]`. Every step solves a linear law whose conductivity comes from
-the last solution's field. The answer is known on every volume: w = u + u^3 / 3 (Kirchhoff) has div(grad w) = 0, a
-linear problem, which is solved beside it.
+the last solution's field. The answer is known on every volume: :math:`w = u + u^3 / 3` (Kirchhoff) has
+:math:`\Delta w = 0`, a linear problem, which is solved beside it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,11 @@
-"""A law of your own
+r"""A law of your own
 =================
 
-With an exact solution, the errors fall with the rates of the degree, p + 1 in L2 and p in H1.
+With an exact solution, the errors fall with the rates of the degree.
 
+.. math:: -\nabla \cdot ((1 + x^2) \nabla u) + 2 u = f
+
+The rates are :math:`p + 1` in :math:`L^2` and :math:`p` in :math:`H^1`.
 `python examples/own_law.py [volume.npz]`. The source, the flux on the face u1, the preconditioner and the errors follow
 from law and solution.
 """

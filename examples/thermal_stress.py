@@ -1,10 +1,14 @@
-"""Thermal stress
+r"""Thermal stress
 ==============
 
-A temperature loads elasticity, sigma = C eps - b T I with b = E a / (1 - 2 nu). `python examples/thermal_stress.py
-[volume.npz]`: heat flows in through the face u1 and out through u0, where T = 0 and the body is clamped. By default a
-beam: its tip moves by a T_tip L / 2, nearly, for it is free to expand but near the clamp. The coupling is a law of
-components (u, T): its product with the vector (0, T) holds the integrals of -b T div v, the load with its sign changed.
+A temperature loads an elastic body.
+
+.. math:: \sigma = C \varepsilon - b\,T\,I, \qquad b = \frac{E\,\alpha}{1 - 2 \nu}
+
+`python examples/thermal_stress.py [volume.npz]`: heat flows in through the face u1 and out through u0, where
+:math:`T = 0` and the body is clamped. By default a beam: its tip moves by :math:`\alpha\,T_\mathrm{tip} L / 2`, nearly,
+for it is free to expand but near the clamp. The coupling is a law of components :math:`(u, T)`: its product with the
+vector :math:`(0, T)` holds the integrals of :math:`-b\,T\,\nabla \cdot v`, the load with its sign changed.
 """
 
 from __future__ import annotations

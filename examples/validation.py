@@ -19,9 +19,10 @@ import numpy as np
 
 import iga_nn
 from iga_nn.cli.commands import main as iga_nn_main
-from iga_nn.figures.evaluate import SECTIONS, sampled_error
+from iga_nn.figures.evaluate import SECTIONS
+from iga_nn.figures.fields import error_of, points_of
 from iga_nn.figures.render import Patch, can_draw, draw, widest_view
-from iga_nn.figures.style import PANEL, SAMPLES, color_bar, colors, error_range, panels_of, save
+from iga_nn.figures.style import PANEL, color_bar, colors, error_range, panels_of, save
 from iga_nn.report.document import read
 from solve import Solution
 
@@ -52,16 +53,16 @@ def draw_errors(
     path: Path, volume: iga_nn.BSplineVolume, solutions: Sequence[Solution], problem: iga_nn.Poisson
 ) -> None:
     """Draw |u - u_h| on the boundary and the three mid-sections, a row per mesh, as the paper's Fig. 14 does."""
-    samples = [sampled_error(volume, solution, problem, SAMPLES) for solution in solutions]
-    limits = error_range([errors for _, errors in samples])
+    points, fields = points_of(volume).patches, [error_of(volume, solution, problem) for solution in solutions]
+    limits = error_range([field.everywhere for field in fields])
     figure, rows = panels_of(len(solutions), 4)
-    for row, (points, errors), solution in zip(rows, samples, solutions, strict=True):
+    for row, field, solution in zip(rows, fields, solutions, strict=True):
         for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
-            lit = isinstance(shown, slice)
+            whole = isinstance(shown, slice)
             chosen = range(6) if isinstance(shown, slice) else (shown,)
-            patches = [Patch(points[i], colors(errors[i], limits), lit=lit) for i in chosen]
+            patches = [Patch(points[i], colors(field.patches[i], limits), lit=False) for i in chosen]
             cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
-            panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if lit else 0.0), PANEL))
+            panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if whole else 0.0), PANEL))
             panel.set_title(title, fontsize=13)
         report = solution.report
         label = f"{report.dofs} unknowns, relative L2 error {report.l2_relative:.3e}, L2 error {report.l2:.3e}"

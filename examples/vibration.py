@@ -1,10 +1,16 @@
-"""Vibration modes
+r"""Vibration modes
 ===============
 
-The lowest modes of an elastic body, clamped at one end: A x = (2 pi f)^2 M x, by SciPy's lobpcg.
+The lowest modes of an elastic body, clamped at one end, by SciPy's lobpcg.
+
+.. math:: A x = (2 \pi f)^2 M x
 
 `python examples/vibration.py [volume.npz]`, such as that of `iga-nn run poisson conch`; by default a beam, whose first
-frequency stands beside that of beam theory, 1.8751^2 / (2 pi) sqrt(E I / (density area)) / length^2.
+frequency stands beside that of beam theory for a length :math:`L`, a section of area :math:`A_s` and the density
+:math:`\varrho`,
+
+.. math:: f_1 = \frac{1.8751^2}{2 \pi L^2} \sqrt{\frac{E I}{\varrho A_s}}.
+
 The density is 1; the body is clamped at the face u0.
 """
 

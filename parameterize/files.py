@@ -2,6 +2,7 @@
 
 import math
 import os
+import warnings
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -68,7 +69,8 @@ def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[A
     if not source.exists():
         raise FileNotFoundError(f"{source}: no such file")
     try:
-        with zipfile.ZipFile(source) as archive:
+        with zipfile.ZipFile(source) as archive, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # numpy warns of headers by Python 2, also where they are only damaged
             held = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
             missing = [name for name in names if name not in held]
             unpacked = sum(held[name].file_size for name in names if name in held)

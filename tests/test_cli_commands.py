@@ -30,7 +30,7 @@ FILES = (
     "volume.npz", "boundary.npz", "history.npz", "solution.npz", "report.json", "report.html", "history.png",
     "convergence.png",
 )  # fmt: skip
-PICTURES = {"faces.png", "lines.png", "cut.png", "distortion.png", "error.png"}
+PICTURES = {"faces.png", "lines.png", "cut.png", "distortion.png", "solution.png", "error.png"}
 
 
 def one_line(text: str) -> str:

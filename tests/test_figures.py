@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import formula_parameterization
+from matplotlib import colormaps
 from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.image import imread
 
 import solve
 from iga_nn.cli.commands import main
-from iga_nn.figures import curves
+from iga_nn.figures import curves, fields
 from iga_nn.figures import cutaway as octant
 from iga_nn.figures import evaluate as sampling
 from iga_nn.figures import map as map_figures
@@ -38,6 +39,79 @@ def test_history_marks_the_stages(tmp_path):
     curves.draw_history(tmp_path / "history.png", formula_parameterization().history)
     assert colored_share(tmp_path / "history.png") > 0.001
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
+
+
+def shown_terms(history):
+    """The names in the legend of the loss, of the terms alone."""
+    (legend,) = [axes.get_legend() for axes in curves.draw_history(None, history).axes if axes.get_legend()]
+    return {text.get_text() for text in legend.get_texts()} - {"loss"}
+
+
+def test_the_legend_of_the_loss_names_what_is_seen():
+    """Terms that are zero throughout, or below the axis, have no curve; a term of a single step has a dot."""
+    steps = np.arange(20)
+    history = {"stage": np.repeat("cube", 20), "step": steps, "loss": np.exp(-0.1 * steps), "folded": 0 * steps}
+    history |= {"arap": np.full(20, 0.3), "bij": np.zeros(20), "star": np.full(20, 1e-10), "cor": np.full(20, np.nan)}
+    assert shown_terms(history) == {"ARAP distortion"}
+    assert shown_terms(history | {"bij": np.where(steps == 7, 1e-3, 0.0)}) == {"ARAP distortion", "folds"}
+    assert shown_terms(history | {"star": np.full(20, 1e-7)}) == {"ARAP distortion", "faces seen from inside"}
+
+
+def bar_of(figure):
+    """The axes of the colour bar, the last of a figure."""
+    return figure.axes[-1]
+
+
+def test_a_solution_that_is_zero_on_the_boundary_is_seen_inside(drawing, small_views):
+    """-div grad u = 1 on the unit cube with u = 0 on its boundary has its largest value, .05621, in the middle."""
+    solution = solve.solve_problem(benchmark_volume(8, amplitude=0.0), solve.Poisson(source="1", boundary="0"))
+    low, high = bar_of(solution.plot("values")).get_ylim()
+    assert low == pytest.approx(0.0, abs=1e-12) and high == pytest.approx(0.0562136, rel=1e-3)
+
+
+def test_a_range_counts_the_inside_where_no_section_passes():
+    """x (1 - x) (1 - 2 x), at most 1 / (6 sqrt(3)), times the same of y and z is zero on all faces and mid-sections."""
+    volume = benchmark_volume(4, amplitude=0.0)
+    bump = "x*(1-x)*y*(1-y)*z*(1-z)*(1-2*x)*(1-2*y)*(1-2*z)"
+    solution = solve.solve_problem(volume, solve.Poisson(exact=bump), refine=1)
+    field = fields.solution_of(solution)
+    assert max(np.abs(patch).max() for patch in field.patches) < 1e-5
+    assert field.limits.high == pytest.approx((3.0**-0.5 / 6.0) ** 3, rel=0.01)
+    assert field.limits.low == pytest.approx(-field.limits.high, rel=1e-2)
+
+
+def test_no_value_that_is_drawn_lies_outside_the_range():
+    volume, problem = benchmark_volume(3), solve.Poisson(exact="exp(x)*sin(3*y)*z")
+    solution = solve.solve_problem(volume, problem)
+    for field in (
+        fields.distortion_of(volume),
+        fields.solution_of(solution),
+        fields.error_of(volume, solution, problem),
+    ):
+        assert max(values.max() for values in field.everywhere) <= field.limits.high
+        is_lowest = field.limits.logarithmic or min(values.min() for values in field.everywhere) >= field.limits.low
+        assert is_lowest and field.lattice.shape == (fields.LATTICE,) * 3
+
+
+def test_a_field_is_sampled_once_for_all_its_pictures(monkeypatch):
+    volume, other, calls = benchmark_volume(1), benchmark_volume(1), []
+    monkeypatch.setattr(fields, "sampled", lambda found_at: calls.append(found_at) or fields.Samples([], np.zeros(1)))
+    assert fields.points_of(volume) is fields.points_of(volume) and len(calls) == 1
+    assert fields.points_of(other) is not fields.points_of(volume) and len(calls) == 2
+
+
+def test_fields_in_figures_have_the_colours_of_the_bar(tmp_path, drawing, small_views):
+    """Without shading, nearly all coloured pixels are mixtures of neighbouring colours of the map."""
+    volume = benchmark_volume(2)
+    solution = solve.solve_problem(volume, solve.Poisson(source="1", boundary="0"))
+    figure = solution_figures.draw_solution(tmp_path / "solution.png", volume, solution)
+    image = imread(tmp_path / "solution.png")[..., :3]
+    panels = image[:, : int(0.8 * image.shape[1])].reshape(-1, 3)
+    colored = panels[np.ptp(panels, axis=1) > 0.1]
+    table = colormaps[sampling.MAP](np.arange(256))[:, :3]
+    off = np.array([np.abs(table - pixel).max(axis=1).min() for pixel in colored[::23]])
+    assert len(off) > 1000 and np.mean(off < 0.03) > 0.75  # the others lie on lines and at the rim
+    assert bar_of(figure).get_ylabel() == "u"
 
 
 def test_map_figures_show_the_map(tmp_path, drawing, small_views):
@@ -78,7 +152,7 @@ def test_cut_shows_the_inside(tmp_path, drawing):
 def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
     cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
     volume = replace(cube, control_points=cube.control_points * size)
-    patches = octant.patches_of(volume, 9)
+    patches = octant.patches_of([sampling.points_on(volume, grid) for grid in sampling.all_grids(9)])
     corner, view = octant.best_cut(patches[:6])
     outward = 2.0 * np.array(corner) - 1.0
     assert np.all(np.sign(view.towards) == outward)
@@ -100,11 +174,11 @@ def test_error_figure_also_where_the_error_is_rounding(tmp_path, drawing, small_
 def test_the_error_of_vectors_is_a_length():
     volume, problem = benchmark_volume(2), solve.Elasticity(exact=("x*y", "sin(z)", "x"))
     solution = solve.solve_problem(volume, problem)
-    points, errors = sampling.sampled_error(volume, solution, problem, 3)
-    x, y, z = np.moveaxis(points[4], -1, 0)
+    n, field = fields.SAMPLES, fields.error_of(volume, solution, problem)
+    x, y, z = np.moveaxis(fields.points_of(volume).patches[4], -1, 0)
     exact = np.stack([x * y, np.sin(z), x], axis=-1)
-    found = solution.grid(*sampling.all_grids(3)[4]).reshape(3, 3, 3)
-    assert errors[4] == pytest.approx(np.linalg.norm(exact - found, axis=-1), abs=1e-14)
+    found = solution.grid(*sampling.all_grids(n)[4]).reshape(n, n, 3)
+    assert field.patches[4] == pytest.approx(np.linalg.norm(exact - found, axis=-1), abs=1e-14)
 
 
 def test_study_has_a_curve_a_degree(tmp_path):

@@ -122,6 +122,17 @@ def test_damaged_array_is_refused(tmp_path):
         load_arrays(path, ("values",))
 
 
+def test_a_header_of_another_python_says_nothing_of_its_own(tmp_path, recwarn):
+    """NumPy warns of a header with an L behind a number; a refusal is one line, and a good file none."""
+    np.savez(tmp_path / "a.npz", a=np.arange(3.0))
+    with zipfile.ZipFile(tmp_path / "a.npz") as archive:
+        content = archive.read("a.npy").replace(b"(3,), }", b"(3L,),}")
+    with zipfile.ZipFile(tmp_path / "b.npz", "w") as archive:
+        archive.writestr("a.npy", content)
+    np.testing.assert_array_equal(load_arrays(tmp_path / "b.npz", ("a",))["a"], [0.0, 1.0, 2.0])
+    assert not recwarn.list
+
+
 def test_other_files_are_refused(tmp_path):
     path = tmp_path / "a.npz"
     path.write_text("v 0 0 0\n")

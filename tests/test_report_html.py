@@ -101,21 +101,23 @@ def test_scene_holds_places_and_values(result):
     volume = benchmark_volume(2)
     problem = solve.Poisson(exact="x+2*y")
     drawing = scene.scene_of(volume, solve.solve_problem(volume, problem), problem)
-    n = drawing["samples"]
-    shares = np.frombuffer(base64.b64decode(drawing["places"]), "<u2").reshape(9, n, n, 3) / 65535
+    n, k = drawing["samples"]["faces"], drawing["samples"]["lattice"]
+    faces = np.frombuffer(base64.b64decode(drawing["places"]["faces"]), "<u2").reshape(6, n, n, 3) / 65535
+    inside = np.frombuffer(base64.b64decode(drawing["places"]["lattice"]), "<u2").reshape(k, k, k, 3) / 65535
     low, high = np.array(drawing["low"]), np.array(drawing["high"])
     middle, last = (n - 1) // 2, n - 1
-    for patch, (i, j), at in ((1, (0, last), (1, 0, 1)), (4, (middle, last), (0.5, 1, 0)), (7, (0, 0), (0, 0.5, 0))):
-        assert np.abs(low + shares[patch, i, j] * (high - low) - volume([at])).max() < 1e-4
+    places = {(1, 0, 1): faces[1, 0, last], (0.5, 1, 0): faces[4, middle, last], (0, 0.5, 0.25): inside[0, 20, 10]}
+    for at, place in places.items():
+        assert np.abs(low + place * (high - low) - volume([at])).max() < 1e-4
     assert [field["name"] for field in drawing["fields"]] == ["distortion", "solution", "error"]
-    values = np.frombuffer(base64.b64decode(drawing["fields"][1]["values"]), "u1").reshape(9, n, n)
+    values = np.frombuffer(base64.b64decode(drawing["fields"][1]["values"]["faces"]), "<u2").reshape(6, n, n)
     x, y, _ = volume([(1, 0, 1)])[0]
     low_u, high_u = float(drawing["fields"][1]["low"]), float(drawing["fields"][1]["high"])
-    assert values[1, 0, last] / 255 == pytest.approx((x + 2 * y - low_u) / (high_u - low_u), abs=0.01)
+    assert values[1, 0, last] / 65535 == pytest.approx((x + 2 * y - low_u) / (high_u - low_u), abs=0.01)
 
 
 def test_scene_of_a_body_has_lengths(result):
     volume = benchmark_volume(1)
     body = solve.Elasticity(force=("0", "0", "-1"))
     drawing = scene.scene_of(volume, solve.solve_problem(volume, body), body)
-    assert [field["title"] for field in drawing["fields"]] == ["tanh(√ARAP / 2), volume 1", "|u|"]
+    assert [field["title"] for field in drawing["fields"]] == ["tanh(√ARAP / 2), at volume 1", "|u|"]

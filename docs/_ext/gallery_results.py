@@ -4,6 +4,7 @@ The view is that of report.html. A script that is executed leaves volume.npz and
 one that trains for long, the volume is kept in docs/kept.
 """
 
+import base64
 import shutil
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,6 @@ from iga_nn.report.html import filled
 from iga_nn.report.viewer import scene_of
 from solve import SplineField
 
-SAMPLES = 41  # a direction of a face: a page of some 150 kB
 FRAME = """
 .. raw:: html
 
@@ -59,10 +59,11 @@ def write_view(app: Sphinx, name: str) -> str:
     if not files:
         return ""
     solved = left / "solution.npz"
-    scene = scene_of(load_volume(files[0]), SplineField.load(solved) if solved.exists() else None, samples=SAMPLES)
+    scene = scene_of(load_volume(files[0]), SplineField.load(solved) if solved.exists() else None, coarser=2)
+    still = base64.b64encode(pictures(app)[name].read_bytes()).decode("ascii")
     target = Path(app.outdir) / "scenes" / f"{name}.html"
     target.parent.mkdir(parents=True, exist_ok=True)
-    page = filled("report/scene.html", title=name.replace("_", " "), scene=scene)
+    page = filled("report/scene.html", title=name.replace("_", " "), scene=scene, still=still)
     target.write_text(page, encoding="utf-8")
     return "solution" if solved.exists() else "faces"
 

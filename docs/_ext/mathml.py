@@ -20,7 +20,7 @@ def visit_display(writer: HTML5Translator, node: nodes.math_block) -> None:
     writer.body.append(writer.starttag(node, "div", CLASS="formula"))
     if node["number"]:
         writer.body.append(f'<span class="eqno">({get_node_equation_number(writer, node)})</span>')
-    for part in node.astext().split("\n\n"):
+    for part in filter(str.strip, node.astext().split("\n\n")):  # a formula beside the directive ends so
         writer.body.append(convert(part, display="block"))
     writer.body.append("</div>\n")
     raise nodes.SkipNode

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -23,6 +24,8 @@ TERMS = {  # of the loss, as parameterize names them
     "star": "faces seen from inside",
     "surface": "spline's boundary",
 }
+TERM_COLORS = tuple(colormaps["tab10"](range(10)))  # a term keeps its colour where another is left out
+LOWEST = 1e-8  # value that is drawn, over the largest loss
 SAME_NORM = 1e-3  # relative: norms of one solution on meshes of different sizes agree better
 STAGES = {"S(2)": "round cuboid S(2)", "S(1)": "sharper cuboid S(1)"}  # the other names need no explanation
 
@@ -32,17 +35,22 @@ def draw_history(path: Path | None, history: dict[str, NDArray[Any]]) -> Figure:
     terms = [name for name in history if name not in ("stage", "step", "loss", "folded")]
     steps = np.arange(len(history["loss"]))
     figure, (upper, lower) = blank(2, 1, (11, 6), sharex=True, height_ratios=(4, 1))
-    for name in terms:
-        upper.plot(steps, positive(history[name]), linewidth=0.8, alpha=0.8, label=TERMS.get(name, name))
+    lowest = LOWEST * float(np.nanmax(history["loss"]))
+    for name, color in zip(terms, TERM_COLORS * len(terms), strict=False):
+        values = positive(history[name])
+        if not np.any(values >= lowest):
+            continue  # it was zero, or far too small to be seen, at every step
+        style = {"color": color, "linewidth": 0.8, "marker": ".", "markersize": 2.0}  # a dot shows a single step
+        upper.plot(steps, values, alpha=0.8, label=TERMS.get(name, name), **style)
     upper.plot(steps, positive(history["loss"]), color="black", linewidth=1.4, label="loss")
     upper.set_yscale("log")
-    upper.set_ylim(bottom=max(upper.get_ylim()[0], 1e-8 * float(np.nanmax(history["loss"]))))  # terms start at zero
+    upper.set_ylim(bottom=max(upper.get_ylim()[0], lowest))  # terms start at zero
     upper.set_ylabel("loss, and its terms without their weights")
     upper.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     lower.plot(steps, history["folded"], color="firebrick", linewidth=1.0)
     lower.set_yscale("symlog", linthresh=1.0)
     lower.set_ylim(bottom=0.0)
-    lower.set_ylabel("folded")
+    lower.set_ylabel("folded samples")
     lower.set_xlabel("step")
     stages = history["stage"]
     for start in np.flatnonzero(np.r_[True, stages[1:] != stages[:-1]]):

@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.volume import AXES, BSplineVolume
+from parameterize.spline.volume import AXES
 
-from .evaluate import FACE_COLORS, all_grids, points_on
+from .evaluate import FACE_COLORS
 from .render import Patch, View, plain_patch, view_of
 
 Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
@@ -17,13 +17,13 @@ Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u
 INSIDE = "#e9e6df"  # colour of the sections, unlike those of the faces
 
 
-def patches_of(volume: BSplineVolume, samples: int, every: int = 0) -> list[Patch]:
+def patches_of(points: Sequence[Array], every: int = 0) -> list[Patch]:
     """Return the images of the six faces, each in its colour, then those of u, v and w = 1/2, in one colour.
 
-    samples: per direction. every: as in Patch.
+    points: on each (m, n, 3). every: as in Patch.
     """
-    places = zip(all_grids(samples), (*FACE_COLORS, INSIDE, INSIDE, INSIDE), strict=True)
-    return [plain_patch(points_on(volume, grid), color, every=every) for grid, color in places]
+    places = zip(points, (*FACE_COLORS, INSIDE, INSIDE, INSIDE), strict=True)
+    return [plain_patch(where, color, every=every) for where, color in places]
 
 
 def best_cut(faces: Sequence[Patch], hand: int = 1) -> tuple[Octant, View]:

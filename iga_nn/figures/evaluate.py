@@ -1,15 +1,11 @@
 """Evaluates what figures show: points of a volume on the cube's faces and sections, and the values there."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
-from parameterize.quality.quality import arap_on
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
-from solve.field import Points, SplineField
-from solve.forms.frame import UnitFrame
+from solve.field import Points
 from solve.forms.problem import BoundaryValueProblem
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
@@ -40,19 +36,12 @@ def all_grids(samples: int) -> list[Grid]:
 
 def points_on(volume: BSplineVolume, grid: Grid) -> Array:
     """Return the points (samples, samples, 3) of a grid on a face or section."""
-    return _flat(volume.grid(*grid))
+    return flat(volume.grid(*grid))
 
 
-def distortions(volume: BSplineVolume, grids: Sequence[Grid]) -> list[Array]:
-    """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1: (samples, samples) for each grid."""
-    scale = 1.0 / UnitFrame.of(volume).length
-    return [np.tanh(np.sqrt(_flat(arap_on(volume, *grid, scale))) / 2.0) for grid in grids]
-
-
-def solution_on(solution: SplineField, grid: Grid) -> Array:
-    """Return u_h, or the length of a vector u_h: (samples, samples)."""
-    values = _flat(solution.grid(*grid))
-    return values if values.ndim == 2 else np.asarray(np.linalg.norm(values, axis=-1))
+def lengths(values: Array) -> Array:
+    """Return scalars on a tensor grid (n_u, n_v, n_w) as they are, and the lengths of vectors (n_u, n_v, n_w, k)."""
+    return values if values.ndim == 3 else np.asarray(np.linalg.norm(values, axis=-1))
 
 
 def error_at(found: Array, problem: BoundaryValueProblem, x: Points) -> Array:
@@ -63,22 +52,12 @@ def error_at(found: Array, problem: BoundaryValueProblem, x: Points) -> Array:
     return np.asarray(np.linalg.norm(found - np.moveaxis(exact, 0, -1), axis=-1))
 
 
-def sampled_error(
-    volume: BSplineVolume, solution: SplineField, problem: BoundaryValueProblem, samples: int
-) -> tuple[list[Array], list[Array]]:
-    """Return points (samples, samples, 3) and |u - u_h| there, on the six faces and the three mid-sections."""
-    problem = problem.on(volume)
-    grids = all_grids(samples)
-    errors = [error_at(solution.grid(*grid), problem, Points.on(volume, *grid)) for grid in grids]
-    return [points_on(volume, grid) for grid in grids], [_flat(values) for values in errors]
-
-
 def face_labels() -> list[str]:
     """Return what the six colours stand for, such as "u0: u = 0"."""
     return [f"{name}: {name[0]} = {name[1]}" for name in FACE_NAMES]
 
 
-def _flat(values: Array) -> Array:
+def flat(values: Array) -> Array:
     """Return the values of a grid without the direction that has a single parameter."""
     axis = next(a for a in range(3) if values.shape[a] == 1)
     return np.asarray(values.squeeze(axis))

@@ -12,13 +12,12 @@ from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 
 from .cutaway import best_cut, octant_label, patches_of, without_octant
-from .evaluate import SECTIONS, all_grids, distortions, face_window, points_on
+from .evaluate import SECTIONS, face_window, points_on
+from .fields import SAMPLES, distortion_of, points_of
 from .render import Patch, check_drawable, draw, plain_patch, view_of
-from .style import PANEL, SAMPLES, ColorRange, color_bar, colors, name_faces, panels_of, save, show_around, show_section
+from .style import PANEL, color_bar, colors, name_faces, panels_of, save, show_around, show_section
 
-EVERY = 14  # samples between two parameter lines: a tenth of the cube
-DISTORTION = "tanh(√ARAP / 2), at volume 1"
-SHARES = ColorRange(0.0, 1.0)  # of the distortion
+EVERY = 12  # samples between two parameter lines: a tenth of the cube
 WINDOW = 0.15  # of the cube, on every side of a meeting place
 MEETING_COLORS = ("#4477aa", "#ee6677")
 
@@ -28,17 +27,19 @@ def draw_faces(path: str | Path | None, volume: BSplineVolume, marks: Array | No
 
     marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    return _draw_around(path, patches_of(volume, SAMPLES)[:6], "Images of the six faces of the unit cube", marks)
+    return _draw_around(path, volume, 0, "Images of the six faces of the unit cube", marks)
 
 
 def draw_lines(path: str | Path | None, volume: BSplineVolume) -> Figure:
     """Draw lines of constant parameters, a tenth apart, on the images of the six faces, from the front and behind."""
-    return _draw_around(path, patches_of(volume, SAMPLES, EVERY)[:6], "Lines of constant u, v, w, a tenth apart")
+    return _draw_around(path, volume, EVERY, "Lines of constant u, v, w, a tenth apart")
 
 
-def _draw_around(path: str | Path | None, patches: list[Patch], title: str, marks: Array | None = None) -> Figure:
+def _draw_around(
+    path: str | Path | None, volume: BSplineVolume, every: int, title: str, marks: Array | None = None
+) -> Figure:
     figure, (panels,) = panels_of(1, 2)
-    show_around(panels, patches, marks)
+    show_around(panels, patches_of(points_of(volume).patches, every)[:6], marks)
     name_faces(figure)
     return save(figure, path, title)
 
@@ -48,27 +49,28 @@ def draw_cut(path: str | Path | None, volume: BSplineVolume) -> Figure:
 
     The octant and the view are those that show most of the cut.
     """
-    named = patches_of(volume, SAMPLES, EVERY)
+    named, field = patches_of(points_of(volume).patches, EVERY), distortion_of(volume)
     octant, view = best_cut(named[:6], orientation(volume))
     distorted = [
-        replace(patch, colors=colors(values, SHARES))
-        for patch, values in zip(named, distortions(volume, all_grids(SAMPLES)), strict=True)
+        replace(patch, colors=colors(values, field.limits), lit=False)
+        for patch, values in zip(named, field.patches, strict=True)
     ]
     figure, (panels,) = panels_of(1, 2)
     for panel, patches in zip(panels, (named, distorted), strict=True):
         panel.imshow(draw(without_octant(patches, octant), view, PANEL))
     name_faces(figure)
-    color_bar(figure, panels, SHARES, DISTORTION)
+    color_bar(figure, panels, field.limits, field.title)
     return save(figure, path, f"Cut open: the octant {octant_label(octant)} is left out")
 
 
 def draw_distortion(path: str | Path | None, volume: BSplineVolume) -> Figure:
     """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2."""
     figure, (panels,) = panels_of(1, 3)
-    grids = all_grids(SAMPLES)[6:]
-    for panel, title, grid, values in zip(panels, SECTIONS, grids, distortions(volume, grids), strict=True):
-        show_section(panel, title, points_on(volume, grid), colors(values, SHARES))
-    color_bar(figure, panels, SHARES, DISTORTION)
+    field = distortion_of(volume)
+    shown = zip(panels, SECTIONS, points_of(volume).patches[6:], field.patches[6:], strict=True)
+    for panel, title, points, values in shown:
+        show_section(panel, title, points, colors(values, field.limits))
+    color_bar(figure, panels, field.limits, field.title)
     return save(figure, path, "Distortion on the mid-sections")
 
 
@@ -94,7 +96,7 @@ def draw_meeting(path: str | Path | None, volume: BSplineVolume, meeting: Meetin
 
 def _glass(volume: BSplineVolume) -> list[Patch]:
     """Return the six faces as transparent patches."""
-    return [plain_patch(points_on(volume, grid), "0.6", opacity=0.25) for grid in all_grids(SAMPLES)[:6]]
+    return [plain_patch(points, "0.6", opacity=0.25) for points in points_of(volume).patches[:6]]
 
 
 PLOTS = {"faces": draw_faces, "lines": draw_lines, "cut": draw_cut, "distortion": draw_distortion}

@@ -121,17 +121,16 @@ def draw(
 
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=list(pixels), lighting="none")
     plotter.set_background("white")
-    plotter.enable_anti_aliasing("ssaa")
-    for patch in patches:
+    for lit, opacity in dict.fromkeys((patch.lit, patch.opacity) for patch in patches):
         plotter.add_mesh(
-            _mesh(patch),
+            _mesh([patch for patch in patches if (patch.lit, patch.opacity) == (lit, opacity)]),
             scalars="rgb",
             rgb=True,
-            smooth_shading=patch.lit,
-            lighting=patch.lit,
+            smooth_shading=lit,
+            lighting=lit,
             ambient=0.5,
             diffuse=0.55,
-            opacity=patch.opacity,
+            opacity=opacity,
         )
     cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
     nearer = float(np.linalg.norm(np.ptp(cloud, axis=0))) * view.towards
@@ -145,14 +144,20 @@ def draw(
     return image
 
 
-def _mesh(patch: Patch) -> Any:
+def _mesh(patches: Sequence[Patch]) -> Any:
+    """Return all patches as one mesh, which VTK draws faster than many; they share no points, so edges stay sharp."""
     import pyvista
 
-    x, y, z = np.moveaxis(patch.points[:, :, None, :], -1, 0)  # each (m, n, 1)
-    grid = pyvista.StructuredGrid(x, y, z)
-    flat = patch.colors.transpose(1, 0, 2).reshape(-1, 3)  # VTK counts the first index fastest
-    grid["rgb"] = np.round(255.0 * flat).astype(np.uint8)
-    return grid.extract_surface(algorithm="dataset_surface") if patch.lit else grid
+    quads, first = [], 0
+    for patch in patches:
+        m, n = patch.points.shape[:2]
+        corner = first + (np.arange(m - 1)[:, None] * n + np.arange(n - 1)).ravel()
+        quads.append(np.stack([np.full_like(corner, 4), corner, corner + n, corner + n + 1, corner + 1], axis=1))
+        first += m * n
+    mesh = pyvista.PolyData(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), np.concatenate(quads))
+    flat = np.concatenate([patch.colors.reshape(-1, 3) for patch in patches])
+    mesh["rgb"] = np.round(255.0 * flat).astype(np.uint8)
+    return mesh
 
 
 def _add_lines(plotter: Any, patches: Sequence[Patch], shift: Array) -> None:

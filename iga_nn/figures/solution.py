@@ -1,65 +1,97 @@
-"""Draws a solution: its values on the boundary, its error on the boundary and on the mid-sections."""
+"""Draws a solution and its error: on the boundary, inside where the volume is cut open, and on the mid-sections."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
+from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 from solve import Solution
+from solve.field import SplineField
 from solve.forms.problem import BoundaryValueProblem
 
 from ..levels import EXACT_ERRORS, TITLES
-from .evaluate import SECTIONS, all_grids, points_on, sampled_error, solution_on
-from .render import Patch, check_drawable
-from .style import SAMPLES, color_bar, colors, error_range, even_range, panels_of, save, show_around, show_section
+from .cutaway import best_cut, without_octant
+from .evaluate import SECTIONS
+from .fields import Field, error_of, points_of, sampled, solution_of
+from .render import Patch, check_drawable, draw
+from .style import PANEL, color_bar, colors, panels_of, save, show_around, show_section
 
 
 def draw_error(
     path: str | Path | None, volume: BSplineVolume, solution: Solution, problem: BoundaryValueProblem
 ) -> Figure:
     """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms."""
-    points, errors = sampled_error(volume, solution, problem, SAMPLES)
-    limits = error_range([errors])
+    field = error_of(volume, solution, problem)
     figure, rows = panels_of(2, 3)
-    boundary = [Patch(p, colors(e, limits)) for p, e in zip(points[:6], errors[:6], strict=True)]
-    show_around(rows[0][:2], boundary)
+    patches = _colored(points_of(volume).patches, field)
+    show_around(rows[0][:2], patches[:6])
     _write_numbers(rows[0][2], solution)
-    for panel, title, where, values in zip(rows[1], SECTIONS, points[6:], errors[6:], strict=True):
-        show_section(panel, title, where, colors(values, limits))
-    color_bar(figure, rows, limits, r"$|u - u_h|$")
+    _show_sections(rows[1], patches[6:])
+    color_bar(figure, rows, field.limits, r"$|u - u_h|$")
     return save(figure, path, "Error on the boundary and on the mid-sections")
 
 
-def draw_values(
-    path: str | Path | None, volume: BSplineVolume, solution: Solution, title: str, *, exaggerate: float | None = None
-) -> Figure:
-    """Draw u_h, or the length of a vector u_h, on the boundary, from the front and from behind.
+def draw_solution(path: str | Path | None, volume: BSplineVolume, solution: SplineField) -> Figure:
+    """Draw u_h, or the length of a vector u_h, as `draw_values` does."""
+    return draw_values(path, volume, solution, solution_of(solution).title)
 
-    exaggerate: draw the body displaced by that many times u_h, a vector.
+
+def draw_values(
+    path: str | Path | None,
+    volume: BSplineVolume,
+    solution: SplineField,
+    title: str,
+    *,
+    exaggerate: float | None = None,
+) -> Figure:
+    """Draw u_h, or the length of a vector u_h, on the boundary, in the volume cut open, and on the mid-sections.
+
+    The colours range over the whole solid. exaggerate: draw the body displaced by that many times u_h, a vector.
     """
-    grids = all_grids(SAMPLES)[:6]
-    values = [solution_on(solution, grid) for grid in grids]
-    points = [points_on(volume, grid) for grid in grids]
+    field, points = solution_of(solution), points_of(volume).patches
     if exaggerate is not None:
-        moved = [solution.grid(*grid).reshape(SAMPLES, SAMPLES, 3) for grid in grids]
+        moved = sampled(lambda grid: solution.grid(*grid)).patches
         points = [where + exaggerate * by for where, by in zip(points, moved, strict=True)]
-    limits = even_range(values)
-    figure, (panels,) = panels_of(1, 2)
-    show_around(panels, [Patch(p, colors(v, limits)) for p, v in zip(points, values, strict=True)])
-    color_bar(figure, panels, limits, title)
+    patches = _colored(points, field)
+    figure, rows = panels_of(2, 3)
+    show_around(rows[0][:2], patches[:6])
+    octant, view = best_cut(patches[:6])
+    halved = [replace(patch, every=len(patch.points) // 2) for patch in patches]  # lines along the cut, too
+    rows[0][2].imshow(draw(without_octant(halved, octant), view, PANEL))
+    rows[0][2].set_title("cut open", fontsize=13)
+    _show_sections(rows[1], patches[6:])
+    color_bar(figure, rows, field.limits, title)
     return save(figure, path)
 
 
+def _colored(points: Sequence[Array], field: Field) -> list[Patch]:
+    """Return the nine patches at points (m, m, 3) in the colours of a field, without shading: they match its bar.
+
+    Lines along the borders show their shape.
+    """
+    return [
+        Patch(where, colors(values, field.limits), lit=False, every=len(where) - 1)
+        for where, values in zip(points, field.patches, strict=True)
+    ]
+
+
+def _show_sections(panels: Any, patches: Sequence[Patch]) -> None:
+    for panel, title, patch in zip(panels, SECTIONS, patches, strict=True):
+        show_section(panel, title, patch.points, patch.colors)
+
+
 def plot_solution(solution: Solution, what: str, file: str | Path | None) -> Figure:
-    """Return the values of a solution, or its error, on the boundary; the error on the mid-sections, too."""
+    """Return the values of a solution, or its error, on the boundary and inside."""
     check_drawable(what, ("values", "error"))
     if what == "error":
         if solution.problem.exact is None:
             raise ValueError("the error is not known: the problem has no exact solution; plot 'values'")
         return draw_error(file, solution.geometry, solution, solution.problem)
-    title = "u" if solution.coefficients.ndim == 3 else "|u|"
-    return draw_values(file, solution.geometry, solution, title)
+    return draw_solution(file, solution.geometry, solution)
 
 
 def _write_numbers(panel: Any, solution: Solution) -> None:

@@ -20,8 +20,7 @@ from parameterize.files import replacing
 from .evaluate import FACE_COLORS, MAP, face_labels
 from .render import Patch, draw, view_of, widest_view
 
-SAMPLES = 141  # per direction of a patch
-PANEL = (900, 700)  # pixels of one view
+PANEL = (720, 560)  # pixels of one view
 NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
 DECADES = 1e-4  # lower end of a logarithmic range over the largest error of the best mesh
 SMALLEST = 1e-200  # smaller fields have no ticks on their colour bar
@@ -105,9 +104,12 @@ class ColorRange:
 
     @property
     def labels(self) -> tuple[str, str]:
-        """Return the texts at the two ends of a legend."""
-        form = "{:.1e}" if self.logarithmic else "{:.3g}"
-        return (self.remark, "") if self.remark else (form.format(self.low), form.format(self.high))
+        """Return the texts at the two ends of a legend; a logarithmic one has all smaller values at its lower end."""
+        if self.remark:
+            return self.remark, ""
+        if self.logarithmic:
+            return f"≤ {self.low:.1e}", f"{self.high:.1e}"
+        return f"{self.low:.3g}", f"{self.high:.3g}"
 
 
 def even_range(values: Sequence[Array]) -> ColorRange:
@@ -141,7 +143,8 @@ def colors(values: Array, limits: ColorRange) -> Array:
 def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:
     """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value."""
     shades = ListedColormap([colormaps[MAP](0.5)]) if limits.remark else MAP
-    bar = figure.colorbar(ScalarMappable(limits.norm(), shades), ax=panels, shrink=0.85, aspect=28)
+    extend = "min" if limits.logarithmic else "neither"  # smaller values have the lowest colour
+    bar = figure.colorbar(ScalarMappable(limits.norm(), shades), ax=panels, shrink=0.85, aspect=28, extend=extend)
     if limits.remark:
         bar.set_ticks([0.5], labels=[limits.remark])
     bar.set_label(title, fontsize=13)

@@ -1,12 +1,11 @@
-"""Makes the interactive scene of report.html: faces and mid-sections of a volume as compact arrays for viewer.js.
+"""Makes the interactive scene of report.html: a volume and the fields on it as compact arrays for the page's script.
 
-Nine patches (the six faces, u = 1/2, v = 1/2, w = 1/2) are sampled on lattices of SAMPLES x SAMPLES points. Places are
-16-bit numbers between two corners of the scene, values 8-bit numbers of a colour map, both in Base64: some 0.8 MB for a
-volume with all its fields.
+The six faces are sampled on lattices of points, the inside on one lattice through the cube, whose planes are the
+sections that the page shows. Places are 16-bit numbers between two corners of the scene, values 16-bit numbers between
+the ends of their colour bar, all in Base64: some 1.8 MB for a volume with all its fields.
 """
 
 import base64
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,16 +13,13 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import AXES, BSplineVolume
 from solve import SplineField
 
 from ..figures import evaluate
-from ..figures.evaluate import distortions, points_on, solution_on
-from ..figures.render import TILT, widest_view
-from ..figures.style import ColorRange, error_range, even_range
+from ..figures.cutaway import best_cut, patches_of
+from ..figures.fields import Field, Samples, distortion_of, error_of, points_of, solution_of
 from ..options import Equation
-
-SAMPLES = 81  # per direction of a patch
 
 Scene = dict[str, Any]
 
@@ -33,48 +29,60 @@ def scene_of(
     solution: SplineField | None = None,
     problem: "Equation | None" = None,
     *,
-    samples: int = SAMPLES,
+    coarser: int = 1,
 ) -> Scene:
-    """Return what viewer.js draws, in JSON's own types; solution and error only where they are known and finite.
+    """Return what the script draws, in JSON's own types; solution and error only where they are known and finite.
 
-    samples: points per direction of a patch.
+    coarser: 2 leaves out every second point.
     """
-    grids = evaluate.all_grids(samples)
-    points = [points_on(volume, grid) for grid in grids]
-    fields = [_field("distortion", "tanh(√ARAP / 2), volume 1", distortions(volume, grids), ColorRange(0.0, 1.0))]
+    points, fields = points_of(volume), [distortion_of(volume)]
     if solution is not None and np.all(np.isfinite(solution.coefficients)):
-        name = "u" if solution.coefficients.ndim == 3 else "|u|"
-        values = [solution_on(solution, grid) for grid in grids]
-        fields.append(_field("solution", name, values, even_range(values)))
+        fields.append(solution_of(solution))
         if problem is not None and problem.exact is not None:
-            _, errors = evaluate.sampled_error(volume, solution, problem, samples)
-            fields.append(_field("error", "|u − uₕ|, logarithmic", errors, error_range([errors])))
-    cloud = np.concatenate([where.reshape(-1, 3) for where in points])
+            fields.append(error_of(volume, solution, problem))
+    cloud = np.concatenate([where.reshape(-1, 3) for where in points.everywhere])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
-    view = widest_view(cloud[: 6 * samples**2], tilt=TILT)
+    octant, view = best_cut(patches_of(points.patches)[:6])
     frame = np.stack([view.right, view.up, view.towards])
     half = np.abs((cloud - (low + high) / 2.0) @ frame[:2].T).max(axis=0)  # width and height as first seen
+    places = Samples([_shares(where, low, high) for where in points.patches], _shares(points.lattice, low, high))
+    faces, lattice = _thinned(places, coarser)
     return {
-        "samples": samples,
+        "samples": {"faces": faces.shape[1], "lattice": len(lattice)},  # per direction
         "low": low.tolist(),
         "high": high.tolist(),
         "view": frame.tolist(),
         "half": half.tolist(),
-        "places": _packed((cloud - low) / np.where(high > low, high - low, 1.0), np.uint16),
+        "octant": list(octant),  # what the cut leaves out
+        "places": {"faces": _packed(faces), "lattice": _packed(lattice)},
+        "axes": list(AXES),
         "colors": list(evaluate.FACE_COLORS),
         "labels": evaluate.face_labels(),
-        "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3]),  # (256, 3)
-        "fields": fields,
+        "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
+        "fields": [_described(field, coarser) for field in fields],
     }
 
 
-def _field(name: str, title: str, patches: Sequence[Array], limits: ColorRange) -> dict[str, str]:
-    """Return the values on the nine patches, coloured between the limits."""
-    low, high = limits.labels
-    return {"name": name, "title": title, "low": low, "high": high, "values": _packed(limits.shares(np.stack(patches)))}
+def _described(field: Field, coarser: int) -> dict[str, Any]:
+    """Return a field with its values as places between the ends of its range."""
+    low, high = field.limits.labels
+    faces, lattice = _thinned(field, coarser)
+    values = {name: _packed(field.limits.shares(part)) for name, part in (("faces", faces), ("lattice", lattice))}
+    return {"name": field.name, "title": field.title, "low": low, "high": high, "values": values}
 
 
-def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint8) -> str:
+def _thinned(samples: Samples, coarser: int) -> tuple[Array, Array]:
+    """Return every second point on the six faces (6, m, m, ...) and all in the lattice; fewer, where `coarser` is 2."""
+    step = slice(None, None, coarser)
+    faces = np.stack([patch[:: 2 * coarser, :: 2 * coarser] for patch in samples.patches[:6]])
+    return faces, samples.lattice[step, step, step]
+
+
+def _shares(points: Array, low: Array, high: Array) -> Array:
+    return np.asarray((points - low) / np.where(high > low, high - low, 1.0))
+
+
+def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint16) -> str:
     """Return numbers 0..1 as whole numbers over the range of `kind`, little-endian, in Base64."""
     numbers = np.rint(np.clip(shares, 0.0, 1.0) * np.iinfo(kind).max).astype(np.dtype(kind).newbyteorder("<"))
     return base64.b64encode(numbers.tobytes()).decode("ascii")

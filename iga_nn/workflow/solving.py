@@ -42,7 +42,7 @@ def solve_levels(
             | {"levels": [item.as_dict() for item in found], "rates": rates(found), "notices": notices_of(found)}
         }
     )
-    _draw_errors(state, volume, solutions, equation)
+    _draw(state, volume, solutions, equation)
     if len(equation.dirichlet) < 6:  # the user names faces: show which is which
         state.draw("solution", named_volume=volume)
     return solutions[-1]
@@ -84,15 +84,19 @@ def verdict_of(state: RunFolder) -> str:
     return str(state.report["parameterization"]["bijective"])
 
 
-def _draw_errors(state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation) -> None:
-    """Draw the error where the exact solution is known, and the convergence where there are several levels."""
-    is_finite = all(np.all(np.isfinite(solution.coefficients)) for solution in solutions)
-    if equation.exact is None or not is_finite:  # not finite: the solver broke down
+def _draw(state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation) -> None:
+    """Draw the solution, its error where the exact one is known, and then the convergence if there are several levels.
+
+    Coefficients that are not finite, for the solver broke down, are not drawn.
+    """
+    if not all(np.all(np.isfinite(solution.coefficients)) for solution in solutions):
         return
-    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1], "problem": equation}
-    if len(solutions) > 1:
-        rows = [ConvergenceRow(solution.report, None, None) for solution in solutions]
-        known["levels"] = {max(solutions[-1].degrees): rows}
+    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1]}
+    if equation.exact is not None:
+        known["problem"] = equation
+        if len(solutions) > 1:
+            rows = [ConvergenceRow(solution.report, None, None) for solution in solutions]
+            known["levels"] = {max(solutions[-1].degrees): rows}
     state.draw("solution", **known)
 
 

@@ -84,10 +84,13 @@ class Binary:
         """Return a table's parts (rows, number of columns), whole numbers as int64."""
         if any(number < 0 for _, number in columns):
             raise MeshError(f"{self._what} has a negative number of columns; {DAMAGED}")
-        row = np.dtype([(f"f{k}", self._order + kind, (number,)) for k, (kind, number) in enumerate(columns)])
+        needed = rows * sum(np.dtype(kind).itemsize * number for kind, number in columns)
         left = len(self._bytes) - self._at
-        if not 0 <= rows * row.itemsize <= left:
-            raise _too_few(self._what, rows * row.itemsize, left, "bytes")
+        if not 0 <= needed <= left:
+            raise _too_few(self._what, needed, left, "bytes")
+        if rows == 0:
+            return [np.empty((0, number), np.float64 if kind[0] == "f" else np.int64) for kind, number in columns]
+        row = np.dtype([(f"f{k}", self._order + kind, (number,)) for k, (kind, number) in enumerate(columns)])
         held = np.frombuffer(self._bytes, row, rows, self._at)
         self._at += rows * row.itemsize
         return [held[f"f{k}"].astype(np.float64 if kind[0] == "f" else np.int64) for k, (kind, _) in enumerate(columns)]

@@ -1,0 +1,108 @@
+"""Samples fields of a solid once for all their pictures: on its faces, its mid-sections and a lattice through it.
+
+Figures and the interactive view colour a field by one range, which counts every sample: those on the boundary, on the
+mid-sections and inside. Whatever is drawn is among the samples, so no value that is drawn lies outside.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any, TypeVar
+
+import numpy as np
+
+from parameterize.arrays import Array
+from parameterize.quality.quality import arap_on
+from parameterize.spline.volume import BSplineVolume
+from solve.field import Points, SplineField
+from solve.forms.frame import UnitFrame
+from solve.forms.problem import BoundaryValueProblem
+
+from .evaluate import Grid, all_grids, error_at, flat, lengths
+from .style import ColorRange, error_range, even_range
+
+SAMPLES = 121  # per direction of a face or mid-section
+LATTICE = 41  # per direction of the cube
+KEPT = 2  # results of one function
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Hold what is found at the same places of the cube.
+
+    patches: nine arrays (SAMPLES, SAMPLES, ...), on the faces in the order of FACE_NAMES, then on u, v, w = 1/2.
+    lattice: (LATTICE, LATTICE, LATTICE, ...), at even steps of u, v and w, both ends included.
+    """
+
+    patches: Sequence[Array]
+    lattice: Array
+
+    @property
+    def everywhere(self) -> list[Array]:
+        """Return all arrays, of patches and lattice."""
+        return [*self.patches, self.lattice]
+
+
+@dataclass(frozen=True, eq=False)
+class Field(Samples):
+    """Hold the values of a field, its name in the controls of the view, the title of its bar, and its range."""
+
+    name: str
+    title: str
+    limits: ColorRange
+
+
+Result = TypeVar("Result", bound=Samples)
+
+
+def sampled(found_at: Callable[[Grid], Array]) -> Samples:
+    """Return the samples of a function of a tensor grid, which gives (n_u, n_v, n_w, ...)."""
+    even = np.linspace(0.0, 1.0, LATTICE)
+    return Samples([flat(found_at(grid)) for grid in all_grids(SAMPLES)], found_at((even, even, even)))
+
+
+def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
+    """Return a function that finds its last results again for the same objects, so that all pictures share samples."""
+    kept: list[tuple[tuple[Any, ...], Result]] = []
+
+    @wraps(function)
+    def found(*given: Any) -> Result:
+        for known, result in kept:
+            if all(old is new for old, new in zip(known, given, strict=True)):
+                return result
+        kept.append((given, function(*given)))
+        del kept[:-KEPT]
+        return kept[-1][1]
+
+    return found
+
+
+@remembered
+def points_of(volume: BSplineVolume) -> Samples:
+    """Return the points (..., 3) of a volume."""
+    return sampled(lambda grid: volume.grid(*grid))
+
+
+@remembered
+def distortion_of(volume: BSplineVolume) -> Field:
+    """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1."""
+    scale = 1.0 / UnitFrame.of(volume).length
+    found = sampled(lambda grid: np.tanh(np.sqrt(arap_on(volume, *grid, scale)) / 2.0))
+    return Field(found.patches, found.lattice, "distortion", "tanh(√ARAP / 2), at volume 1", ColorRange(0.0, 1.0))
+
+
+@remembered
+def solution_of(solution: SplineField) -> Field:
+    """Return u_h, or the length of a vector u_h."""
+    found = sampled(lambda grid: lengths(solution.grid(*grid)))
+    title = "u" if solution.coefficients.ndim == 3 else "|u|"
+    return Field(found.patches, found.lattice, "solution", title, even_range(found.everywhere))
+
+
+@remembered
+def error_of(volume: BSplineVolume, solution: SplineField, problem: BoundaryValueProblem) -> Field:
+    """Return |u - u_h|, whose range is logarithmic. problem: its exact solution is known."""
+    problem = problem.on(volume)
+    found = sampled(lambda grid: error_at(solution.grid(*grid), problem, Points.on(volume, *grid)))
+    limits = error_range([found.everywhere])
+    return Field(found.patches, found.lattice, "error", "|u − uₕ|, logarithmic", limits)
