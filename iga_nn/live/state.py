@@ -24,6 +24,7 @@ STAGES = {
     "cube": "3 of 6: to a cube",
     "corners": "4 of 6: corners fixed",
     "edges": "5 of 6: edges fixed",
+    "layout": "before the spline: the surface on a sphere",
     "spline": "6 of 6: the spline",
 }
 LABELS = {"checking": "being checked", "ready": "accepted"}  # the other states are called by their names
