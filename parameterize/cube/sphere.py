@@ -24,7 +24,7 @@ from ..surface.geometry import doubled_areas, edge_table
 from .cutting import split_edges
 from .flips import Layout
 
-_Weigh = Callable[[Array, Array], Array]
+_Weigh = Callable[[Array, Array, Mask], Array]
 
 _SHIFT = -1e-6  # below all eigenvalues of the Laplacian, so that it can be factorised
 _THIN = 1e-6  # area of a triangle, and length of an edge, that counts at least, as a share of the mean
@@ -41,7 +41,7 @@ def lay_on_sphere(
     """
     vertices, faces, upper = _halves(vertices, faces, layout.least_share)
     triangles = _Triangles(vertices, faces)
-    directions = _hemispheres(vertices, faces, upper, lambda straight, _: np.ones(len(straight)))
+    directions = _hemispheres(vertices, faces, upper, lambda straight, *_: np.ones(len(straight)))
     for weigh in _for_long_arms(layout):
         if triangles.energy(directions) <= layout.squeezed:
             break
@@ -72,19 +72,22 @@ def _for_long_arms(layout: LayoutConfig) -> Iterator[_Weigh]:
 
     Where each ring of points around an arm is to be nearer to the middle than the last by the same amount, the edges
     along it weigh as much as on a cone: as the square of how far away its tip is, in lengths of the edge. Edges that
-    lead aside would mix what lies on different sides of the arm, so these count the less, the sharper.
+    lead aside would mix what lies on different sides of the arm, so these count the less, the higher the power. Mixed
+    least is what follows the points nearer to the rim alone.
     """
-    yield lambda straight, _: 1.0 + layout.along * straight
+    yield lambda straight, *_: 1.0 + layout.along * straight
     for power in layout.sharpness:
-        yield lambda straight, left, power=power: 1.0 + straight**power * left**2  # type: ignore[misc]
+        yield lambda straight, left, _, p=power: 1.0 + straight**p * left**2  # type: ignore[misc]
+    for power in layout.one_way:
+        yield lambda straight, left, outwards, p=power: 1.0 + straight**p * left * outwards  # type: ignore[misc]
 
 
 def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -> Array:
     """Return directions (n, 3) of points (n, 3) whose triangles above and below go to the two hemispheres.
 
     The common rim goes to the equator by its length. Every other point is a mean of its neighbours in the disc. `weigh`
-    is told of each mesh edge how straight it leads towards the rim, or away from it, 0 to 1, and how far the point
-    farthest from the rim is, in lengths of the edge.
+    is told of each mesh edge how straight it leads towards the rim, or away from it, 0 to 1; how far the point farthest
+    from the rim is, in lengths of the edge; and whether the neighbour is nearer to the rim than the point it pulls.
     """
     rim = np.asarray(igl.boundary_loop(faces[upper]), dtype=np.int64)
     length = np.linalg.norm(vertices[np.roll(rim, -1)] - vertices[rim], axis=1)
@@ -99,7 +102,9 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -
         length = _lengths(vertices, edges)
         away = dijkstra(_links(edges, length, len(vertices)), indices=rim, min_only=True)[edges]
         straight, left = ((away[:, 1] - away[:, 0]) / length) ** 2, (away.max() - away.mean(axis=1)) / length
-        links = _links(edges, weigh(straight, left), len(vertices))
+        nearer = away[:, 1] < away[:, 0]
+        pulls = weigh(straight, left, nearer), weigh(straight, left, ~nearer)
+        links = _links(edges, np.concatenate(pulls), len(vertices))
         matrix = csc_array(_laplacian(links)[inner][:, inner])
         flat[inner] = _solved(matrix, links[inner][:, rim] @ flat[rim])
         square = (flat[used] ** 2).sum(axis=1, keepdims=True)  # stereographic
@@ -114,9 +119,12 @@ def _lengths(vertices: Array, edges: IntArray) -> Array:
 
 
 def _links(edges: IntArray, weights: Array, count: int) -> csr_array:
-    """Return the weights (e,) of edges (e, 2) between `count` points as a symmetric matrix."""
+    """Return the weights of edges (e, 2) between `count` points as a matrix.
+
+    weights: (e,) for a symmetric one; else (2 e,), those of the second ends for the first ones and then the others.
+    """
     i, j = np.concatenate([edges, edges[:, ::-1]]).T
-    return csr_array(coo_array((np.tile(weights, 2), (i, j)), shape=(count, count)))
+    return csr_array(coo_array((np.resize(weights, len(i)), (i, j)), shape=(count, count)))
 
 
 def _laplacian(links: csr_array) -> csr_array:
@@ -124,7 +132,7 @@ def _laplacian(links: csr_array) -> csr_array:
 
 
 def _solved(matrix: csc_array, right: Array) -> Array:
-    """Solve with a symmetric positive definite matrix: the order of elimination keeps its symmetry."""
+    """Solve with a matrix that needs no pivots: it is symmetric positive definite, or its diagonal is dominant."""
     factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return np.asarray(factors.solve(right))
 
