@@ -74,7 +74,7 @@ def test_a_needle_askew_takes_the_memory_of_what_is_in_it():
     assert len(inside) * 0.1**3 == pytest.approx(volume, rel=0.05)
     within = ((inside >= 0.0) & (inside <= 100.0)).all(axis=1)  # places are cut off at the cube's faces
     assert places[within] == pytest.approx(inside[within] / 100.0, abs=1e-4)
-    assert taken < 100e6
+    assert taken < 250e6  # a number for each point of the box would take 500, and there were several
 
 
 def test_its_spline_stage_penalises_folds_from_the_first_round():

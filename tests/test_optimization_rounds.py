@@ -363,7 +363,9 @@ def test_what_was_certified_is_the_result_where_further_rounds_fold_more(monkeyp
 
     def found(control, *_):
         left = next(answers)
-        seen.append(Optimized(control, replace(proved, unproved=np.tile([1, 1, 1], (left, 1))) if left else proved, True))
+        seen.append(
+            Optimized(control, replace(proved, unproved=np.tile([1, 1, 1], (left, 1))) if left else proved, True)
+        )
         return seen[-1]
 
     monkeypatch.setattr(Optimized, "of", found)

@@ -150,4 +150,4 @@ def test_a_needle_askew_takes_the_memory_of_what_is_in_it():
     taken = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert len(points) * CELL**3 == pytest.approx(4.0 / 3.0 * np.pi * 35.0 * 0.35**2, rel=0.1)
-    assert taken < 50e6
+    assert taken < 250e6  # the coordinates of all would take 1500

@@ -3,8 +3,9 @@
 The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
 sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
 one-to-one but badly squeezed: a long arm shrinks exponentially with its length. Where it does, the mesh edges along it
-get more weight: those of a cone, on which such a layout is even, up to its tip. From there Newton's method lowers the symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics
-34, 2015), which is infinite where a triangle has no area left: no step turns a triangle over.
+get more weight: those of a cone, on which such a layout is even, up to its tip. From there Newton's method lowers the
+symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has no
+area left: no step turns a triangle over.
 """
 
 import math
@@ -37,7 +38,8 @@ def lay_on_sphere(
 ) -> Layout:
     """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
 
-    `progress` is told of each Newton step, under the name of the stage "layout", with the energy as its loss. Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh.
+    Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh. `progress` is told of each
+    Newton step: the stage is "layout", the loss the energy.
     """
     vertices, faces, upper = _halves(vertices, faces, layout.least_share)
     triangles = _Triangles(vertices, faces)

@@ -81,7 +81,7 @@ def near_or_inside(vertices: Array, faces: IntArray, cell: float, margin: float)
 def stencils(vertices: Array, faces: IntArray, cell: float, *, device: torch.device, dtype: torch.dtype) -> Stencils:
     """Return stencils around every lattice point inside the surface or within h/2 of it, to cover it at any shift."""
     index = near_or_inside(vertices, faces, cell, cell / 2.0)
-    centres = index[signed_distance(index * cell, vertices, faces) < cell / 2.0]
+    centres = index[signed_distance(np.asarray(cell * index, dtype=np.float64), vertices, faces) < cell / 2.0]
     needed, inverse = np.unique((centres[:, None, :] + OFFSETS).reshape(-1, 3), axis=0, return_inverse=True)
     return Stencils(
         torch.as_tensor(needed * cell, dtype=dtype, device=device),
