@@ -64,7 +64,8 @@ class Task:
     @cached_property
     def sphere(self) -> Layout:
         """The surface at volume 1, laid on the sphere."""
-        return lay_on_sphere(self.surface.unit_vertices, self.surface.faces, self.config.layout)
+        surface = self.surface
+        return lay_on_sphere(surface.unit_vertices, surface.faces, self.config.layout, self.report["progress"])
 
 
 @dataclass(frozen=True, eq=False)

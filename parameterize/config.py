@@ -223,9 +223,12 @@ class LayoutConfig:
     settle_margin: float = 1e-2  # share that a cut keeps from the ends of its edge
     undo_rounds: int = 10  # in which such steps are undone at flipped triangles, at most
     least_share: float = 0.25  # that the line which halves a surface keeps from the ends of the edges it divides
-    squeezed: float = 1e8  # energy of the first layout on the sphere (at rest some 50) above which another is tried
-    along: float = 10.0  # weight of edges that lead away from that line, in addition, in the other one
+    squeezed: float = 1e8  # energy of the first layout on the sphere (at rest some 50) above which others are tried
+    along: float = 10.0  # weight of edges that lead away from that line, in addition, in the first of the others
+    sharpness: tuple[int, ...] = (2, 4, 8, 16, 32, 64)  # in the next ones: the higher, the straighter edges count
+    one_way: tuple[int, ...] = (4, 16)  # likewise in the last ones, where edges count from their far end alone
     sphere_steps: int = 300  # of Newton's method for the layout on the sphere, at most
+    usual_sphere_steps: int = 30  # of most surfaces: tells the time left
     sphere_damping: float = 1e-8  # of these, as a share of the mean diagonal entry
     sphere_gain: float = 1e-3  # the steps end once one lowers the energy by less than this share
     turns: int = 200  # of the cube in that layout, drawn at random

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import cg
 
-from .arrays import Array, IntArray, Mask
+from .arrays import Array, IntArray
 from .config import ExtensionConfig, SplineConfig
 from .cube.cube import VARYING_AXES
 from .cube.flips import Layout
@@ -32,21 +32,19 @@ def extended(layout: Layout, options: ExtensionConfig) -> tuple[Array, Array]:
     low = layout.vertices.min(axis=0) - cell * _OFFSET
     shape = np.ceil((layout.vertices.max(axis=0) - low) / cell).astype(np.int64) + 1
     lines = [_crossings(layout, axis, low, cell, shape) for axis in range(3)]
-    inside = _inside(lines[0], shape)
+    inside = _inside(lines[0])
     matrix, right = _harmonic_system(lines, inside)
     precondition = diags_array(1.0 / matrix.diagonal())
     places = [cg(matrix, column, rtol=options.tolerance, M=precondition)[0] for column in right.T]
-    return low + cell * np.argwhere(inside), np.clip(np.stack(places, axis=1), 0.0, 1.0)
+    return low + cell * inside, np.clip(np.stack(places, axis=1), 0.0, 1.0)
 
 
-def _harmonic_system(lines: list["_Crossings"], inside: Mask) -> tuple[csr_array, Array]:
-    """Return matrix (k, k) and right side (k, 3): each inner point is the mean of its six neighbours.
+def _harmonic_system(lines: list["_Crossings"], index: IntArray) -> tuple[csr_array, Array]:
+    """Return matrix (k, k) and right side (k, 3): each inner point, index (k, 3), is the mean of its six neighbours.
 
     Where the surface is nearer than the next lattice point, it takes that one's part, weighed by how near it is.
     """
-    index = np.argwhere(inside)
-    numbers = np.full(inside.shape, -1)
-    numbers[inside] = np.arange(len(index))
+    keys = np.ravel_multi_index(tuple(index.T), tuple(lines[0].shape))  # ascending
     diagonal, right = np.zeros(len(index)), np.zeros((len(index), 3))
     rows, columns = [], []
     for (axis, crossings), side in product(enumerate(lines), (1, -1)):
@@ -54,8 +52,9 @@ def _harmonic_system(lines: list["_Crossings"], inside: Mask) -> tuple[csr_array
         near = gap < 1.0
         beside = index.copy()
         beside[:, axis] += side
-        neighbours = numbers[tuple(np.clip(beside, 0, np.array(inside.shape) - 1).T)]
-        linked = ~near & (neighbours >= 0)
+        wanted = np.ravel_multi_index(tuple(beside.T), tuple(lines[0].shape), mode="clip")
+        neighbours = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        linked = ~near & (keys[neighbours] == wanted)
         weight = np.where(near, 1.0 / np.maximum(gap, _NEAREST), linked)
         right[near] += weight[near, None] * values[near]
         diagonal += weight
@@ -127,10 +126,20 @@ def _doubled_area(a: Array, b: Array, c: Array) -> Array:
     return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
-def _inside(crossings: _Crossings, shape: IntArray) -> Mask:
-    """Return which lattice points lie inside, along lines of the first axis: more have been entered than left."""
-    entered = np.zeros((shape[1] * shape[2], shape[0] + 1), dtype=np.int64)
+def _inside(crossings: _Crossings) -> IntArray:
+    """Return the lattice points (k, 3) inside, in their order: along lines of the first axis, more entered than left.
+
+    Only they are held: of the box around a thin body that lies askew they are a small part.
+    """
+    lines, shape = crossings.lines, crossings.shape
     places = np.clip(np.ceil(crossings.positions).astype(np.int64), 0, shape[0])
-    np.add.at(entered, (crossings.lines, places), crossings.signs)
-    inside = np.cumsum(entered, axis=1)[:, :-1] > 0
-    return np.asarray(np.moveaxis(inside.reshape(shape[1], shape[2], shape[0]), 2, 0))
+    total = np.cumsum(crossings.signs)
+    begins = np.searchsorted(lines, lines)  # of each crossing's line, the first one
+    entered = total - (total - crossings.signs)[begins]
+    same_line = np.append(lines[1:] == lines[:-1], False)
+    ends = np.where(same_line, np.append(places[1:], 0), shape[0])
+    counts = np.where(entered > 0, ends - places, 0)
+    owner = np.repeat(np.arange(len(lines)), counts)
+    first = places[owner] + np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+    index = np.stack([first, *np.divmod(lines[owner], shape[2])], axis=1)
+    return index[np.lexsort(index.T[::-1])]

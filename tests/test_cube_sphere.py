@@ -118,3 +118,45 @@ def test_the_energy_falls_and_no_step_turns_a_triangle_over():
     relaxed = _relaxed(rough, triangles, LAYOUT)
     assert triangles.energies(relaxed).sum() < triangles.energies(rough).sum()
     assert not turned_over(relaxed, faces).any()
+
+
+@pytest.mark.parametrize(("rings", "around", "length"), [(300, 8, 150.0), (40, 30, 100.0)])
+def test_a_needle_is_laid_out_whole_without_a_warning(rings, around, length):
+    """Its plain layout shrinks to less than the numbers can tell apart: to triangles of no area."""
+    vertices, faces = rod(rings, around, length)
+    with np.errstate(all="raise", under="ignore"):
+        layout = lay_on_sphere(vertices, faces, LAYOUT)
+    assert not turned_over(layout.places, layout.faces).any()
+    energies = _Triangles(layout.vertices, layout.faces).energies(layout.places)
+    assert np.isfinite(energies).all()
+    assert energies.sum() < 2.0 * 8.0 * np.pi * length  # 8 pi is that of a sphere
+
+
+def test_triangles_that_the_numbers_cannot_tell_apart_have_infinite_energy_and_no_warning():
+    vertices, faces = ball(300)
+    triangles = _Triangles(vertices, faces)
+    squeezed = vertices.copy()
+    squeezed[faces[0]] = vertices[faces[0, 0]]  # to a single point
+    with np.errstate(all="raise"):
+        energies = triangles.energies(squeezed)
+        assert np.isfinite(triangles.energies(vertices)).all()
+    touched = np.isin(faces, faces[0]).sum(axis=1) >= 2
+    assert np.isinf(energies[touched]).all()
+    assert np.isfinite(energies[~np.isin(faces, faces[0]).any(axis=1)]).all()
+    assert np.array_equal(_relaxed(squeezed, triangles, LAYOUT), squeezed)
+
+
+def test_each_step_is_told_and_may_be_the_last():
+    vertices, faces = horseshoe(400)
+    told = []
+    lay_on_sphere(vertices, faces, LAYOUT, told.append)
+    assert [now.step for now in told] == list(range(1, len(told) + 1)) and len(told) > 2
+    assert {(now.stage, now.steps) for now in told} == {("layout", LAYOUT.sphere_steps)}
+    assert np.all(np.diff([now.loss for now in told]) < 0.0)
+    assert all(now.seconds_left > 0.0 for now in told)
+
+    def stop(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        lay_on_sphere(vertices, faces, LAYOUT, stop)

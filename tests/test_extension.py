@@ -1,11 +1,12 @@
 """The extension of a surface's layout into the solid: values on its surface, sheets that are close, a folded sheet."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
-from shapes import ball
+from shapes import ball, turned
 from small_run import tiny_config
 
 from parameterize import parameterize
@@ -58,6 +59,22 @@ def test_where_two_parts_overlap_is_inside():
     assert len(inside) * CELL.cell**3 == pytest.approx(1.0, rel=0.1)
     for low in (0.1, 0.45, 0.65):  # in one, in both, in the other
         assert ((inside[:, 0] > low) & (inside[:, 0] < low + 0.15)).any()
+
+
+def test_a_needle_askew_takes_the_memory_of_what_is_in_it():
+    """Of the box around it, 40 cubed, the lattice has 64 million points, and the needle a ten thousandth of them."""
+    points, faces = ball(400)
+    points = turned(points * [35.0, 0.35, 0.35], (0.0, -0.62, 0.79))
+    assert np.ptp(points, axis=0).min() > 35.0
+    tracemalloc.start()
+    inside, places = extended(Layout(points, faces, points / 100.0), replace(CELL, cell=0.1))
+    taken = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    volume = abs(trimesh.Trimesh(points, faces, process=False).volume)
+    assert len(inside) * 0.1**3 == pytest.approx(volume, rel=0.05)
+    within = ((inside >= 0.0) & (inside <= 100.0)).all(axis=1)  # places are cut off at the cube's faces
+    assert places[within] == pytest.approx(inside[within] / 100.0, abs=1e-4)
+    assert taken < 250e6  # a number for each point of the box would take 500, and there were several
 
 
 def test_its_spline_stage_penalises_folds_from_the_first_round():

@@ -84,3 +84,12 @@ def test_turns_that_overlap_are_parted():
         control = control + step
     parted = type(volume)(volume.degrees, volume.knots, np.moveaxis(control.numpy(), 0, -1))
     assert check_boundary(parted).injective is True
+
+
+def test_samples_are_looked_at_in_parts_with_the_same_result(monkeypatch):
+    volume = spring(-1e-2)
+    whole = contact(volume)
+    monkeypatch.setattr("parameterize.optimization.contact._CHUNK", 37)
+    parts = contact_penalty(volume.knots, 3, control_of(volume), GAP)
+    assert np.array_equal(parts.spans, whole.spans) and len(parts.spans) > 2 * 37
+    assert torch.equal(parts.normals, whole.normals)

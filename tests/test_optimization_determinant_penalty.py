@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 import torch
@@ -119,3 +121,20 @@ def test_curvature_is_gauss_newton():
     expected = 2.0 * (change**2).mean(axis=(1, 2, 3)).sum() / len(spans)
     found = float((step * barrier.curvature(control)(step.float())).sum())
     assert found == pytest.approx(expected, rel=3e-3)
+
+
+def test_rows_that_are_not_kept_are_made_anew_with_the_same_result(monkeypatch):
+    knots, control, volume = setting(3, 0.2, n=(8, 8, 8))
+    barrier = SpanBarrier(knots, 3, 0.8)
+    barrier.activate(all_spans(volume))
+    step = torch.randn(control.shape, generator=torch.Generator().manual_seed(0))
+    products, held = [], []
+    for most in (1e9, 1e6, 0.0):
+        monkeypatch.setattr("parameterize.optimization.determinant_penalty._MOST_KEPT", most)
+        tracemalloc.start()
+        curvature = barrier.curvature(control)
+        held.append(tracemalloc.get_traced_memory()[0])
+        tracemalloc.stop()
+        products.append(curvature(step))
+    assert torch.equal(products[0], products[1]) and torch.equal(products[0], products[2])
+    assert held[0] > 5e6 and held[1] < held[0] - 3e6 and held[2] < 1e6

@@ -351,6 +351,34 @@ def test_what_gave_way_counts_again_once_the_map_is_certified():
     assert history.arrays()["step"].max() >= 3 * CONFIG.steps  # rounds after the certificate: 0.05 times 4 a round
 
 
+@pytest.mark.parametrize(
+    ("counts", "rounds"),
+    [([0, 0, 3, 1, 4, 9, 20], 5), ([0, 2, 2, 1, 0, 0, 0], 7), ([0, 3, 4, 0, 0, 0, 0], 3), ([0, 12, 1, 0, 0, 0, 0], 2)],
+    ids=["worse and worse", "recovers", "worse once", "too many at once"],
+)
+def test_what_was_certified_is_the_result_where_further_rounds_fold_more(monkeypatch, counts, rounds):
+    """With at most ten spans watched. Numbers of unproved spans after each round; the first is certified."""
+    proved, steps, seen = certify(as_volume(wavy_control(0.0))), count(1), []
+    answers = iter([0, *counts])  # the first is asked of the start
+
+    def found(control, *_):
+        left = next(answers)
+        seen.append(
+            Optimized(control, replace(proved, unproved=np.tile([1, 1, 1], (left, 1))) if left else proved, True)
+        )
+        return seen[-1]
+
+    monkeypatch.setattr(Optimized, "of", found)
+    monkeypatch.setattr("parameterize.optimization.rounds._Rounds._mended", lambda _, found: found)
+    monkeypatch.setattr(DESCEND, lambda energy, control, *_, **__: control + 1e-6 * next(steps))
+    fit = surface_fit()
+    fit.give_way(np.full(len(fit.points), 1e-6))  # so that the polish has something to take back
+    config = replace(CONFIG, rounds=12, polish=6, most_watched=10)
+    kept = optimize(wavy_control(0.0), KNOTS, fit, config, history=History())
+    assert len(seen) == 1 + rounds
+    assert kept is [one for one, left in zip(seen[1:], counts, strict=False) if left == 0][-1]
+
+
 def test_interrupted_between_rounds_goes_on_to_the_same_result(tmp_path):
     start = wavy_control(0.15, seed=1)
     config = replace(CONFIG, steps=2, rounds=3)

@@ -1,17 +1,18 @@
+import tracemalloc
 from itertools import product
 
 import numpy as np
 import pytest
 import torch
 from scipy.spatial import cKDTree
-from shapes import ball, rounded_cube
+from shapes import ball, rounded_cube, turned
 
 from parameterize.training.samples import (
     OFFSETS,
     TriangleSampler,
     gather,
     interior_points,
-    lattice,
+    near_or_inside,
     signed_distance,
     stencils,
 )
@@ -42,7 +43,7 @@ def test_stencils_cover_the_domain_under_every_shift():
     vertices, faces = rounded_cube(600)
     found = make_stencils(vertices, faces)
     centres = found.nodes[found.index[:, 0]].numpy()
-    points, _ = lattice(vertices, CELL / 3.0, 0.0)
+    points = CELL / 3.0 * near_or_inside(vertices, faces, CELL / 3.0, 0.0)
     points = np.concatenate([points[signed_distance(points, vertices, faces) < 0.0], vertices])
     for corner in product((-0.5, 0.5), repeat=3):
         reach, _ = cKDTree(centres + CELL * np.array(corner)).query(points, p=np.inf)
@@ -119,3 +120,34 @@ def test_gathered_rows_have_a_repeatable_gradient():
     for _ in range(300):  # plain indexing differs about once in 70 times on two threads
         (again,) = torch.autograd.grad((gather(rows, index) * weights).sum(), rows)
         assert torch.equal(first, again)
+
+
+def whole_lattice(vertices, cell, margin):
+    low, high = np.floor((vertices.min(0) - margin) / cell), np.ceil((vertices.max(0) + margin) / cell)
+    return np.stack(np.meshgrid(*map(np.arange, low, high + 1.0), indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (3.0, 1.0, 0.5), (6.0, 0.4, 0.4)])
+def test_nothing_inside_is_left_out_of_the_lattice(stretch):
+    vertices, faces = ball(500)
+    vertices = turned(vertices * stretch, (0.5, 0.9, -0.4))
+    everywhere = whole_lattice(vertices, CELL, CELL / 2.0)
+    inside = everywhere[signed_distance(CELL * everywhere, vertices, faces) < 0.0]
+    assert interior_points(vertices, faces, CELL) == pytest.approx(CELL * inside)
+    close = everywhere[signed_distance(CELL * everywhere, vertices, faces) < CELL / 2.0]
+    found = near_or_inside(vertices, faces, CELL, CELL / 2.0)
+    assert {tuple(row) for row in close.astype(int).tolist()} <= {tuple(row) for row in found.tolist()}
+    assert np.array_equal(found, np.unique(found, axis=0))  # each once, in their order
+
+
+def test_a_needle_askew_takes_the_memory_of_what_is_in_it():
+    """Of the box around it, 40 cubed, the lattice has 64 million points, and the needle a ten thousandth of them."""
+    vertices, faces = ball(400)
+    vertices = turned(vertices * [35.0, 0.35, 0.35], (0.0, -0.62, 0.79))
+    assert np.ptp(vertices, axis=0).min() > 35.0
+    tracemalloc.start()
+    points = interior_points(vertices, faces, CELL)
+    taken = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(points) * CELL**3 == pytest.approx(4.0 / 3.0 * np.pi * 35.0 * 0.35**2, rel=0.1)
+    assert taken < 250e6  # the coordinates of all would take 1500

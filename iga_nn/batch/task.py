@@ -40,7 +40,7 @@ def compute(task: Task, number: int, batch: str) -> Ended:
     """
     from distributed import get_worker
 
-    worker, stages = get_worker(), [stage.name for stage in task.mapping.config().stages] + ["spline"]
+    worker, stages = get_worker(), [stage.name for stage in task.mapping.config().stages] + ["layout", "spline"]
 
     def tell(now: Progress) -> None:
         share = (stages.index(now.stage) + now.step / max(now.steps, 1)) / len(stages)

@@ -27,6 +27,7 @@ STAGES = {
     "cube": "3 of 7: to a cube",
     "corners": "4 of 7: corners fixed",
     "edges": "5 of 7: edges fixed",
+    "layout": "before the spline: the surface on a sphere",
     "spline": "6 of 7: the spline",
 }
 LAST = "7 of 7: solution and report"

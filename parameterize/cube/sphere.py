@@ -3,11 +3,14 @@
 The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
 sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
 one-to-one but badly squeezed: a long arm shrinks exponentially with its length. Where it does, the mesh edges along it
-get more weight. From there Newton's method lowers the symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics
-34, 2015), which is infinite where a triangle has no area left: no step turns a triangle over.
+get more weight: those of a cone, on which such a layout is even, up to its tip. From there Newton's method lowers the
+symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has no
+area left: no step turns a triangle over.
 """
 
 import math
+import time
+from collections.abc import Callable, Iterator
 
 import igl
 import numpy as np
@@ -17,27 +20,35 @@ from scipy.sparse.linalg import eigsh, splu
 
 from ..arrays import Array, IntArray, Mask
 from ..config import LayoutConfig
+from ..progress import Progress, ProgressCallback, ignore
 from ..surface.geometry import doubled_areas, edge_table
 from .cutting import split_edges
 from .flips import Layout
 
+_Weigh = Callable[[Array, Array, Mask], Array]
+
 _SHIFT = -1e-6  # below all eigenvalues of the Laplacian, so that it can be factorised
 _THIN = 1e-6  # area of a triangle, and length of an edge, that counts at least, as a share of the mean
+_LEAST_ROOM = 1e-40  # of a triangle on the sphere, as a share of its area: powers of less leave the numbers' range
 _SHORTEST_STEP = 1e-10
 
 
-def lay_on_sphere(vertices: Array, faces: IntArray, layout: LayoutConfig) -> Layout:
+def lay_on_sphere(
+    vertices: Array, faces: IntArray, layout: LayoutConfig, progress: ProgressCallback = ignore
+) -> Layout:
     """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
 
-    Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh.
+    Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh. `progress` is told of each
+    Newton step: the stage is "layout", the loss the energy.
     """
     vertices, faces, upper = _halves(vertices, faces, layout.least_share)
     triangles = _Triangles(vertices, faces)
-    directions = _hemispheres(vertices, faces, upper, 0.0)
-    if triangles.energy(directions) > layout.squeezed:
-        other = _hemispheres(vertices, faces, upper, layout.along)
-        directions = min(directions, other, key=triangles.energy)
-    return Layout(vertices, faces, _relaxed(directions, triangles, layout))
+    directions = _hemispheres(vertices, faces, upper, lambda straight, *_: np.ones(len(straight)))
+    for weigh in _for_long_arms(layout):
+        if triangles.energy(directions) <= layout.squeezed:
+            break
+        directions = min(directions, _hemispheres(vertices, faces, upper, weigh), key=triangles.energy)
+    return Layout(vertices, faces, _relaxed(directions, triangles, layout, progress))
 
 
 def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntArray, Mask]:
@@ -58,11 +69,27 @@ def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntA
     return points, faces, np.concatenate([height, np.zeros(len(cut))])[faces].sum(axis=1) > 0.0
 
 
-def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, along: float) -> Array:
+def _for_long_arms(layout: LayoutConfig) -> Iterator[_Weigh]:
+    """Yield weights of mesh edges, see `_hemispheres`, that shrink a long arm less; which suits depends on the mesh.
+
+    Where each ring of points around an arm is to be nearer to the middle than the last by the same amount, the edges
+    along it weigh as much as on a cone: as the square of how far away its tip is, in lengths of the edge. Edges that
+    lead aside would mix what lies on different sides of the arm, so these count the less, the higher the power. Mixed
+    least is what follows the points nearer to the rim alone.
+    """
+    yield lambda straight, *_: 1.0 + layout.along * straight
+    for power in layout.sharpness:
+        yield lambda straight, left, _, p=power: 1.0 + straight**p * left**2  # type: ignore[misc]
+    for power in layout.one_way:
+        yield lambda straight, left, outwards, p=power: 1.0 + straight**p * left * outwards  # type: ignore[misc]
+
+
+def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -> Array:
     """Return directions (n, 3) of points (n, 3) whose triangles above and below go to the two hemispheres.
 
-    The common rim goes to the equator by its length. Every other point is a mean of its neighbours in the disc, in
-    which one that lies straight towards the rim, or away from it, counts 1 + `along` times.
+    The common rim goes to the equator by its length. Every other point is a mean of its neighbours in the disc. `weigh`
+    is told of each mesh edge how straight it leads towards the rim, or away from it, 0 to 1; how far the point farthest
+    from the rim is, in lengths of the edge; and whether the neighbour is nearer to the rim than the point it pulls.
     """
     rim = np.asarray(igl.boundary_loop(faces[upper]), dtype=np.int64)
     length = np.linalg.norm(vertices[np.roll(rim, -1)] - vertices[rim], axis=1)
@@ -76,7 +103,10 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, along: float) ->
         edges, _ = edge_table(faces[half])
         length = _lengths(vertices, edges)
         away = dijkstra(_links(edges, length, len(vertices)), indices=rim, min_only=True)[edges]
-        links = _links(edges, 1.0 + along * ((away[:, 1] - away[:, 0]) / length) ** 2, len(vertices))
+        straight, left = ((away[:, 1] - away[:, 0]) / length) ** 2, (away.max() - away.mean(axis=1)) / length
+        nearer = away[:, 1] < away[:, 0]
+        pulls = weigh(straight, left, nearer), weigh(straight, left, ~nearer)
+        links = _links(edges, np.concatenate(pulls), len(vertices))
         matrix = csc_array(_laplacian(links)[inner][:, inner])
         flat[inner] = _solved(matrix, links[inner][:, rim] @ flat[rim])
         square = (flat[used] ** 2).sum(axis=1, keepdims=True)  # stereographic
@@ -91,9 +121,12 @@ def _lengths(vertices: Array, edges: IntArray) -> Array:
 
 
 def _links(edges: IntArray, weights: Array, count: int) -> csr_array:
-    """Return the weights (e,) of edges (e, 2) between `count` points as a symmetric matrix."""
+    """Return the weights of edges (e, 2) between `count` points as a matrix.
+
+    weights: (e,) for a symmetric one; else (2 e,), those of the second ends for the first ones and then the others.
+    """
     i, j = np.concatenate([edges, edges[:, ::-1]]).T
-    return csr_array(coo_array((np.tile(weights, 2), (i, j)), shape=(count, count)))
+    return csr_array(coo_array((np.resize(weights, len(i)), (i, j)), shape=(count, count)))
 
 
 def _laplacian(links: csr_array) -> csr_array:
@@ -101,7 +134,7 @@ def _laplacian(links: csr_array) -> csr_array:
 
 
 def _solved(matrix: csc_array, right: Array) -> Array:
-    """Solve with a symmetric positive definite matrix: the order of elimination keeps its symmetry."""
+    """Solve with a matrix that needs no pivots: it is symmetric positive definite, or its diagonal is dominant."""
     factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return np.asarray(factors.solve(right))
 
@@ -128,13 +161,17 @@ class _Triangles:
         self._stiffness = sides @ np.swapaxes(sides, 1, 2) / (4.0 * self._area[:, None, None])
 
     def energies(self, directions: Array) -> Array:
-        """Return the energy of each triangle (m,); infinity where it is turned over, seen from the sphere's centre."""
+        """Return the energy of each triangle (m,).
+
+        It is infinite where a triangle is turned over, seen from the sphere's centre, or too small for the numbers.
+        """
         corners = directions[self.faces]
         area = 0.5 * _volumes(corners)
         sides = corners - corners[:, :1]  # tiny triangles would be lost in the rounding of their corners
         dirichlet = np.einsum("mij,mic,mjc->m", self._stiffness, sides, sides)
-        squeezed = np.divide(self._area, area, out=np.full(len(area), np.inf), where=area > 0.0)
-        return np.asarray(dirichlet * (1.0 + squeezed**2))
+        told_apart = area > _LEAST_ROOM * self._area
+        squeezed = np.divide(self._area, area, out=np.ones(len(area)), where=told_apart)
+        return np.where(told_apart, dirichlet * (1.0 + squeezed**2), np.inf)
 
     def energy(self, directions: Array) -> float:
         """Return the energy of all triangles."""
@@ -178,7 +215,9 @@ def _area_bends(corners: Array) -> Array:
     return bends
 
 
-def _relaxed(directions: Array, triangles: _Triangles, layout: LayoutConfig) -> Array:
+def _relaxed(
+    directions: Array, triangles: _Triangles, layout: LayoutConfig, progress: ProgressCallback = ignore
+) -> Array:
     """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls.
 
     Where the hemispheres squeeze triangles to less than the numbers can tell, the directions are returned as they are.
@@ -187,7 +226,8 @@ def _relaxed(directions: Array, triangles: _Triangles, layout: LayoutConfig) -> 
     unknowns = (2 * triangles.faces[:, :, None] + np.arange(2)).reshape(-1, 6)
     rows, columns = np.repeat(unknowns, 6, axis=1).ravel(), np.tile(unknowns, (1, 6)).ravel()
     size = 2 * len(directions)
-    for _ in range(layout.sphere_steps if math.isfinite(energy) else 0):
+    for number in range(layout.sphere_steps if math.isfinite(energy) else 0):
+        begun = time.perf_counter()
         tangents = _tangents(directions)
         slopes, hessians = triangles.derivatives(directions, tangents)
         slope = np.asarray(np.bincount(unknowns.ravel(), slopes.ravel(), size), dtype=np.float64)
@@ -205,6 +245,8 @@ def _relaxed(directions: Array, triangles: _Triangles, layout: LayoutConfig) -> 
         else:
             break
         gain, directions, energy = energy - lower, trial, lower
+        left = max(layout.usual_sphere_steps - number, 1) * (time.perf_counter() - begun)
+        progress(Progress("layout", number + 1, layout.sphere_steps, energy, 0, left))
         if gain < layout.sphere_gain * energy:
             break
     return directions

@@ -23,6 +23,7 @@ from .sliding import SlidingParameters
 
 _SAMPLES = 110  # a direction and cube face
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
+_CHUNK = 4096  # samples at a time, which take some 40 MB
 _REACH = 0.05  # from a contact, in a domain of volume 1: what the steps of a round look at
 _ACCURACY = 2.0  # of the fast winding number
 
@@ -109,8 +110,12 @@ def _around(points: Array, touching: IntArray) -> IntArray:
 
 def _facing_samples(points: Array, normals: Array, touching: IntArray) -> tuple[IntArray, IntArray]:
     """Return the samples of `touching` (k,) near which another faces the opposite way, and the nearest such one."""
-    near = np.asarray(cKDTree(points).query(points[touching], k=_CANDIDATES)[1])  # (k, candidates), nearest first
-    opposite = np.einsum("kc,knc->kn", normals[touching], normals[near]) < -0.5
-    found = opposite.any(axis=1)
-    first = opposite[found].argmax(axis=1)
-    return touching[found], near[found, first]
+    tree, nearest = cKDTree(points), np.full(len(touching), -1)
+    for start in range(0, len(touching), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        near = np.asarray(tree.query(points[touching[chunk]], k=_CANDIDATES)[1])  # (k, candidates), nearest first
+        opposite = np.einsum("kc,knc->kn", normals[touching[chunk]], normals[near]) < -0.5
+        first = near[np.arange(len(near)), opposite.argmax(axis=1)]
+        nearest[chunk] = np.where(opposite.any(axis=1), first, -1)
+    found = nearest >= 0
+    return touching[found], nearest[found]

@@ -24,6 +24,7 @@ from ..threads import in_parallel
 from .operators import PiecewiseOperator
 
 _BLOCK = 32  # spans at a time: what they need fits into the cache
+_MOST_KEPT = 300e6  # bytes of rows that are kept from product to product; those of further spans are made anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,17 +130,20 @@ class SpanBarrier:
         )
 
     def curvature(self, control: Tensor) -> PiecewiseOperator:
-        """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
+        """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision.
+
+        Its rows are kept while they take less than `_MOST_KEPT`: those of a map that folds nearly everywhere would take
+        gigabytes. Where they are made anew at each product, the result is the same.
+        """
+        taken = 0.0
 
         def piece(spans: _Spans) -> Callable[[Tensor], tuple[IntArray, Array]]:
+            nonlocal taken
             found = self._short_rows(control, spans, np.float32)
-            first, rows, shares = found.spans.first, (found.rows, found.starts), 2.0 * found.shares
-            weights, back = found.spans.weights.astype(np.float32), found.spans.back.astype(np.float32)
-
-            def product(x: Tensor) -> tuple[IntArray, Array]:
-                return first, _squared(x.numpy(), first, weights, back, *rows, shares)
-
-            return product
+            taken += found.rows.nbytes
+            if taken <= _MOST_KEPT:
+                return lambda x: _product(found, x)
+            return lambda x: _product(self._short_rows(control, spans, np.float32), x)
 
         return PiecewiseOperator(in_parallel(piece, self._pieces), _collected)
 
@@ -163,6 +167,14 @@ class SpanBarrier:
         starts = np.concatenate([[0], np.cumsum(counts[counts > 0])])
         shares = spans.shares[place[:, 0]].astype(dtype)
         return _Rows(spans.some(counts > 0), short[tuple(place.T)], shares, rows, starts)
+
+
+def _product(found: _Rows, x: Tensor) -> tuple[IntArray, Array]:
+    """Return where the windows of some spans begin, and what their rows, in single precision, make of x there."""
+    spans = found.spans
+    weights, back = spans.weights.astype(np.float32), spans.back.astype(np.float32)
+    pushed = _squared(x.numpy(), spans.first, weights, back, found.rows, found.starts, 2.0 * found.shares)
+    return spans.first, pushed
 
 
 def _collected(parts: list[tuple[IntArray, Array]], like: Tensor) -> Tensor:

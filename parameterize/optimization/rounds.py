@@ -30,7 +30,7 @@ from .surface_distance import SurfaceFit
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "spline"
-_COUNTS = ("number", "parting", "polished", "fewest", "halved")  # of rounds and spans, in a checkpoint
+_COUNTS = ("number", "parting", "polished", "unproved", "fewest", "halved")  # of rounds and spans, in a checkpoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,8 @@ def optimize(
 
     Where the boundary of a certified map meets itself, up to `parting` rounds push it apart, and the surface data there
     lose weight; where it still does then, the rounds end. Once the map is certified, a few more rounds take back what
-    the data has lost, step by step, as far as they can. What these rounds fold again is moved back. Anchors along the
+    the data has lost, step by step, as far as they can. What these rounds fold again is moved back; where it cannot be
+    and the next round does not unfold it but folds more, the rounds end. Anchors along the
     cube's edges draw F to the surface in those last rounds and, where it is close to begin with, in the first ones: not
     while what is folded comes apart. The result is the last certified map whose boundary is proved not to meet itself,
     else the last one where that is not decided, else the last certified one, else the one with the fewest unproved
@@ -153,10 +154,11 @@ class _Rounds:
     certified: bool = False  # whether a round on these knots has ended with a certified map
     parting: int = 0  # rounds in which the boundary of a certified map that meets itself is pushed apart
     polished: int = 0  # rounds after that, or after the map was certified for the first time
+    unproved: int = 0  # spans that the last round has left so
     fewest: int = sys.maxsize  # spans unproved when their number was last halved
     halved: int = 0  # the round in which that was
     off: float = math.inf  # mean squared distance of the best map from the surface
-    lost: bool = False  # whether the rounds end without a certified map
+    lost: bool = False  # whether further rounds would bring no better map
 
     @property
     def finished(self) -> bool:
@@ -226,7 +228,9 @@ class _Rounds:
         if 2 * len(unproved) <= self.fewest or self.number <= len(self.shares):
             self.fewest, self.halved = len(unproved), self.number
         self.number += 1
-        self.lost = not self.growing and self._hopeless(many, distance)
+        worse = self.polished > 0 and (many or 0 < self.unproved < len(unproved))
+        self.unproved = len(unproved)
+        self.lost = not self.growing and (worse or self._hopeless(many, distance))
 
     def _hopeless(self, many: bool, distance: float) -> bool:
         """Return whether further rounds would not part a boundary that meets itself, or not unfold F at the surface.

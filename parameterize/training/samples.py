@@ -12,6 +12,8 @@ from ..surface.geometry import doubled_areas
 
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
 _STEPS = np.array(list(np.ndindex(3, 3, 3))) - 1
+_SMALL = 8  # lattice points along a part of the lattice that is not halved further
+_ACCURACY = 2.0  # of the fast winding number
 OFFSETS = np.concatenate([_STEPS[np.count_nonzero(_STEPS, axis=1) == moved] for moved in range(3)])
 
 
@@ -46,19 +48,40 @@ def signed_distance(points: Array, vertices: Array, faces: IntArray) -> Array:
     return np.asarray(igl.signed_distance(points, vertices, faces, sign_type=kind)[0])
 
 
-def lattice(vertices: Array, cell: float, margin: float) -> tuple[Array, IntArray]:
-    """Return lattice points (k, 3) that fill the bounding box grown by `margin`, and their integer coordinates."""
-    low = np.floor((vertices.min(0) - margin) / cell).astype(int)
-    high = np.ceil((vertices.max(0) + margin) / cell).astype(int)
-    axes = [np.arange(a, b + 1) for a, b in zip(low, high, strict=True)]
-    index = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return index * cell, index
+def near_or_inside(vertices: Array, faces: IntArray, cell: float, margin: float) -> IntArray:
+    """Return the integer coordinates (k, 3), in their order, of lattice points: of all inside and some others.
+
+    The lattice fills the bounding box grown by `margin`, which is halved until a part is small or touches no triangle's
+    box, so grown; such a part is left out where it lies outside. A thin body that lies askew fills little of its box.
+    """
+    corners = vertices[faces]
+    grown = np.stack([corners.min(axis=1) - margin, corners.max(axis=1) + margin], axis=1) / cell  # (m, 2, 3)
+    winding, found = igl.FastWindingNumberBVH(), []
+    winding.init(vertices, faces)
+    low, high = np.floor(grown[:, 0].min(axis=0)).astype(int), np.ceil(grown[:, 1].max(axis=0)).astype(int)
+    parts = [(low, high, np.arange(len(faces)))]
+    while parts:
+        low, high, near = parts.pop()
+        near = near[((grown[near, 0] <= high) & (grown[near, 1] >= low)).all(axis=1)]
+        if not len(near) and winding.winding_number(cell * low[None].astype(float), _ACCURACY)[0] < 0.5:
+            continue
+        axis = int((high - low).argmax())
+        middle = (low[axis] + high[axis]) // 2
+        if not len(near) or high[axis] - low[axis] < _SMALL:
+            axes = [np.arange(a, b + 1) for a, b in zip(low, high, strict=True)]
+            found.append(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
+            continue
+        below, above = high.copy(), low.copy()
+        below[axis], above[axis] = middle, middle + 1
+        parts += [(low, below, near), (above, high, near)]
+    index = np.concatenate(found)
+    return index[np.lexsort(index.T[::-1])]
 
 
 def stencils(vertices: Array, faces: IntArray, cell: float, *, device: torch.device, dtype: torch.dtype) -> Stencils:
     """Return stencils around every lattice point inside the surface or within h/2 of it, to cover it at any shift."""
-    points, index = lattice(vertices, cell, cell / 2.0)
-    centres = index[signed_distance(points, vertices, faces) < cell / 2.0]
+    index = near_or_inside(vertices, faces, cell, cell / 2.0)
+    centres = index[signed_distance(np.asarray(cell * index, dtype=np.float64), vertices, faces) < cell / 2.0]
     needed, inverse = np.unique((centres[:, None, :] + OFFSETS).reshape(-1, 3), axis=0, return_inverse=True)
     return Stencils(
         torch.as_tensor(needed * cell, dtype=dtype, device=device),
@@ -69,7 +92,7 @@ def stencils(vertices: Array, faces: IntArray, cell: float, *, device: torch.dev
 
 def interior_points(vertices: Array, faces: IntArray, cell: float) -> Array:
     """Return the lattice points inside the surface: (k, 3)."""
-    points, _ = lattice(vertices, cell, 0.0)
+    points = near_or_inside(vertices, faces, cell, 0.0) * cell
     return points[igl.fast_winding_number(vertices, faces, points) > 0.5]
 
 
