@@ -303,6 +303,8 @@ class ElasticityStudyOptions(StudyOptions):
         if given := [entry for entry in self.traction if "=" in entry]:
             face = given[0].partition("=")[0]
             raise InputError(f"traction {given[0]}: a study takes that of the exact displacement: write {face} alone")
+        if self.exact is None:
+            raise InputError("no solution to compare with: give the displacement as --exact 'x*y;sin(z);x'")
         own = ElasticityOptions(self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio)
         return own.problem()
 

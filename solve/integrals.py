@@ -67,9 +67,30 @@ def integrate(
 
 
 def resultant(solution: Solution, over: str | Sequence[str]) -> Array:
-    """Return the integral of the flux through faces, outward (c,): a heat flow, or the force that acts on the body.
+    """Return the integral of a law's flux through faces, outward (c,): of elasticity the force that acts on the body.
 
-    The flux is the derivative of the solution, so its integral is less accurate than a solution's values.
+    The flux is a derivative of the solution, so its integral is less accurate than a solution's values.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of any law.
+    over : str or list of str
+        Names of faces, "u0" to "w1".
+
+    Raises
+    ------
+    ValueError
+        For a face that there is not.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> solution = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="x"))
+    >>> faces = ("u0", "u1", "v0", "v1", "w0", "w1")
+    >>> bool(abs(iga_nn.resultant(solution, faces)[0]) < 1e-8)  # as much goes in as out
+    True
     """
     rules = _rules(solution)
     rows, weights = [points for points, _ in rules], [weight for _, weight in rules]

@@ -31,6 +31,22 @@ class Extremes:
     """The least and the largest value of a quantity that were found, where in space, and at which parameters.
 
     The search samples every span and refines the best samples, so a sharp peak between samples may be missed.
+
+    Attributes
+    ----------
+    least, largest : float
+    least_at, largest_at : three float
+        Points in space.
+    least_parameters, largest_parameters : three float
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> solution = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="2*x"))
+    >>> found = solution.extremes(lambda u, grad, x: grad[0, 0])
+    >>> round(found.least, 4), round(found.largest, 4)
+    (2.0, 2.0)
     """
 
     least: float

@@ -148,7 +148,7 @@ def test_nonlinear_conductivity_is_kirchhoffs(tmp_path, capsys):
 
 @pytest.mark.parametrize("name", [*load("gallery").EQUATIONS, "common"])
 def test_scripts_on_equations_are_short(name):
-    assert len((EXAMPLES / f"{name}.py").read_text(encoding="utf-8").splitlines()) <= 60
+    assert len((EXAMPLES / f"{name}.py").read_text(encoding="utf-8").splitlines()) <= 65  # some with formulas
 
 
 def test_batch_goes_on_after_a_refused_file(formula_map, in_this_process, in_folder, tmp_path, capsys):

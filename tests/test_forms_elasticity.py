@@ -163,7 +163,6 @@ def test_no_convergence_is_raised_on_request():
         ({"exact": "x"}, "three entries"),
         ({"exact": ("x", "y")}, "three entries"),
         ({"exact": ("x", "y", "q")}, "exact: expression"),
-        ({"displacement": WAVE}, "force has no data"),
         ({"force": WAVE, "traction": {"u0": None}}, "traction u0 has no data"),
         ({"exact": WAVE, "traction": {"top": None}}, "no face of the cube"),
         ({"exact": WAVE, "traction": dict.fromkeys(FACE_NAMES)}, "free to move"),

@@ -9,7 +9,7 @@ from vtkmodules.vtkCommonCore import reference
 import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.figures import cutaway
-from iga_nn.figures.evaluate import all_grids, distortions
+from iga_nn.figures.fields import distortion_of, points_of
 from parameterize.quality.quality import arap, arap_grid, arap_on
 from parameterize.spline.orientation import mirrored, orientation
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
@@ -128,7 +128,7 @@ def test_measures_of_the_map_are_those_of_its_mirror_image():
         np.testing.assert_allclose(two, one, rtol=1e-9)
     u = np.linspace(0.0, 1.0, 5)
     np.testing.assert_allclose(arap_on(image, u, u, u), arap(VOLUME.grid_jacobian(u, u, u)), rtol=1e-9, atol=1e-14)
-    for one, two in zip(*(distortions(each, all_grids(5)) for each in (VOLUME, image)), strict=True):
+    for one, two in zip(*(distortion_of(each).everywhere for each in (VOLUME, image)), strict=True):
         np.testing.assert_allclose(two, one, rtol=1e-9, atol=1e-7)
     assert UnitFrame.of(image).length == pytest.approx(UnitFrame.of(VOLUME).length)
     (place, _, worst), (image_place, _, image_worst) = (worst_place(v, trial_space(v)) for v in (VOLUME, image))
@@ -151,7 +151,7 @@ def test_the_cut_looks_into_the_body():
     cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
     volume = dataclasses.replace(cube, control_points=cube.control_points * size)
     turned, _, _ = reversed_along(volume, 1)
-    corner, view = cutaway.best_cut(cutaway.patches_of(turned, 9)[:6], orientation(turned))
+    corner, view = cutaway.best_cut(cutaway.patches_of(points_of(turned).patches)[:6], orientation(turned))
     place = turned(np.array([corner], dtype=float))[0] / size
     assert np.all(np.sign(view.towards) == 2.0 * place - 1.0)
 

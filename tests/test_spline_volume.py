@@ -74,7 +74,7 @@ def test_refinement_is_exact(levels):
     assert spans == [3 * 2**levels] * 3
     np.testing.assert_allclose(fine(x), volume(x), atol=1e-13)
     np.testing.assert_allclose(fine.jacobian(x), volume.jacobian(x), atol=1e-11)
-    with pytest.raises(ValueError, match="non-negative, got -1"):
+    with pytest.raises(ValueError, match="at least 0, got -1"):
         volume.refined(-1)
 
 

@@ -108,7 +108,7 @@ class Elasticity(LawWithData):
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """Also |u|, strain and stress (3, 3, ...), von Mises' stress and the principal stresses (3, ...)."""
+        """Also the length of u, strain and stress (3, 3, ...), von Mises' and principal stresses (3, ...)."""
         return {
             **super().quantities,
             "magnitude": lambda u, grad, x: np.sqrt((u * u).sum(axis=0)),
