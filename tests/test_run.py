@@ -112,7 +112,7 @@ def test_without_a_damaged_checkpoint_the_run_goes_on_from_the_one_before(surfac
     damaged.unlink()
     resumed = parameterize(surface, tiny_config(), progress=lambda s: steps.append(s.stage), resume=True, **options)
     same_result(undisturbed, resumed)
-    assert set(steps) == {"layout", "spline"}
+    assert set(steps) == {"spline"}
 
 
 def test_a_refinement_interrupted_and_resumed_is_undisturbed(surface, tmp_path):
