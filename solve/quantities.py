@@ -45,7 +45,7 @@ class Extremes:
     >>> from solve import benchmark_volume
     >>> solution = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="2*x"))
     >>> found = solution.extremes(lambda u, grad, x: grad[0, 0])
-    >>> round(found.least, 4), round(found.largest, 4)
+    >>> round(found.least, 2), round(found.largest, 2)
     (2.0, 2.0)
     """
 

@@ -1,9 +1,11 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 from shapes import area, ball, enclosed_volume, is_closed, turned
 
-from parameterize.cube.cutting import cut_along_rays, split_edges, subdivide_long_edges
+from parameterize.cube.cutting import cut_along_rays, split_edges, subdivide_finely, subdivide_long_edges
 from parameterize.surface.geometry import edge_table
 
 
@@ -92,6 +94,22 @@ def test_short_edges_are_left_alone():
     points, faces = ball(60)
     finer, triangles = subdivide_long_edges(points, faces, 10.0)
     assert finer is points and triangles is faces
+
+
+def test_slivers_are_cut_less_finely_before_they_are_millions():
+    """Of a needle of slivers: cut as finely as asked for they would have 400 000 vertices."""
+    points, faces = ball(1000)
+    points = points * [1.0, 1.0, 300.0]
+    assert subdivide_long_edges(points, faces, 0.1, most=1500) is None
+    tracemalloc.start()
+    finer, triangles = subdivide_finely(points, faces, 0.1, 3000)
+    taken = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert 1000 < len(finer) <= 3000 and is_closed(triangles)
+    assert taken < 20e6
+    whole, _ = subdivide_long_edges(points, faces, 5.0)
+    same, _ = subdivide_long_edges(points, faces, 5.0, most=len(whole))
+    assert np.array_equal(whole, same) and subdivide_long_edges(points, faces, 5.0, most=len(whole) - 1) is None
 
 
 def test_edges_of_a_tetrahedron():

@@ -5,6 +5,7 @@ size and no smaller than the third. Splitting the triangles that such a half pla
 edges on it; seen from the centre the mesh then resolves the 12 edges and 8 corners of the cube.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,10 +69,13 @@ def cut_along_rays(mapped: Array, faces: IntArray, snap: float) -> CutMesh:
     return CutMesh(faces, parents, share)
 
 
-def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tuple[Array, IntArray]:
+def subdivide_long_edges(
+    vertices: Array, faces: IntArray, longest: float, most: float = math.inf
+) -> tuple[Array, IntArray] | None:
     """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface the same.
 
-    vertices: (n, 3), or with further columns, which are interpolated as well.
+    vertices: (n, 3), or with further columns, which are interpolated as well. None where that takes more than `most`
+    vertices: of long slivers it may take millions.
     """
     while True:
         edges = edge_table(faces)[0]
@@ -79,6 +83,8 @@ def subdivide_long_edges(vertices: Array, faces: IntArray, longest: float) -> tu
         long = np.linalg.norm((ends[:, 1] - ends[:, 0])[:, :3], axis=1) > longest
         if not long.any():
             return vertices, faces
+        if len(vertices) + np.count_nonzero(long) > most:
+            return None
         faces = split_edges(faces, edges[long], len(vertices))
         vertices = np.concatenate([vertices, ends[long].mean(axis=1)])
 
@@ -89,9 +95,9 @@ def subdivide_finely(vertices: Array, faces: IntArray, longest: float, most: int
     vertices: (n, 3), or with further columns, which are interpolated as well. The given vertices stay, however many.
     """
     while True:
-        points, triangles = subdivide_long_edges(vertices, faces, longest)
-        if len(points) <= max(most, len(vertices)):
-            return points, triangles
+        found = subdivide_long_edges(vertices, faces, longest, max(most, len(vertices)))
+        if found is not None:
+            return found
         longest *= 1.25
 
 

@@ -13,6 +13,7 @@ from ..surface.geometry import doubled_areas
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
 _STEPS = np.array(list(np.ndindex(3, 3, 3))) - 1
 _SMALL = 8  # lattice points along a part of the lattice that is not halved further
+_ROUNDING = 1e-6  # of a distance, in cells
 _ACCURACY = 2.0  # of the fast winding number
 OFFSETS = np.concatenate([_STEPS[np.count_nonzero(_STEPS, axis=1) == moved] for moved in range(3)])
 
@@ -51,11 +52,15 @@ def signed_distance(points: Array, vertices: Array, faces: IntArray) -> Array:
 def near_or_inside(vertices: Array, faces: IntArray, cell: float, margin: float) -> IntArray:
     """Return the integer coordinates (k, 3), in their order, of lattice points: of all inside and some others.
 
-    The lattice fills the bounding box grown by `margin`, which is halved until a part is small or touches no triangle's
-    box, so grown; such a part is left out where it lies outside. A thin body that lies askew fills little of its box.
+    The lattice fills the bounding box grown by `margin`, which is halved until a part is small or no triangle's box and
+    plane come within `margin`; such a part is left out where it lies outside. A thin body that lies askew fills little
+    of its box.
     """
     corners = vertices[faces]
     grown = np.stack([corners.min(axis=1) - margin, corners.max(axis=1) + margin], axis=1) / cell  # (m, 2, 3)
+    normals = doubled_areas(vertices, faces)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    heights = (normals * corners[:, 0]).sum(axis=1) / cell
     winding, found = igl.FastWindingNumberBVH(), []
     winding.init(vertices, faces)
     low, high = np.floor(grown[:, 0].min(axis=0)).astype(int), np.ceil(grown[:, 1].max(axis=0)).astype(int)
@@ -63,6 +68,8 @@ def near_or_inside(vertices: Array, faces: IntArray, cell: float, margin: float)
     while parts:
         low, high, near = parts.pop()
         near = near[((grown[near, 0] <= high) & (grown[near, 1] >= low)).all(axis=1)]
+        off = np.abs(normals[near] @ (low + high) / 2.0 - heights[near])
+        near = near[off <= np.abs(normals[near]) @ (high - low) / 2.0 + margin / cell + _ROUNDING]
         if not len(near) and winding.winding_number(cell * low[None].astype(float), _ACCURACY)[0] < 0.5:
             continue
         axis = int((high - low).argmax())
