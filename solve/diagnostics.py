@@ -198,24 +198,29 @@ def map_notices(
     return notices + [f"more iterations than usual: {text}" for text in dict.fromkeys(weaknesses) if text]
 
 
-def failure(volume: BSplineVolume, space: TrialSpace, result: LinearResult) -> str:
-    """Return why the linear solver did not converge, and where to look, in one line; "" where it did."""
+def failure(volume: BSplineVolume, space: TrialSpace, result: LinearResult, caveat: str = "") -> str:
+    """Return why the linear solver did not converge, and where to look, in one line; "" where it did.
+
+    caveat: of the law.
+    """
     if result.converged:
         return ""
     if result.breakdown:
         said = f"no convergence: after {result.iterations} iterations {result.breakdown}"
         return said + (INDEFINITE_REMEDY if result.breakdown == INDEFINITE else EXTREME_REMEDY)
+    residuals = result.residuals
+    said = (
+        f"no convergence: residual {residuals[0]:.1e} at the start, {residuals[-1]:.1e} after {result.iterations} "
+        f"iterations (lowest {min(residuals):.1e}); "
+    )
+    if caveat:
+        return f"{said}{caveat}, which takes many iterations: allow more of them, or try 0.45"
     parameters, point, scaled = worst_place(volume, space)
     cube, where = (
         ", ".join(f"{axis}={value:.4g}" for axis, value in zip(axes, place, strict=True))
         for axes, place in ((AXES, parameters), ("xyz", point))
     )
-    residuals = result.residuals
-    return (
-        f"no convergence: residual {residuals[0]:.1e} at the start, {residuals[-1]:.1e} after {result.iterations} "
-        f"iterations (lowest {min(residuals):.1e}); the map is worst at {cube} ({where}): "
-        f"scaled Jacobian {scaled:.2g}"
-    )
+    return f"{said}the map is worst at {cube} ({where}): scaled Jacobian {scaled:.2g}"
 
 
 def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array, float]:

@@ -14,6 +14,8 @@ from parameterize.quality.distances import SampledBoundary, nearest_on_boundary
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
+FARTHEST = 1e4  # of the volume's size: from there rounding hides which point of it is nearest
+
 
 class Points(np.ndarray[Any, Any]):
     """Points (3, ...) of a volume: an array that knows the parameters of its points, so that fields have values there.
@@ -106,6 +108,11 @@ class SplineField(Brief):
         outside = np.isnan(where[:, 0])
         if clip and outside.any():
             beyond = np.atleast_2d(np.asarray(points, dtype=np.float64))[outside]
+            middle = self.geometry.control_points.mean(axis=(0, 1, 2))
+            if np.abs(beyond - middle).max() > FARTHEST * np.ptp(self.geometry.control_points, axis=(0, 1, 2)).max():
+                raise ValueError(
+                    f"a point lies more than {FARTHEST:g} times the volume's size away: its nearest is lost"
+                )
             where[outside], _ = nearest_on_boundary(beyond, self.geometry, SampledBoundary.of(self.geometry))
             outside[:] = False
         values = np.full((len(where), *self.coefficients.shape[3:]), np.nan)

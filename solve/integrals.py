@@ -37,8 +37,10 @@ def integrate(
 
     Raises
     ------
+    TypeError
+        For what is no volume or solution.
     ValueError
-        For a name that the law does not give, a face that there is not, and a function of another shape.
+        For a name that the law does not give, a face that there is not, and a function that fails or has another shape.
 
     Examples
     --------
@@ -50,10 +52,12 @@ def integrate(
     >>> bool(0.1 < mean < 0.2)
     True
     """
+    if not isinstance(body, BSplineVolume | Solution):
+        raise TypeError(f"body must be a volume or a solution, got {body!r:.80}")
     volume = body if isinstance(body, BSplineVolume) else body.geometry
     rules = _rules(body)
     rows, weights = [points for points, _ in rules], [weight for _, weight in rules]
-    faces = _faces(over)
+    faces = None if over is None else _faces(over)
     if faces is None:
         total: Array | float = 0.0
         start = 0
@@ -92,11 +96,13 @@ def resultant(solution: Solution, over: str | Sequence[str]) -> Array:
     >>> bool(abs(iga_nn.resultant(solution, faces)[0]) < 1e-8)  # as much goes in as out
     True
     """
+    if not isinstance(solution, Solution):
+        raise TypeError(f"a resultant is that of a solution, got {solution!r:.80}")
     rules = _rules(solution)
     rows, weights = [points for points, _ in rules], [weight for _, weight in rules]
     flux = quantity_of(solution.problem.form, "flux")
     total = np.zeros(solution.problem.form.components)
-    for axis, side in _faces(over) or ():
+    for axis, side in _faces(over):
         single = [np.array([float(side)]) if a == axis else row for a, row in enumerate(rows)]
         values = np.squeeze(grid_values(solution, flux, *single), 2 + axis)  # (c, 3, q_b, q_c)
         _, area = face_geometry(solution.geometry, rows, axis, side)
@@ -116,10 +122,10 @@ def _rules(body: BSplineVolume | Solution) -> list[tuple[Array, Array]]:
     return found
 
 
-def _faces(over: str | Sequence[str] | None) -> list[tuple[int, int]] | None:
-    """Return axis and side of each face; None for the whole body. Raises ValueError for a name that there is not."""
-    if over is None:
-        return None
+def _faces(over: str | Sequence[str]) -> list[tuple[int, int]]:
+    """Return axis and side of each face. Raises ValueError for a name that there is not, and for no names."""
+    if not over or not isinstance(over, str | Sequence | set):
+        raise ValueError(f"over: give names of faces, {', '.join(FACE_NAMES)}; got {over!r:.80}")
     names = [over] if isinstance(over, str) else list(over)
     for name in names:
         if name not in FACE_NAMES:
@@ -135,8 +141,15 @@ def _integrand(body: BSplineVolume | Solution, what: str | Integrand | None, u: 
         return grid_values(body, quantity_of(body.problem.form, what), u, v, w)  # type: ignore[arg-type]
     if isinstance(what, str):
         raise ValueError(f"a volume alone has no {what!r}: give a function of x, or a solution in its place")
+    if not callable(what):
+        raise ValueError(f"what must be a function or nothing, got {what!r:.80}")
     x = Points.on(body, u, v, w)
-    found = np.asarray(what(x), dtype=np.float64)  # type: ignore[call-arg]
+    try:
+        found = np.asarray(what(x), dtype=np.float64)  # type: ignore[call-arg]
+    except Exception as error:  # whatever a user's function does
+        raise ValueError(f"the function of x fails: {type(error).__name__}: {error}") from error
+    if found.ndim == 0:
+        return np.broadcast_to(found, x.shape[1:])
     if found.shape[-3:] != x.shape[1:]:
         raise ValueError(f"the function must return an array (..., {', '.join(map(str, x.shape[1:]))})")
     return found

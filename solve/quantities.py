@@ -5,6 +5,7 @@ A quantity is a function of u (c, ...), grad (c, 3, ...) and x (3, ...), as a la
 slowly than the spline: a stress is less accurate than the displacement.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, in_brackets
-from parameterize.spline.bspline import divided_spans, evaluate_at, evaluate_grid
+from parameterize.spline.bspline import divided_spans, evaluate_at, evaluate_grid, real_array
 from parameterize.spline.volume import BSplineVolume
 
 from .field import Points, SplineField
@@ -80,7 +81,9 @@ def volume_of(field: SplineField) -> BSplineVolume:
 
 def at_points(field: SplineField, form: Form, what: str | Quantity, points: ArrayLike) -> Array:
     """Return a quantity (m, ...) at parameters (m, 3); NaN where these are NaN, as of points outside of the volume."""
-    where = np.atleast_2d(np.asarray(points, dtype=np.float64))
+    where = np.atleast_2d(real_array(points, "points"))
+    if where.ndim != 2 or where.shape[1] != 3:
+        raise ValueError(f"points must have shape (m, 3), got {np.shape(points)}")
     inside = ~np.isnan(where).any(axis=1)
     found = _values(field, quantity_of(form, what), where[inside])
     values = np.full((len(where), *found.shape[:-1]), np.nan)
@@ -140,6 +143,8 @@ def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: 
     except (TypeError, LookupError, AttributeError, ArithmeticError) as error:
         raise ValueError(f"the quantity fails: {type(error).__name__}: {error}") from error
     shape = x.shape[1:]
+    if found.ndim == 0:
+        return np.broadcast_to(found, shape)
     if found.shape[found.ndim - len(shape) :] != shape:
         raise ValueError(f"a quantity must return an array (..., {', '.join(map(str, shape))}), got {found.shape}")
     return found
@@ -158,8 +163,14 @@ def _extreme(field: SplineField, quantity: Quantity, sign: float) -> tuple[float
     places, values = np.empty((0, 3)), np.empty(0)
     for u in slabs(*rows):
         found = sign * grid_values(field, quantity, u, *rows[1:])
-        if found.ndim != 3:
-            raise ValueError(f"extremes are of one number a point; this quantity has the shape {found.shape[:-3]}")
+        if math.prod(found.shape[:-3]) != 1:
+            raise ValueError(
+                f"extremes are of one number a point, this quantity has the shape {found.shape[:-3]}: "
+                "choose a part of it, as in lambda u, grad, x: u[0]"
+            )
+        if not np.all(np.isfinite(found)):
+            raise ValueError("extremes are of finite numbers; this quantity has others")
+        found = found.reshape(found.shape[-3:])
         best = np.argsort(-found, axis=None, kind="stable")[:_CANDIDATES]
         i, j, k = np.unravel_index(best, found.shape)
         places = np.concatenate([places, np.column_stack([u[i], rows[1][j], rows[2][k]])])

@@ -206,7 +206,7 @@ class System:
         dofs = len(self.known) * space.dofs
         clock, sent = [time.process_time()], space.traffic()
         result = self._iterate(options)
-        failed = failure(volume, space, result)
+        failed = failure(volume, space, result, problem.form.caveat)
         if failed and result.iterations == 0:  # there is the start alone
             raise ConvergenceError(failed)
         steps = result.iterations + (options.start is not None)  # products made
@@ -223,7 +223,9 @@ class System:
         if has_norm and (options.estimate or (options.estimate is None and problem.exact is None)):
             estimate = error_estimate(volume, space, full, problem, self._energy(result.x))
         clock.append(time.process_time())
-        doubtful, meaningful = judge(volume, problem, errors, estimate, dofs)
+        doubtful, meaningful = judge(volume, problem, errors, estimate if result.converged else None, dofs)
+        if errors is None and problem.form.caveat:
+            doubtful.append(f"the error is not estimated: {problem.form.caveat}; compare two refinements")
         if not has_norm:
             doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
         of_map = map_notices(volume, self.matrix, options.certified, [block.weakness for block in self.blocks])

@@ -34,6 +34,13 @@ def test_points_outside_take_the_nearest_value(solution):
     assert solution.probe(outside, clip=True) == pytest.approx(plane(on_face), abs=1e-6)
 
 
+def test_points_too_far_away_for_a_nearest_point(solution):
+    assert np.isfinite(solution.probe([[1e3, 0.5, 0.5]], clip=True)).all()
+    assert np.isnan(solution.probe([[1e300, 0.5, 0.5]])).all()
+    with pytest.raises(ValueError, match="10000 times the volume's size away"):
+        solution.probe([[1e9, 0.5, 0.5]], clip=True)
+
+
 def test_vectors_have_rows():
     volume = benchmark_volume(2)
     field = SplineField(volume.degrees, volume.knots, volume.control_points, volume)

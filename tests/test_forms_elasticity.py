@@ -171,3 +171,17 @@ def test_no_convergence_is_raised_on_request():
 def test_problems_that_do_not_fit_together_are_refused(data, says):
     with pytest.raises(ValueError, match=says):
         Elasticity(**data)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.45, 0.46, 0.49])
+def test_near_one_half_the_error_is_not_estimated_and_the_ratio_is_named(ratio):
+    """The estimate was 30 to 500 times too large there, and the map was blamed for the iterations."""
+    free = dict.fromkeys(("v0", "v1", "w0", "w1"), ("0", "0", "0"))
+    law = Elasticity(traction={**free, "u1": ("0", "0", "-2")}, poisson_ratio=ratio)
+    report = solve_problem(benchmark_volume(2), law, refine=1).report
+    assert report.converged and (report.error_estimate is not None) == (ratio <= 0.45)
+    notices = " ".join(solve_problem(benchmark_volume(2), law, refine=1, max_iterations=3).report.notices)
+    assert "no convergence" in notices and "hardly resolves" not in notices
+    assert (
+        (f"Poisson's ratio {ratio:g} is near 1/2" in notices) == (ratio > 0.45) == ("the map is worst" not in notices)
+    )

@@ -109,9 +109,12 @@ def test_extremes_have_their_place(refine):
     assert "to 0.25 at (1, 0.5" in str(found)
 
 
-def test_extremes_of_a_vector_are_refused(heat):
-    with pytest.raises(ValueError, match=r"one number a point; this quantity has the shape \(1, 3\)"):
+def test_extremes_are_of_one_finite_number(heat):
+    assert heat.extremes("u").largest == heat.extremes(lambda u, grad, x: u[0]).largest
+    with pytest.raises(ValueError, match=r"one number a point, this quantity has the shape \(1, 3\): choose a part"):
         heat.extremes("flux")
+    with pytest.raises(ValueError, match="finite numbers"):
+        heat.extremes(lambda u, grad, x: np.nan * u[0])
 
 
 def test_volume_and_area_are_exact():
@@ -121,6 +124,19 @@ def test_volume_and_area_are_exact():
     assert integrate(box, over=["v0", "v1", "v0"]) == pytest.approx(2.0, rel=1e-14)
     assert integrate(box, lambda x: x[0] * x[1]) == pytest.approx(2.0 * 4.5 * 0.5, rel=1e-13)
     np.testing.assert_allclose(integrate(box, lambda x: x, over="w1"), [6.0, 9.0, 3.0], rtol=1e-13)
+
+
+def test_numbers_are_functions_too(heat):
+    volume = heat.geometry
+    assert integrate(volume, lambda x: 2.0) == pytest.approx(2.0 * integrate(volume), rel=1e-14)
+    assert integrate(heat, lambda u, grad, x: 2.0, over="u1") == pytest.approx(2.0 * integrate(volume, over="u1"))
+
+
+def test_what_is_no_body_is_refused(heat):
+    with pytest.raises(TypeError, match="body must be a volume or a solution, got 'map.npz'"):
+        integrate("map.npz")
+    with pytest.raises(TypeError, match="a resultant is that of a solution"):
+        resultant(heat.geometry, "u1")
 
 
 def test_a_hollow_cylinder(shell):
@@ -154,10 +170,17 @@ def test_the_force_on_a_bar(bar):
     [
         (lambda s: s.quantity("stress", [[0.5, 0.5, 0.5]]), "Poisson gives no 'stress'; it gives u, gradient, flux"),
         (lambda s: s.quantity(lambda u, grad, x: u[7], [[0.5, 0.5, 0.5]]), "the quantity fails: IndexError"),
-        (lambda s: s.quantity(lambda u, grad, x: 1.0, [[0.5, 0.5, 0.5]]), r"must return an array \(..., 1\), got"),
+        (lambda s: s.quantity(lambda u, grad, x: np.ones(7), [[0.5] * 3]), r"must return an array \(..., 1\), got"),
+        (lambda s: s.quantity("u", np.zeros((1, 4, 3))), r"points must have shape \(m, 3\), got \(1, 4, 3\)"),
+        (lambda s: s.quantity("u", [[1j, 0.0, 0.0]]), "points must be real numbers"),
         (lambda s: integrate(s, over="top"), "'top' is no face of the cube"),
+        (lambda s: integrate(s, over=[]), "over: give names of faces"),
+        (lambda s: integrate(s, over=3), "over: give names of faces"),
+        (lambda s: resultant(s, None), "over: give names of faces"),
         (lambda s: integrate(s.geometry, "u"), "a volume alone has no 'u'"),
-        (lambda s: integrate(s.geometry, lambda x: 1.0), "must return an array"),
+        (lambda s: integrate(s.geometry, 3), "what must be a function or nothing, got 3"),
+        (lambda s: integrate(s.geometry, lambda x: np.ones(7)), "must return an array"),
+        (lambda s: integrate(s.geometry, lambda u, grad, x: u), "the function of x fails: TypeError"),
     ],
 )
 def test_bad_questions_are_refused(heat, call, message):

@@ -103,6 +103,7 @@ def test_a_folded_map_ends_and_gives_one_of_the_places():
 def test_no_points_and_bad_points():
     volume = VOLUMES["cubic"]
     assert locate(volume, np.empty((0, 3))).shape == (0, 3)
+    assert np.isnan(locate(volume, [[1e300, 0.0, 0.0], [0.0, -1e160, 0.0]])).all()
     assert volume.locate([0.0, 0.0, 0.5]).shape == (1, 3)
     with pytest.raises(ValueError, match=r"shape \(m, 3\), got \(5, 2\)"):
         locate(volume, np.zeros((5, 2)))

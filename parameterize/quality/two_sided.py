@@ -16,6 +16,7 @@ from ..surface.geometry import area_shares, doubled_areas
 from .distances import Distances, SampledBoundary, nearest_on_boundary, to_mesh
 
 _PER_SPAN = 2.0  # samples on the mesh a direction, where spans have the mean area
+_LEAST_SAMPLES = 4_000  # some, also of a spline of few spans; halving edges gives two to four times as many
 _MOST_SAMPLES = 100_000  # on the mesh, where it has not more vertices itself
 
 
@@ -71,4 +72,5 @@ def _spacing(volume: BSplineVolume, vertices: Array, faces: IntArray) -> float:
     """Return how long an edge between samples on the mesh may be."""
     u, v, w = (len(breakpoints(row)) - 1 for row in volume.knots)
     area = float(np.linalg.norm(doubled_areas(vertices, faces), axis=1).sum()) / 2.0
-    return float(np.sqrt(area / (2 * (u * v + v * w + w * u)))) / _PER_SPAN
+    cells = max(_PER_SPAN**2 * 2 * (u * v + v * w + w * u), _LEAST_SAMPLES)
+    return float(np.sqrt(area / cells))

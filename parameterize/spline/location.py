@@ -91,6 +91,12 @@ class _Index:
 
     def parameters(self, points: Array) -> Array:
         """Return the parameters (m, 3) of points (m, 3), NaN outside."""
+        within = np.all((points >= self.low.min(axis=0)) & (points <= self.high.max(axis=0)), axis=1)
+        found = np.full((len(points), 3), np.nan)  # outside of the box there is nothing to look for
+        found[within] = self._parameters(points[within])
+        return found
+
+    def _parameters(self, points: Array) -> Array:
         spline = (_padded(self.volume.knots), np.array(self.volume.degrees), self.volume.control_points)
         search = (self.nets, self.low, self.high, self.ends, self.corner, self.cell, self.counts)
 

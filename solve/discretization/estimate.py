@@ -44,10 +44,10 @@ def error_estimate(
 
     energy: a(u_h, u_h), of a symmetric law whose given values are zero, else None. The work of the loads on the error
     is then the square of its energy norm, and as large a share of u_h is added: bodies that bend are too stiff by it.
-    None where the residual tells too little: in a space that is only continuous somewhere, whose derivatives jump, and
-    where the derivatives of the law's coefficients are unknown.
+    None where the residual tells too little: in a space that is only continuous somewhere, whose derivatives jump, of a
+    law with a caveat, and where the derivatives of its coefficients are unknown.
     """
-    if space.is_only_continuous or problem.not_differentiable:
+    if space.is_only_continuous or problem.not_differentiable or problem.form.caveat:
         return None
     lowest = lowest_waves(volume, problem)
     sums = np.zeros(3)  # squares of the norms of the error, its energy norm, the norm of the solution

@@ -18,6 +18,9 @@ from .problem import LawWithData, Natural
 NONE = ("0", "0", "0")  # of a vector
 
 
+NEARLY_RIGID = 0.45  # Poisson's ratio from which on the estimate of the error was 30 to 500 times too large
+
+
 @dataclass(frozen=True)
 class Elasticity(LawWithData):
     """Linear elasticity of an isotropic body: -div sigma = f, sigma = lambda div(u) I + mu (grad u + grad u^T).
@@ -105,6 +108,14 @@ class Elasticity(LawWithData):
         for i in range(3):
             stress[i, i] += pressure
         return stress
+
+    @property
+    def caveat(self) -> str:
+        """Why a body that hardly changes its volume is hard to solve, and the error not estimated."""
+        nu = self.poisson_ratio
+        return (
+            f"Poisson's ratio {nu:g} is near 1/2, where a body hardly changes its volume" if nu > NEARLY_RIGID else ""
+        )
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:

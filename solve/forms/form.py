@@ -61,6 +61,11 @@ class Form:
         return 0.0
 
     @property
+    def caveat(self) -> str:
+        """Why a law takes many iterations, and why its error cannot be estimated from the residual; "" where it can."""
+        return ""
+
+    @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What can be asked of a solution of this law, by name; a law of one's own may add to it."""
         return {"u": lambda u, grad, x: u, "gradient": lambda u, grad, x: grad, "flux": self.flux}
