@@ -11,6 +11,7 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from iga_nn.io.vtk import write_bezier
 from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.readers.vtu import _name
 from parameterize.surface.surface import MeshError, load_surface
 
 STRIPS = [[1, 0, 3, 2], [4, 5, 6, 7], [0, 1, 4, 5], [3, 2, 7, 6], [0, 4, 2, 6], [1, 3, 5, 7]]  # outward, two triangles
@@ -262,3 +263,9 @@ def test_the_first_time_step_is_taken_with_a_notice(tmp_path):
     surface = load_surface(tmp_path / "body.vtu")
     assert surface.volume == pytest.approx(1.0)
     assert "the first of 3 time steps read" in surface.notices
+
+
+def test_every_kind_of_vtk_has_a_name_and_no_warning(recwarn):
+    names = [_name(number) for number in range(90)]
+    assert names[52] == "parametric_surface" and names[79] == "bezier_hexahedron" and names[89] == "VTK 89"
+    assert not recwarn.list

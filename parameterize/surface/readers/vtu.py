@@ -1,6 +1,7 @@
 """VTK's .vtu: points and cells of all its pieces; point data, cell data and field data are skipped."""
 
 import re
+import warnings
 from xml.etree import ElementTree
 
 import numpy as np
@@ -102,7 +103,9 @@ def _name(number: int) -> str:
     import pyvista
 
     try:
-        name = pyvista.CellType(number).name.lower()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of kinds that PyVista will no longer name
+            name = pyvista.CellType(number).name.lower()
     except ValueError:
         return f"VTK {number}"
     return "poly_line" if name.endswith(("_curve", "_edge")) else name
