@@ -173,6 +173,12 @@ def test_problems_that_do_not_fit_together_are_refused(data, says):
         Elasticity(**data)
 
 
+def test_vectors_may_be_arrays():
+    one, two = (Elasticity(force=force, displacement=np.zeros(3)) for force in (np.array([0.0, 0.0, 1.0]), [0, 0, 1]))
+    volume = benchmark_volume(2)
+    assert np.array_equal(solve_problem(volume, one).coefficients, solve_problem(volume, two).coefficients)
+
+
 @pytest.mark.parametrize("ratio", [0.3, 0.45, 0.46, 0.49])
 def test_near_one_half_the_error_is_not_estimated_and_the_ratio_is_named(ratio):
     """The estimate was 30 to 500 times too large there, and the map was blamed for the iterations."""

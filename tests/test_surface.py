@@ -285,6 +285,21 @@ def test_refuses_a_one_sided_surface():
         surface_from_arrays(points, faces)
 
 
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        (np.ones((4, 3)) + 1j, [[0, 1, 2]], "vertices must be real numbers, got complex128"),
+        ([["a", "b", "c"]], [[0, 1, 2]], "vertices must be real numbers, got <U1"),
+        ([[0, 0, 0], [1, 0]], [[0, 1, 2]], "vertices must be rows of three, got rows of several lengths"),
+        ([[0, 0, 0]] * 3, [[0, 1, 2], [0, 1]], "faces must be rows of three, got rows of several lengths"),
+    ],
+)
+def test_arrays_of_other_entries_are_named(vertices, faces, message, recwarn):
+    with pytest.raises(MeshError, match=message):
+        surface_from_arrays(vertices, faces)
+    assert not recwarn.list
+
+
 def test_arrays_of_the_wrong_kind_are_named():
     with pytest.raises(MeshError, match=r"vertices must have shape \(n, 3\), got \(8, 2\)"):
         surface_from_arrays(CUBE[:, :2], TRIANGLES)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, IntArray, in_brackets
 from ..display import Brief, Shown
@@ -230,8 +230,10 @@ def surface_from_arrays(
     1.0
     """
     try:
-        points = np.array(vertices, dtype=np.float64)
-        triangles = np.asarray(faces)
+        points, triangles = _array(vertices, "vertices"), _array(faces, "faces")
+        if points.dtype.kind not in "iuf":
+            raise MeshError(f"vertices must be real numbers, got {points.dtype}")
+        points = np.array(points, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 3:
             raise MeshError(f"vertices must have shape (n, 3), got {points.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
@@ -244,6 +246,14 @@ def surface_from_arrays(
         return _gate(RawMesh(points, triangles, digest, notices), name, "", component, max_faces)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
+
+
+def _array(values: ArrayLike, name: str) -> NDArray[Any]:
+    """Return values as an array. Raises MeshError where their rows have several lengths."""
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise MeshError(f"{name} must be rows of three, got rows of several lengths") from None
 
 
 def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces: int) -> Surface:

@@ -89,6 +89,7 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
     of_coordinates: functions take three arrays x, y, z instead of one array (3, ...).
     Raises ExpressionError for a formula that is refused, ValueError for what is no datum; both name it.
     """
+    data = data.tolist() if isinstance(data, np.ndarray) else data
     is_vector = isinstance(data, Sequence) and not isinstance(data, str | bytes)
     given: list[Any] = list(data) if is_vector else [data]  # type: ignore[arg-type]
     entries = [repr(float(entry)) if isinstance(entry, int | float) else entry for entry in given]
