@@ -64,7 +64,7 @@ class MapOptions(SurfaceOptions):
         steps_factor: multiply the steps of every stage by this factor; a small one gives a quick look.
         tolerance: of control_points "auto": root mean square distance between surface and spline, taken both ways, over
             the diagonal of the surface's bounding box.
-        max_control_points: of control_points "auto": at most so many per direction.
+        max_control_points: of control_points "auto": at most so many per direction, 30 or more, with which it starts.
 
     Examples:
         >>> import iga_nn
@@ -91,7 +91,8 @@ class MapOptions(SurfaceOptions):
         with input_errors():
             config = preset(self.preset).scaled(self.steps_factor)
             if self.control_points == "auto":
-                _check_count("max control points", self.max_control_points, config.spline.control_points)
+                first = config.spline.control_points
+                _check_count("max control points", self.max_control_points, first, f"; auto starts with {first}")
                 return config.refined(self.tolerance, self.max_control_points)
             _check_count("control points", self.control_points, config.spline.degree + 1)
             for name in ("tolerance", "max_control_points"):
@@ -349,10 +350,10 @@ class WorkerOptions(Checked):
             raise InputError(f"{flag}: is for workers on this machine; leave it out with --scheduler")
 
 
-def _check_count(name: str, count: int, fewest: int) -> None:
+def _check_count(name: str, count: int, fewest: int, reason: str = "") -> None:
     """Raise InputError for a number of control points that cannot be run."""
     if not fewest <= count <= MAX_CONTROL_POINTS:
-        raise InputError(f"{name} {count}: at least {fewest}, at most {MAX_CONTROL_POINTS} per direction")
+        raise InputError(f"{name} {count}: at least {fewest}, at most {MAX_CONTROL_POINTS} per direction{reason}")
 
 
 def check_space(refine: Sequence[int], degree: int | None) -> None:
