@@ -56,7 +56,10 @@ def test_auto_takes_its_limits_to_the_map():
     ("given", "says"),
     [
         ({"control_points": "auto", "tolerance": 0.0}, "tolerance must be positive and finite, got 0.0"),
-        ({"control_points": "auto", "max_control_points": 29}, "max control points 29: at least 30, at most 100 per direction; auto starts with 30"),
+        (
+            {"control_points": "auto", "max_control_points": 29},
+            "at least 30, at most 100 per direction; auto starts with 30",
+        ),
         ({"control_points": "auto", "max_control_points": 101}, "max control points 101: at least 30, at most 100"),
         ({"control_points": 3}, "control points 3: at least 4, at most 100"),
         ({"tolerance": 1e-3}, "tolerance: has a meaning with --control-points auto alone"),
