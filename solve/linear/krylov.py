@@ -71,6 +71,8 @@ def conjugate_gradients(
     while residuals[-1] > tolerance and len(residuals) <= max_iterations:
         z = preconditioner(r)
         rz = dot(r, z)
+        if fault := _fault(rz):
+            return LinearResult(x, tuple(residuals), False, fault)
         p *= rz / rz_old
         p += z
         product = operator(p)
@@ -86,7 +88,7 @@ def conjugate_gradients(
     return LinearResult(x, tuple(residuals), residuals[-1] <= tolerance)
 
 
-def _fault(rz: float, curvature: float) -> str:
+def _fault(rz: float, curvature: float = 1.0) -> str:
     """Return what is wrong where r.z, or the curvature p.Ap of the direction that follows from z, is not positive."""
     if not math.isfinite(rz) or rz == 0.0:  # r is neither
         return NO_DIRECTION
