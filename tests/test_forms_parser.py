@@ -195,3 +195,10 @@ def test_messages_stay_short_and_on_one_line():
         Expression("+".join(["x"] * 400))
     assert len(str(caught.value)) < 200
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["exp(x+z)*3in(y)", "2or(x)", "x*6if(y)"])
+def test_python_adds_no_warning_to_a_refusal(text, recwarn):
+    with pytest.raises(ExpressionError):
+        Expression(text)
+    assert not recwarn.list

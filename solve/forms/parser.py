@@ -10,6 +10,7 @@ import math
 import operator
 import re
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -142,7 +143,9 @@ class _Translator:
             if depth > MAX_DEPTH:
                 raise ExpressionError(f"expression, column {column}: more than {MAX_DEPTH} nested parentheses")
         try:
-            tree = ast.parse(self.text, mode="eval")
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # Python's, of what is refused below
+                tree = ast.parse(self.text, mode="eval")
         except SyntaxError as error:
             place = f", column {error.offset}" if error.offset else ""
             hint = "; a product is written with *, as in 2*x" if "decimal literal" in error.msg else ""

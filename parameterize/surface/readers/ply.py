@@ -62,7 +62,8 @@ def _binary(body: bytes, elements: list[Element], order: str) -> Found:
         wanted = _wanted(element)
         columns, at = binary_rows(body, at, element, order, wanted)
         if element.name == "vertex":
-            places = np.stack(columns, axis=1).astype(np.float64)
+            with np.errstate(invalid="ignore"):  # a signalling NaN, which is refused where a face uses it
+                places = np.stack(columns, axis=1).astype(np.float64)
         elif element.name in READ and element.count:
             rows = _whole(columns[0])
             polygons += rows if element.name == "face" else triangles_of_strips(_parted(rows))
