@@ -16,11 +16,11 @@ from parameterize.arrays import Array, in_brackets
 from parameterize.spline.bspline import divided_spans, evaluate_at, evaluate_grid, real_array
 from parameterize.spline.volume import BSplineVolume
 
+from .discretization.estimate import FIRST
 from .field import Points, SplineField
 from .forms.form import Form, Quantity
 
 Place = tuple[float, float, float]
-FIRST = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 _PER_SPAN = 3  # intervals a span and direction in which extremes are looked for
 _CANDIDATES = 8  # samples around which they are refined
 _ZOOMS = 30  # steps of this, each halving the box

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..cube.cube import axis_and_side, damped_fit, tangent_axes
-from ..spline.bspline import breakpoints
+from ..spline.bspline import breakpoints, divided_spans
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import doubled_areas
 
@@ -57,7 +57,11 @@ class SampledBoundary:
         """Sample all six faces, edges included: each span alike, `samples` a direction at least."""
         if samples < 2:
             raise ValueError(f"samples must be at least 2, got {samples}")
-        u, v, w = (_spread(breakpoints(row), samples) for row in volume.knots)
+        spans = [len(breakpoints(row)) - 1 for row in volume.knots]
+        u, v, w = (
+            divided_spans(row, max(PER_SPAN, -(-(samples - 1) // count)))
+            for row, count in zip(volume.knots, spans, strict=True)
+        )
         return cls.on(volume, u, v, w)
 
     @classmethod
@@ -75,13 +79,6 @@ class SampledBoundary:
             cube_faces.append(np.full(len(face), k))
             count += len(parameters[-1])
         return cls(*(np.concatenate(parts) for parts in (parameters, points, triangles, cube_faces)))
-
-
-def _spread(breaks: Array, samples: int) -> Array:
-    """Divide each span between breakpoints equally, into PER_SPAN at least: so many parameters or more."""
-    pieces = max(PER_SPAN, -(-(samples - 1) // (len(breaks) - 1)))
-    inner = breaks[:-1, None] + np.diff(breaks)[:, None] * (np.arange(pieces) / pieces)
-    return np.append(inner.ravel(), breaks[-1])
 
 
 def _halved_cells(n_a: int, n_b: int) -> IntArray:
