@@ -20,6 +20,7 @@ QUIET = (
 )  # fmt: skip
 
 OWN = "not an origin"
+MOVED = -32000  # the protocol's code of an error: the page was left, or loaded anew, before it could answer
 
 
 def browse(chromium: str, folder: Path, url: str, width: int) -> tuple[np.ndarray, str, list[str]]:
@@ -40,6 +41,10 @@ def addresses(log: Path) -> list[str]:
     return [event["url"] for event in events if "url" in event and event.get("initiator", OWN) != OWN]
 
 
+class Moved(AssertionError):
+    """The page was loaded anew while a command was under way."""
+
+
 class Tab:
     """An open page: what its console complained of, and the addresses it asked for."""
 
@@ -58,7 +63,8 @@ class Tab:
         while True:
             answer = await self._socket.receive_json(timeout=60)
             if answer.get("id") == self._count and answer.get("sessionId") == self._session:
-                assert "error" not in answer, answer
+                if "error" in answer:
+                    raise (Moved if answer["error"].get("code") == MOVED else AssertionError)(answer)
                 return answer["result"]
             self._note(answer.get("method"), answer.get("params", {}))
 
@@ -81,11 +87,18 @@ class Tab:
     async def until(self, script, seconds=30.0):
         """Wait for an expression to be true and return it."""
         end = asyncio.get_running_loop().time() + seconds
-        while not (found := await self.value(script)):
+        while not (found := await self._value_once_loaded(script)):
             if asyncio.get_running_loop().time() > end:
                 raise AssertionError(f"not within {seconds} s: {script}\n{await self.text()}")
             await asyncio.sleep(0.1)
         return found
+
+    async def _value_once_loaded(self, script):
+        """The value of an expression; nothing while the page is being loaded anew."""
+        try:
+            return await self.value(script)
+        except Moved:
+            return None
 
     async def text(self):
         """What a reader sees."""
