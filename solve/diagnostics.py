@@ -168,7 +168,7 @@ def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list
 
 def _values_fit(volume: BSplineVolume, problem: BoundaryValueProblem, face: str) -> bool:
     x = Points.on(volume, *(np.array([float(face[1])]) if axis == face[0] else INSIDE for axis in AXES))
-    return _agree(problem.boundary_at(x), lambda: (problem.exact_at(x)[0], 0.0))
+    return _agree(problem.boundary_at(x, face), lambda: (problem.exact_at(x)[0], 0.0))
 
 
 def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:

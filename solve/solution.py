@@ -16,6 +16,7 @@ from .field import SplineField
 from .forms.form import Quantity
 from .forms.problem import BoundaryValueProblem
 from .quantities import Extremes, at_points, extremes, on_grid
+from .reactions import Balance
 
 if TYPE_CHECKING:
     import pyvista
@@ -68,6 +69,8 @@ class SolveReport:
     traffic : dict of str to float
         Of several processes, the bytes that all together send in a step of the linear solver: for copies of rows
         ("halo"), and in the preconditioner ("transposition", "substitution").
+    balance : Balance or None
+        What acts on the body and what its supports answer.
 
     Examples
     --------
@@ -91,6 +94,7 @@ class SolveReport:
     meaningful: bool = True
     residuals: tuple[float, ...] = field(default=(), repr=False)
     traffic: Mapping[str, float] = field(default_factory=dict)
+    balance: Balance | None = None
 
     l2 = _known("errors", "l2")
     l2_relative = _known("errors", "l2_relative")
@@ -103,6 +107,7 @@ class SolveReport:
         """Return the entry as report.json holds it; errors that are not known are absent."""
         names = ("elements", "dofs", "h", *NORMS, "iterations", "converged", "residual", "meaningful", "seconds")
         found = {name: value for name in names if (value := getattr(self, name)) is not None}
+        found |= self.balance.as_dict() if self.balance else {}
         return found | ({"traffic": dict(self.traffic)} if self.traffic else {})
 
     def __str__(self) -> str:
@@ -110,7 +115,8 @@ class SolveReport:
         found = {shown: getattr(self, norm) for norm, shown in NORMS.items()}
         parts += [f"{shown} {value:.4e}" for shown, value in found.items() if value is not None]
         state = "" if self.converged else f", NOT CONVERGED (residual {self.residual:.1e})"
-        return "\n".join([", ".join([*parts, f"{self.iterations} iterations{state}"]), *self.notices])
+        answers = [str(self.balance)] if self.balance and self.balance.reactions else []
+        return "\n".join([", ".join([*parts, f"{self.iterations} iterations{state}"]), *answers, *self.notices])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -149,7 +149,7 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     if comm is not None:
         space = space.slab(comm)
     _, load, _ = assemble_data(volume, problem, space, quadrature="gauss")
-    if len(problem.natural) == 6 and not problem.form.has_reaction:
+    if problem.fixes_nothing and not problem.form.has_reaction:
         space.add(load)
         balanced(load[:, *space.window], space)
     if problem.exact is not None:

@@ -16,18 +16,21 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .diagnostics import ConvergenceError, failure, judge, map_notices
-from .discretization.boundary import boundary_coefficients, face_rule, has_face
+from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_norms, missing_mean
 from .discretization.estimate import error_estimate
+from .discretization.on_regions import demand_area, demand_held, weak_faces
 from .discretization.operator import FormOperator, Operator, assemble
 from .discretization.quadrature import rule_of
 from .discretization.space import TrialSpace, agreed, embedded, longest_edge
+from .discretization.weak import WeakFace
 from .field import Points, SplineField
 from .forms.form import Form, check_law
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
+from .reactions import balance
 from .solution import Solution, SolveReport
 
 DEVICES = ("cpu", "cuda")
@@ -76,6 +79,8 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
             raise ValueError(f"{type(problem).__name__.lower()} runs on device='cpu' only, got device={device!r}")
         if problem.robin:
             raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
+        if problem.conditions:
+            raise ValueError(f"regions run on device='cpu' only, got device={device!r}")
         from .linear.cuda import check_available  # torch comes in here only
 
         check_available(device)
@@ -117,6 +122,7 @@ class System:
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
     right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
+    loads: Array  # (c, n_u, n_v, n_w): of all coefficients, before what is known is taken from them
     setup: float  # process seconds
 
     @property
@@ -243,6 +249,7 @@ class System:
             meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,
+            balance=balance(self, full, self.loads) if has_norm else None,
         )
         field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
@@ -293,14 +300,15 @@ def build(
         if isinstance(operator, FormOperator) and inverses[0].singular:
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
-                "solution open: give one face to boundary or robin"
+                "solution open: give one face, or a region, a value or an exchange"
             )
+        loads = load.copy()
         load -= operator.apply(known)
         space.add(load)
         right = np.ascontiguousarray(load[:, *space.window])
         right = balanced(right, space) if inverses[0].singular else right
         setup = time.process_time() - start
-    return System(volume, problem, space, operator, known, inverses, right, setup)
+    return System(volume, problem, space, operator, known, inverses, right, loads, setup)
 
 
 def assemble_data(
@@ -324,19 +332,42 @@ def assemble_data(
         component=0 if form.components == 1 and form.symmetric and not couples else None,
         threads=threads,
     )
-    robin = {}
     with agreed(space.comm):
-        for name in FACE_NAMES:
-            if name in space.dirichlet or not has_face(space, name):
-                continue
-            face = face_rule(volume, space, name)
-            alpha, data = problem.on_face(name, face.points, face.normal)
-            if alpha is not None:
-                robin[name] = replace(face, measure=alpha * face.measure)
-            for density, total in zip(data, load, strict=True):
-                total[face.layer] += face.integrate(density)
+        if problem.conditions:
+            terms: dict[str, Any] = _on_regions(volume, problem, space, load)
+        else:
+            terms = _on_faces(volume, problem, space, load)
     known = boundary_coefficients(volume, space.whole, problem.boundary_at, form.components)
-    return replace(operator, robin=robin), load, known[:, space.rows].copy()
+    return replace(operator, faces=terms), load, known[:, space.rows].copy()
+
+
+def _on_faces(
+    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, load: Array
+) -> dict[str, FaceRule]:
+    """Add the data on the images of the cube's faces to a load, and return the faces that have Robin's term."""
+    robin = {}
+    for name in FACE_NAMES:
+        if name in space.dirichlet or not has_face(space, name):
+            continue
+        face = face_rule(volume, space, name)
+        alpha, data = problem.on_face(name, face.points, face.normal)
+        if alpha is not None:
+            robin[name] = replace(face, measure=alpha * face.measure)
+        for density, total in zip(data, load, strict=True):
+            total[face.layer] += face.integrate(density)
+    return robin
+
+
+def _on_regions(
+    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, load: Array
+) -> dict[str, WeakFace]:
+    """Add the data on regions of the boundary to a load, and return the faces that have terms."""
+    faces = weak_faces(volume, problem, space)
+    demand_area(volume, problem, space, faces)
+    demand_held(problem, space, faces, float(np.ptp(volume.control_points, axis=(0, 1, 2)).max()))
+    for face in faces:
+        face.add_load(load)
+    return {face.name: face for face in faces}
 
 
 def balanced(load: Array, space: TrialSpace) -> Array:

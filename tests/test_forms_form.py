@@ -183,7 +183,7 @@ def test_a_law_that_is_not_coercive_somewhere_is_refused_with_the_place():
         ({"source": ("1", "2", "3")}, "source must have two entries, one a component"),
         ({"source": "1"}, "source must have two entries"),
         ({}, r"source has no data: give source=\(\"0\", \.\.\.\)"),
-        ({"exact": lambda x: x[:2]}, "source has no data: exact is a function or a field"),
+        ({"exact": lambda x: x[:2]}, "source has no data: exact is a function, a field or a choice"),
         ({"source": ("1", "1"), "neumann": {"top": None}}, "'top' is no face"),
         ({"source": ("1", "1"), "neumann": {"u0": None}}, "neumann u0 has no data"),
         ({"source": ("1", "1"), "neumann": ["u0"]}, "neumann must be a dictionary of face names"),

@@ -20,19 +20,20 @@ FREE = None
 
 
 def boundary_coefficients(
-    volume: BSplineVolume, space: TrialSpace, values: Callable[[Array], Array], components: int = 1
+    volume: BSplineVolume, space: TrialSpace, values: Callable[[Array, str], Array], components: int = 1
 ) -> Array:
     """Return coefficients (c, n_u, n_v, n_w) of an approximation of Dirichlet data on their faces, zero elsewhere.
 
-    values: takes points (3, ...) and returns (c, ...), one row for each of the components. Corners are interpolated,
+    values: takes points (3, ...) and the name of a face on which they lie, and returns (c, ...), one row for each of
+    the components. Corners are interpolated,
     then edges and faces projected in L2, in the parametric measure; each takes up what the smaller ones have fixed.
     """
     coefficients = np.zeros((components, *space.shape))
     points, bases, projections = zip(*map(_projection, space.knots, space.degrees), strict=True)
     for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
-        if not any(
-            FACE_NAMES[2 * axis + side] in space.dirichlet for axis, side in enumerate(entity) if side is not FREE
-        ):
+        of = [FACE_NAMES[2 * axis + side] for axis, side in enumerate(entity) if side is not FREE]
+        given = [name for name in of if name in space.dirichlet]
+        if not given:
             continue
         free = [a for a in range(3) if entity[a] is FREE]
         u, v, w = (points[a] if side is FREE else np.array([float(side)]) for a, side in enumerate(entity))
@@ -41,7 +42,7 @@ def boundary_coefficients(
         fixed = coefficients[:, *ends]  # on the closed entity: its own ends are known already
         for a in free:
             fixed = apply_along(bases[a], fixed, a + 1)
-        residual = values(Points.on(volume, u, v, w)) - fixed
+        residual = values(Points.on(volume, u, v, w), given[0]) - fixed
         for a in free:
             residual = np.moveaxis(np.tensordot(projections[a], residual, (1, a + 1)), 0, a + 1)
         coefficients[:, *inside] = residual
@@ -79,15 +80,24 @@ class FaceRule:
         """Return integrals (n_b, n_c) of a density (q_b, q_c) times each trial function."""
         return self.bases[0].T @ (density * self.measure) @ self.bases[1]
 
-    def add_mass(self, coefficients: Array, result: Array) -> None:
-        """Add Robin's term, the integral of alpha u v, of coefficients (n_u, n_v, n_w) to `result`, shaped alike."""
-        values = self.bases[0] @ coefficients[self.layer] @ self.bases[1].T
-        result[self.layer] += self.integrate(values)
+    def add_product(self, coefficients: Array, result: Array) -> None:
+        """Add Robin's term, the integral of alpha u v, of coefficients (c, n_u, n_v, n_w) to a result, shaped alike."""
+        for component, total in zip(coefficients, result, strict=True):
+            values = self.bases[0] @ component[self.layer] @ self.bases[1].T
+            total[self.layer] += self.integrate(values)
 
-    def add_mass_diagonal(self, diagonal: Array) -> None:
-        """Add the diagonal of Robin's term to an array (n_u, n_v, n_w)."""
+    def add_diagonal(self, component: int, diagonal: Array) -> None:
+        """Add the diagonal of Robin's term, for each component the same, to an array (n_u, n_v, n_w)."""
         b, c = (basis.power(2) for basis in self.bases)
         diagonal[self.layer] += b.T @ self.measure @ c
+
+    def add_lumped(self, component: int, diagonal: Array) -> None:
+        """Add the integral of alpha times each function to an array (n_u, n_v, n_w)."""
+        diagonal[self.layer] += self.integrate(np.ones(self.measure.shape))
+
+    def stiffness(self, component: int) -> float:
+        """Return the integral of alpha over the face."""
+        return float(self.measure.sum())
 
 
 def has_face(space: TrialSpace, name: str) -> bool:

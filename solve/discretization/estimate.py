@@ -123,7 +123,7 @@ def _from_face(
     across = _quadratic(problem.form.tensor(spans.middle), spans.slopes[axis])
     along = [0.0 if a == axis else k for a, k in enumerate(lowest)]
     total = 0.0
-    for oscillates, part in _parts(problem.boundary_at(x) - found, counts):
+    for oscillates, part in _parts(problem.boundary_at(x, face) - found, counts):
         depth = 0.5 * np.sqrt(across / spans.factor(problem, oscillates, along))
         squares = _integrals(part**2, weights, counts) * np.minimum(depth, 1.0)
         total += float(squares[has_area].sum())

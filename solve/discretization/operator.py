@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -21,9 +21,25 @@ from parameterize.threads import in_parallel
 from ..forms.form import Form, reaction
 from ..forms.jets import PAIRS
 from . import kernels
-from .boundary import FaceRule
 from .quadrature import GaussRule, geometry_planes, operator_rule
 from .space import TrialSpace, agreed
+
+
+class FaceTerm(Protocol):
+    """Terms of a matrix that are integrals over the image of a face."""
+
+    def add_product(self, coefficients: Array, result: Array) -> None:
+        """Add the product with coefficients (c, n_u, n_v, n_w) to a result, shaped alike."""
+
+    def add_diagonal(self, component: int, diagonal: Array) -> None:
+        """Add the diagonal of a component's block to an array (n_u, n_v, n_w)."""
+
+    def add_lumped(self, component: int, diagonal: Array) -> None:
+        """Add what each function has of the integral of the factor of u . v, to an array (n_u, n_v, n_w)."""
+
+    def stiffness(self, component: int) -> float:
+        """Return the integral of the factor of u . v, of one component: its mean over the face's parameters."""
+
 
 SHARES = 4  # of the pieces of one colour a thread: some wait less where others take longer
 LAYERS = 4  # of elements in a piece of work, where the degree allows so few
@@ -48,14 +64,14 @@ class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
     threads: of a product. folded: at how many of the points of all processes det J has the wrong sign.
-    robin: the rules of the faces that have Robin's term, as far as this process integrates.
+    faces: the terms on the faces of the cube that have some, as far as this process integrates.
     """
 
     space: TrialSpace
     rule: GaussRule
     threads: int
     folded: int = field(default=0, kw_only=True)
-    robin: Mapping[str, FaceRule] = field(default_factory=dict, kw_only=True)
+    faces: Mapping[str, FaceTerm] = field(default_factory=dict, kw_only=True)
 
     @cached_property
     def tables(self) -> kernels.Tables:
@@ -72,9 +88,8 @@ class MatrixFree:
         source = np.ascontiguousarray(coefficients).reshape(math.prod(coefficients.shape[:-3]), *self.space.shape)
         result = np.zeros_like(source)
         self.on_planes(lambda points: self._multiply(points, source, result))
-        for face in self.robin.values():
-            for component, total in zip(source, result, strict=True):
-                face.add_mass(component, total)
+        for face in self.faces.values():
+            face.add_product(source, result)
         return result.reshape(coefficients.shape)
 
     def apply_free(self, free: Array) -> Array:
@@ -96,9 +111,11 @@ class Operator(MatrixFree):
     """The positive semidefinite matrix of a scalar symmetric law, for each component the same.
 
     factors: (q_u, 6 or 7, q_w, q_v), the six of G and c |det J| where there is a reaction; weights included.
+    component: of the law whose block it is.
     """
 
     factors: Array
+    component: int = 0
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
         for component, total in zip(coefficients, result, strict=True):
@@ -122,8 +139,8 @@ class Operator(MatrixFree):
 
         self.on_planes(add)
         on_faces = np.zeros(self.space.shape)
-        for face in self.robin.values():
-            face.add_mass_diagonal(on_faces)
+        for face in self.faces.values():
+            face.add_diagonal(self.component, on_faces)
         return result + on_faces
 
     def dense(self, axis: int, derivative: int) -> Array:
@@ -171,7 +188,7 @@ class FormOperator(MatrixFree):
         law, rule = (self.volume, self.space, self.form), self.rule
         block, _ = assemble(*law, rule=rule, component=component, threads=self.threads)
         assert isinstance(block, Operator)
-        return replace(block, robin=self.robin)
+        return replace(block, faces=self.faces, component=component)
 
 
 def assemble(

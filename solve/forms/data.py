@@ -17,6 +17,7 @@ from .parser import Expression, ExpressionError
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
 SMALLEST = 1.0 / LARGEST  # of a law's coefficients, by which data are divided
 WORDS = {2: "two", 3: "three"}
+NOT_SMOOTH = "a function, a field or a choice (where, min, max), whose derivatives are unknown"
 USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
 Scalar = str | float | SplineField | Callable[..., ArrayLike]
@@ -44,8 +45,8 @@ class Datum:
 
     @property
     def is_formula(self) -> bool:
-        """Whether all its derivatives are known."""
-        return len(self.formulas) == len(self.entries)
+        """Whether all its derivatives are known: those of where, min and max jump."""
+        return len(self.formulas) == len(self.entries) and all(formula.is_smooth for formula in self.formulas)
 
     def placed(self, frame: UnitFrame) -> "Datum":
         """Return the same datum with X, Y, Z measured in a frame."""

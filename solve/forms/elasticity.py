@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from numbers import Real
 from typing import Any
 
@@ -11,11 +11,13 @@ import numpy as np
 
 from parameterize.arrays import Array
 
+from .condition import GivenRegions, conditions_of
 from .data import LARGEST, SMALLEST, Data
 from .form import Quantity
 from .problem import LawWithData, Natural
 
 NONE = ("0", "0", "0")  # of a vector
+ON_REGIONS = ("fix", "roller", "symmetry", "load", "pressure", "spring")
 
 
 NEARLY_RIGID = 0.45  # Poisson's ratio from which on the estimate of the error was 30 to 500 times too large
@@ -44,6 +46,19 @@ class Elasticity(LawWithData):
         E > 0.
     poisson_ratio : float
         -1 < nu < 1/2. `lame` converts from lambda and mu.
+    fix : regions, or dict of region to three entries or None, optional
+        Displacement on regions of the boundary (`Region`, or its text), zero for regions alone; an entry that is None
+        leaves that component free. Where a region is given, what no region names is free, or has the traction of
+        `exact`; `displacement` and `traction` are left out then.
+    roller, symmetry : regions, or dict of region to entry, optional
+        The displacement along the normal alone, zero for regions alone: two names for one condition.
+    load : dict of region to three entries or None, optional
+        sigma n, force per area.
+    pressure : dict of region to entry, optional
+        Force per area against the outward normal.
+    spring : dict of region to entry, optional
+        k of sigma n = -k u: an elastic foundation, force per area and displacement; (k, three entries) for
+        sigma n = k (outside - u).
 
     Raises
     ------
@@ -67,6 +82,13 @@ class Elasticity(LawWithData):
     traction: Natural = field(default_factory=dict)
     young: float = 1.0
     poisson_ratio: float = 0.3
+    _: KW_ONLY
+    fix: GivenRegions | None = None
+    roller: GivenRegions | None = None
+    symmetry: GivenRegions | None = None
+    load: GivenRegions | None = None
+    pressure: GivenRegions | None = None
+    spring: GivenRegions | None = None
 
     components = 3
     constant = True
@@ -79,10 +101,12 @@ class Elasticity(LawWithData):
             )
         if not (isinstance(self.poisson_ratio, Real) and -1.0 < self.poisson_ratio < 0.5):
             raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {self.poisson_ratio!r:.80}")
-        is_loaded = self.displacement is not None or bool(self.traction)
+        on_regions = conditions_of(3, self.exact, **{kind: getattr(self, kind) for kind in ON_REGIONS})
+        is_loaded = self.displacement is not None or bool(self.traction) or bool(on_regions)
         force = NONE if self.force is None and self.exact is None and is_loaded else self.force
-        self._set({"exact": self.exact, "source": force, "boundary": self.displacement}, self.traction, {})
-        if not self.dirichlet:
+        given = {"exact": self.exact, "source": force, "boundary": self.displacement}
+        self._set(given, self.traction, {}, on_regions)
+        if not self.dirichlet and not on_regions:
             raise ValueError("traction on all six faces leaves the body free to move: leave one face to displacement")
 
     @staticmethod
@@ -116,6 +140,12 @@ class Elasticity(LawWithData):
         return (
             f"Poisson's ratio {nu:g} is near 1/2, where a body hardly changes its volume" if nu > NEARLY_RIGID else ""
         )
+
+    def free_motions(self, x: Array) -> Array:
+        """Return the six motions of a rigid body (6, 3, m): along x, y, z, and about them."""
+        shifts = np.eye(3)[:, :, None] * np.ones(x.shape[1])
+        turns = [np.cross(axis, x, axisb=0).T for axis in np.eye(3)]
+        return np.concatenate([shifts, np.stack(turns)])
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:

@@ -65,6 +65,10 @@ class Form:
         """Why a law takes many iterations, and why its error cannot be estimated from the residual; "" where it can."""
         return ""
 
+    def free_motions(self, x: Array) -> Array:
+        """Return the motions (k, c, m) at points x (3, m) that a vector law does not resist; none here."""
+        return np.zeros((0, self.components, x.shape[1]))
+
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What can be asked of a solution of this law, by name; a law of one's own may add to it."""

@@ -6,6 +6,7 @@ kinds allowed and translated.
 """
 
 import ast
+import functools
 import math
 import operator
 import re
@@ -13,6 +14,7 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -41,8 +43,17 @@ FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
     **{name: getattr(Jet, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh")},
     "abs": abs,
 }
+CHOICES = {"min": 2, "max": 2, "where": 3}  # functions that choose among values, and how many arguments they take
+COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
 
-Evaluator = Callable[[Sequence[Jet]], Jet]  # of the six variables
+Values = Sequence[Any]  # of the variables, jets; where conditions have names, Boolean arrays of these after them
+Evaluator = Callable[[Values], Jet]
+Decider = Callable[[Values], Any]  # gives Boolean arrays
 
 
 class ExpressionError(ValueError):
@@ -64,19 +75,22 @@ class Expression:
     """A formula in x, y, z and X, Y, Z.
 
     frame: what X, Y, Z mean; a formula with one of them cannot be evaluated without it (`placed`).
-    variables: those that occur in the formula.
+    variables: those that occur in the formula. is_smooth: whether it is without where, min and max, whose results bend
+        or jump: no source follows from such a formula.
     Raises ExpressionError, naming the place, for anything outside the whitelist.
     """
 
     text: str
     frame: UnitFrame | None = None
     variables: frozenset[str] = field(init=False, repr=False, compare=False)
+    is_smooth: bool = field(init=False, repr=False, compare=False)
     _evaluate: Evaluator = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        translator = _Translator(self.text)
-        object.__setattr__(self, "variables", frozenset(translator.variables))
-        object.__setattr__(self, "_evaluate", translator.result)
+        translator = Translator(self.text)
+        object.__setattr__(self, "_evaluate", translator.number())
+        object.__setattr__(self, "variables", frozenset(translator.used))
+        object.__setattr__(self, "is_smooth", not translator.chooses)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the text, which is parsed again."""
@@ -115,24 +129,33 @@ class Expression:
                     f"{_shorten(self.text)!r}: X, Y, Z are scaled by the size of a volume: name it with "
                     "problem.on(volume)"
                 )
-            scale = 1.0 / self.frame.length
-            variables += [scale * (c - middle) for c, middle in zip(x, self.frame.center, strict=True)]
+            variables += scaled(self.frame, x)
         with np.errstate(all="ignore"):
             return self._evaluate(variables)
+
+
+def scaled(frame: UnitFrame, x: Sequence[Jet]) -> list[Jet]:
+    """Return the jets of X, Y, Z from those of x, y, z."""
+    return [(1.0 / frame.length) * (c - middle) for c, middle in zip(x, frame.center, strict=True)]
 
 
 def _shorten(text: str, length: int = 40) -> str:
     return text if len(text) <= length else text[: length - 3] + "..."
 
 
-class _Translator:
-    """Turns a text into nested closures over jets, refusing what is not on the list."""
+class Translator:
+    """Turns a text into nested closures, refusing what is not on the list.
 
-    def __init__(self, text: str) -> None:
+    variables: the names of numbers. marks: the names of conditions. used: the names that occur. chooses: whether where,
+    min or max does. Raises ExpressionError, here and in `number` and `condition`, for what is refused.
+    """
+
+    def __init__(self, text: str, variables: Sequence[str] = VARIABLES, marks: Sequence[str] = ()) -> None:
         if not isinstance(text, str):
             raise ExpressionError(f"an expression must be text, got {type(text).__name__}")
-        self.text = text.strip()
-        self.variables: set[str] = set()
+        self.text, self.variables, self.marks = text.strip(), variables, marks
+        self.used: set[str] = set()
+        self.chooses = False
         if not self.text:
             raise ExpressionError("the expression is empty; write a formula such as exp(X+Z)*sin(Y)")
         if len(self.text) > MAX_LENGTH:
@@ -152,7 +175,15 @@ class _Translator:
             raise ExpressionError(f"expression{place}, {_shorten(self.text)!r}: {error.msg}{hint}") from None
         except (ValueError, MemoryError, RecursionError) as error:
             raise ExpressionError(f"expression, {_shorten(self.text)!r}: cannot be parsed ({error})") from None
-        self.result = self._node(tree.body, 1)
+        self.body = tree.body
+
+    def number(self) -> Evaluator:
+        """Return the text as a function of the values that gives a number a point."""
+        return self._node(self.body, 1)
+
+    def condition(self) -> Decider:
+        """Return the text as a function of the values that says at which points it holds."""
+        return self._condition(self.body, 1)
 
     def _refuse(self, node: ast.expr, why: str) -> ExpressionError:
         place = _shorten(ast.get_source_segment(self.text, node) or "")
@@ -166,12 +197,15 @@ class _Translator:
                 return self._number(node, value)
             case ast.Name(id=name) if name in CONSTANTS:
                 return _constant(CONSTANTS[name])
-            case ast.Name(id=name) if name in VARIABLES:
-                self.variables.add(name)
-                return operator.itemgetter(VARIABLES.index(name))
+            case ast.Name(id=name) if name in self.variables:
+                self.used.add(name)
+                return operator.itemgetter(self.variables.index(name))
+            case ast.Name(id=name) if name in self.marks:
+                raise self._refuse(node, "is a condition, where a number must stand")
             case ast.Name():
-                names = ", ".join((*VARIABLES, *CONSTANTS, *FUNCTIONS))
-                raise self._refuse(node, f"unknown name; the names are {names}")
+                raise self._unknown(node)
+            case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
+                raise self._refuse(node, "is a condition, where a number must stand: write where(condition, a, b)")
             case ast.UnaryOp(op=ast.USub()):
                 inner = self._node(node.operand, depth + 1)
                 return lambda p: -inner(p)
@@ -185,6 +219,34 @@ class _Translator:
                 return self._call(node, depth)
         raise self._refuse(node, f"not allowed; use numbers, x y z X Y Z pi e, + - * / ** and {' '.join(FUNCTIONS)}")
 
+    def _unknown(self, node: ast.expr) -> ExpressionError:
+        names = ", ".join((*self.variables, *CONSTANTS, *FUNCTIONS, *CHOICES, *self.marks))
+        return self._refuse(node, f"unknown name; the names are {names}")
+
+    def _condition(self, node: ast.expr, depth: int) -> Decider:
+        if depth > MAX_DEPTH:
+            raise self._refuse(node, f"nested more than {MAX_DEPTH} deep")
+        match node:
+            case ast.Name(id=name) if name in self.marks:
+                self.used.add(name)
+                return operator.itemgetter(len(self.variables) + self.marks.index(name))
+            case ast.Name(id=name) if name not in self.variables:
+                raise self._unknown(node)
+            case ast.UnaryOp(op=ast.Not()):
+                inner = self._condition(node.operand, depth + 1)
+                return lambda p: ~inner(p)
+            case ast.BoolOp(op=op):
+                parts = [self._condition(part, depth + 1) for part in node.values]
+                join = np.logical_and if isinstance(op, ast.And) else np.logical_or
+                return lambda p: functools.reduce(join, [part(p) for part in parts])
+            case ast.Compare(ops=ops) if all(type(op) in COMPARISONS for op in ops):
+                sides = [self._node(side, depth + 1) for side in (node.left, *node.comparators)]
+                tests = [COMPARISONS[type(op)] for op in ops]
+                return lambda p: _all_hold(tests, [side(p).value for side in sides])
+            case ast.Compare():
+                raise self._refuse(node, "conditions compare with <, <=, > and >=: surfaces are not met exactly")
+        raise self._refuse(node, "is a number, where a condition must stand, such as z < 1 or nx > 0.9")
+
     def _number(self, node: ast.Constant, value: Any) -> Evaluator:
         if type(value) not in (int, float):
             raise self._refuse(node, "only real numbers are allowed")
@@ -194,19 +256,37 @@ class _Translator:
 
     def _call(self, node: ast.Call, depth: int) -> Evaluator:
         name = node.func.id if isinstance(node.func, ast.Name) else ""
+        if name in CHOICES:
+            return self._choice(node, name, depth)
         if name not in FUNCTIONS:
-            meant = name.lower()
-            remedy = f"write {meant}" if meant in FUNCTIONS else f"the functions are {', '.join(FUNCTIONS)}"
+            meant, names = name.lower(), (*FUNCTIONS, *CHOICES)
+            remedy = f"write {meant}" if meant in names else f"the functions are {', '.join(names)}"
             raise self._refuse(node.func, f"not a known function; {remedy}")
         if len(node.args) != 1 or node.keywords:
             raise self._refuse(node, f"{name} takes exactly one argument")
         function, inner = FUNCTIONS[name], self._node(node.args[0], depth + 1)
         return lambda p: function(inner(p))
 
+    def _choice(self, node: ast.Call, name: str, depth: int) -> Evaluator:
+        if len(node.args) != CHOICES[name] or node.keywords:
+            raise self._refuse(node, f"{name} takes exactly {CHOICES[name]} arguments")
+        self.chooses = True
+        first, second = (self._node(part, depth + 1) for part in node.args[-2:])
+        if name == "where":
+            decide = self._condition(node.args[0], depth + 1)
+            return lambda p: _chosen(decide(p), first(p), second(p))
+        better = operator.le if name == "min" else operator.ge
+
+        def best(p: Values) -> Jet:
+            a, b = first(p), second(p)
+            return _chosen(better(a.value, b.value), a, b)
+
+        return best
+
     def _binary(self, node: ast.BinOp, depth: int) -> Evaluator:
         left, right = self._node(node.left, depth + 1), self._node(node.right, depth + 1)
         names = {part.id for part in ast.walk(node.right) if isinstance(part, ast.Name)}
-        if isinstance(node.op, ast.Pow) and names.isdisjoint(VARIABLES):
+        if isinstance(node.op, ast.Pow) and names.isdisjoint((*self.variables, *self.marks)):
             with np.errstate(all="ignore"):
                 exponent = float(right([]).value)
             if not abs(exponent) <= MAX_EXPONENT:
@@ -214,6 +294,21 @@ class _Translator:
             return lambda p: left(p).power(exponent)
         combine = OPERATORS[type(node.op)]
         return lambda p: combine(left(p), right(p))
+
+
+def _all_hold(tests: Sequence[Callable[[Any, Any], Any]], sides: Sequence[Any]) -> Any:
+    """Return whether each number stands in its relation to the next, as in 0 < x < 1."""
+    return functools.reduce(np.logical_and, [test(*pair) for test, pair in zip(tests, pairwise(sides), strict=True)])
+
+
+def _chosen(condition: Any, a: Jet, b: Jet) -> Jet:
+    """Return a jet where a condition holds and another where it does not."""
+
+    def entry(one: Any, other: Any) -> Any:
+        return np.where(condition, one, other)
+
+    gradient = tuple(map(entry, a.gradient, b.gradient))
+    return Jet(entry(a.value, b.value), gradient, tuple(map(entry, a.hessian, b.hessian)))
 
 
 def _constant(number: float) -> Evaluator:

@@ -11,7 +11,8 @@ import numpy as np
 from parameterize.arrays import Array
 
 from ..field import SplineField
-from .data import Data, Datum, Scalar, demand, demand_definite, demand_size
+from .condition import GivenRegions, conditions_of
+from .data import NOT_SMOOTH, Data, Datum, Scalar, demand, demand_definite, demand_size
 from .jets import PAIRS, SYMMETRIC, Jet
 from .problem import LawWithData, Natural, Robin
 
@@ -46,6 +47,14 @@ class Poisson(LawWithData):
         kappa grad u . n on the faces "u0", "u1", "v0", "v1", "w0", "w1", n the outward unit normal; None: from `exact`.
     robin : dict of face name to (entry, entry or None)
         (alpha, g) of kappa grad u . n + alpha u = g; alpha not negative; None for g: from `exact`.
+    value : dict of region to entry or None, or regions, optional
+        Values of u on regions of the boundary (`Region`, or its text), zero for regions alone; None: from `exact`.
+        Where a region is given, what no region names has no flux, or that of `exact`, the source is zero unless it is
+        given or follows from `exact`, and `boundary`, `neumann` and `robin` are left out.
+    inflow : dict of region to entry or None, optional
+        kappa grad u . n on regions.
+    exchange : dict of region to (entry, entry or None), optional
+        (alpha, outside) of kappa grad u . n = alpha (outside - u) on regions, as of heat that passes to the air.
 
     Raises
     ------
@@ -71,14 +80,21 @@ class Poisson(LawWithData):
     reaction: Scalar | None = None
     neumann: Natural = field(default_factory=dict)
     robin: Robin = field(default_factory=dict)
+    value: GivenRegions | None = None
+    inflow: GivenRegions | None = None
+    exchange: GivenRegions | None = None
 
     def __post_init__(self) -> None:
-        if self.exact is None and self.source is None and self.boundary is None:
-            object.__setattr__(self, "exact", DEFAULT_EXACT)
+        on_regions = conditions_of(1, self.exact, value=self.value, flux=self.inflow, exchange=self.exchange)
         given = {role: getattr(self, role) for role in ("exact", "source", "boundary", "reaction")}
+        if on_regions and self.exact is None and self.source is None:
+            given["source"] = "0"
+        elif self.exact is None and self.source is None and self.boundary is None:
+            object.__setattr__(self, "exact", DEFAULT_EXACT)
+            given["exact"] = DEFAULT_EXACT
         kappa = _six(self.kappa)
         count = len(kappa) if isinstance(kappa, list) else 1
-        self._set({**given, "kappa": kappa}, self.neumann, self.robin, kappa=count)
+        self._set({**given, "kappa": kappa}, self.neumann, self.robin, on_regions, kappa=count)
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return kappa grad u."""
@@ -103,7 +119,7 @@ class Poisson(LawWithData):
     def not_differentiable(self) -> str:
         """Why the derivatives of kappa, or the values of c on jets, are unknown; "" where they are known."""
         if "kappa" in self.data and not self.data["kappa"].is_formula:
-            return "kappa is a function or a field, whose derivatives are unknown"
+            return f"kappa is {NOT_SMOOTH}"
         return "reaction is a field" if isinstance(self.reaction, SplineField) else ""
 
     def tensor(self, x: Array, component: int = 0) -> Array:

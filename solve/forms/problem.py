@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -13,6 +13,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import SplineField
+from .condition import WITH_FACTOR, Condition, GivenRegions, conditions_of
 from .data import Data, Datum, demand, finite, parse
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
@@ -36,9 +37,17 @@ class BoundaryValueProblem:
     labels: ClassVar[Mapping[str, str]] = {}  # role -> name in messages, where that is another
     natural: tuple[str, ...]  # faces on which the flux through them is given
     dirichlet: tuple[str, ...]  # faces on which u itself is given
+    conditions: tuple[Condition, ...]  # on regions of the boundary; where there are any, all else of it is free
     data: Mapping[str, Datum]  # by role
 
-    def _set(self, given: Mapping[str, Data | None], neumann: Natural, robin: Robin, **counts: int) -> None:
+    def _set(
+        self,
+        given: Mapping[str, Data | None],
+        neumann: Natural,
+        robin: Robin,
+        conditions: tuple[Condition, ...] = (),
+        **counts: int,
+    ) -> None:
         """Parse the data. Raises ValueError where they do not fit together or cannot be known.
 
         counts: role -> how many entries its datum has, where these are not the law's components.
@@ -66,10 +75,28 @@ class BoundaryValueProblem:
                 count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
                 face = role.split(":")[0].partition(" ")[2]
                 data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
+        on_regions = {role: pair for condition in conditions for role, pair in condition.given().items()}
+        for role, (entry, size) in on_regions.items():
+            if entry is not None:
+                count = size or self.form.components
+                data[role] = parse(role, entry, count, of_coordinates=self.of_coordinates)
         dirichlet = tuple(face for face in FACE_NAMES if face not in neumann and face not in robin)
-        for name, value in (("data", data), ("natural", tuple(neumann)), ("dirichlet", dirichlet)):
+        if conditions:
+            if on_faces or given.get("boundary") is not None:
+                raise ValueError(
+                    f"give data on regions, or on faces by {self.label('boundary')}, {self.label('neumann')} and "
+                    'robin, not both: a face of the cube is a region, too, as in "u0"'
+                )
+            strong = {face for condition in conditions if condition.is_strong for face in condition.region.faces}
+            dirichlet = tuple(face for face in FACE_NAMES if face in strong)
+        for name, value in (
+            ("data", data),
+            ("natural", tuple(neumann)),
+            ("dirichlet", dirichlet),
+            ("conditions", conditions),
+        ):
             object.__setattr__(self, name, value)
-        for role in ("source", *on_faces):
+        for role in ("source", *on_faces, *on_regions):
             if role not in data:
                 self._check_derived(role)
 
@@ -79,7 +106,11 @@ class BoundaryValueProblem:
         if exact is None:
             zero = '"0"' if self.form.components == 1 else '("0", ...)'
             raise ValueError(f"{name} has no data: give {name}={zero} for none, or the solution as formulas in exact")
-        why = "" if exact.is_formula else "exact is a function or a field, whose derivatives are unknown"
+        why = (
+            ""
+            if exact.is_formula
+            else "exact is a function, a field or a choice (where, min, max), whose derivatives are unknown"
+        )
         why = why or (self.not_differentiable if role == "source" else "")
         if why:
             raise ValueError(f"{name} has no data: {why}; give {name}=... too, or formulas")
@@ -108,13 +139,24 @@ class BoundaryValueProblem:
 
     @property
     def is_scaled(self) -> bool:
-        """Whether X, Y or Z occurs in a formula."""
-        return any(formula.is_scaled for _, _, formula in self.formulas)
+        """Whether X, Y or Z occurs in a formula or in the condition of a region."""
+        return any(formula.is_scaled for _, _, formula in self.formulas) or any(
+            condition.region.is_scaled for condition in self.conditions
+        )
+
+    @property
+    def fixes_nothing(self) -> bool:
+        """Whether no value of u is given anywhere, and no exchange with the outside."""
+        if self.conditions:
+            return not any(c.is_essential or c.kind in WITH_FACTOR for c in self.conditions)
+        return len(self.natural) == len(FACE_NAMES)
 
     def placed(self, frame: UnitFrame) -> Self:
         """Return the same problem with X, Y, Z measured in a frame."""
         other = copy(self)
         object.__setattr__(other, "data", {role: datum.placed(frame) for role, datum in self.data.items()})
+        regions = (replace(condition, region=condition.region.placed(frame)) for condition in self.conditions)
+        object.__setattr__(other, "conditions", tuple(regions))
         return other
 
     @property
@@ -152,9 +194,13 @@ class BoundaryValueProblem:
     def _exact_jets(self, x: Array, hessian: Numbers = (0.0,) * 6) -> list[Jet]:
         return [formula.jet(coordinates(np.asarray(x), hessian)) for formula in self.exact_formulas]
 
-    def boundary_at(self, x: Array) -> Array:
-        """Return the values of u (c, ...) given on the boundary: those of `exact` or zero where none are given."""
-        for role in ("boundary", "exact"):
+    def boundary_at(self, x: Array, face: str = "") -> Array:
+        """Return the values of u (c, ...) given on the boundary: those of `exact` or zero where none are given.
+
+        face: on which the points lie, where regions give a face its own values.
+        """
+        of_face = [c.role for c in self.conditions if c.is_strong and face in c.region.faces]
+        for role in (*of_face[:1], "boundary", "exact"):
             if role in self.data:
                 return self.data[role](x)
         return np.zeros((self.form.components, *x.shape[1:]))
@@ -171,10 +217,44 @@ class BoundaryValueProblem:
             demand(alpha >= 0.0, f"{role}: alpha", "zero or positive", x)
         if role in self.data:
             return alpha, self.data[role](x)
+        flux = self._flux_of_exact(role, x, normal)
+        return alpha, flux if alpha is None else flux + alpha * self.data["exact"](x)
+
+    def _flux_of_exact(self, role: str, x: Array, normal: Array) -> Array:
+        """Return flux . n (c, ...) of the formulas `exact`, data of a role."""
         u, grad = known(self._exact_jets(x, ()), x.shape[1:])
         flux = (np.asarray(self.form.flux(u, grad, x), dtype=np.float64) * normal).sum(axis=1)
-        finite(f"{self.label(role)} (from exact)", flux, x, self._first_formula)
-        return alpha, flux if alpha is None else flux + alpha * self.data["exact"](x)
+        return finite(f"{self.label(role)} (from exact)", flux, x, self._first_formula)
+
+    def values_on(self, condition: Condition, direction: Array, x: Array) -> Array:
+        """Return what an essential condition gives of u along a direction (c, m) at points (3, m): (m,)."""
+        role = condition.role if condition.role in self.data else "exact"
+        found = self.data[role](x)
+        return found[0] if len(found) != len(direction) else np.asarray((found * direction).sum(axis=0))
+
+    def flux_on(self, condition: Condition | None, x: Array, normal: Array) -> Array:
+        """Return the flux (c, m) into the body that a condition gives at points (3, m) with normals (3, m).
+
+        None stands for the flux of `exact`, or none, on what no region names. That of a factor is for u = 0.
+        """
+        if condition is None or (condition.data is None and condition.role not in self.data):
+            if not self.exact_formulas:
+                return np.zeros((self.form.components, *x.shape[1:]))
+            return self._flux_of_exact("flux" if condition is None else condition.role, x, normal)
+        if condition.kind in WITH_FACTOR:
+            factor = self.factor_on(condition, x)
+            if condition.role in self.data:
+                return np.asarray(factor * self.data[condition.role](x))
+            return self._flux_of_exact(condition.role, x, normal) + factor * self.data["exact"](x)
+        found = self.data[condition.role](x)
+        return -found[0] * normal if condition.kind == "pressure" else found
+
+    def factor_on(self, condition: Condition, x: Array) -> Array:
+        """Return the factor (m,) of an exchange or a spring at points (3, m)."""
+        role = f"{condition.role}: factor"
+        factor = self.data[role](x)[0]
+        demand(factor >= 0.0, role, "zero or positive", x)
+        return factor
 
     def exact_at(self, x: Array) -> tuple[Array, Array | None]:
         """Return exact u (c, ...) and its gradient (c, 3, ...), None where the derivatives are unknown."""
@@ -223,6 +303,13 @@ class Problem(BoundaryValueProblem):
         flux . n on "u0", ..., "w1", n the outward unit normal; None: from `exact`.
     robin : dict of face name to (entry, datum or None)
         (alpha, g) of flux . n + alpha u = g; alpha one entry, not negative; None for g: from `exact`.
+    value : dict of region to datum or None, or regions, optional
+        Values of u on regions of the boundary, zero for regions alone. Where a region is given, all of the boundary
+        that no region names has no flux, or that of `exact`; `boundary`, `neumann` and `robin` are left out then.
+    inflow : dict of region to datum or None, optional
+        flux . n on regions.
+    exchange : dict of region to (entry, datum or None), optional
+        (alpha, outside) of flux . n = alpha (outside - u) on regions; alpha not negative.
 
     Raises
     ------
@@ -254,9 +341,15 @@ class Problem(BoundaryValueProblem):
     boundary: Data | None = None
     neumann: Natural = field(default_factory=dict)
     robin: Robin = field(default_factory=dict)
+    value: GivenRegions | None = None
+    inflow: GivenRegions | None = None
+    exchange: GivenRegions | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.form, Form):
             raise TypeError(f"form must be an instance of a subclass of Form, got {self.form!r}")
         given = {role: getattr(self, role) for role in ("exact", "source", "boundary")}
-        self._set(given, self.neumann or {}, self.robin or {})
+        on_regions = {"value": self.value, "flux": self.inflow, "exchange": self.exchange}
+        self._set(
+            given, self.neumann or {}, self.robin or {}, conditions_of(self.form.components, self.exact, **on_regions)
+        )

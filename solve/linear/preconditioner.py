@@ -136,15 +136,15 @@ def _is_usable(preconditioner: FastDiagonalization) -> bool:
 def _without_local(operator: Operator) -> FastDiagonalization:
     """Return fast diagonalization alone; its numbers are not finite where the coefficients are too extreme."""
     space = operator.space
-    here = {name: float(face.measure.sum()) for name, face in operator.robin.items()}
-    robin = {name: float(space.total(here.get(name, 0.0))) for name in FACE_NAMES}
-    slopes, masses, averages = _directional_matrices(operator, robin)
+    here = {name: face.stiffness(operator.component) for name, face in operator.faces.items()}
+    stiff = {name: float(space.total(here.get(name, 0.0))) for name in FACE_NAMES}
+    slopes, masses, averages = _directional_matrices(operator, stiff)
     mean_mass = float(space.total(sum(plane[6:].sum() for plane in operator.factors)))  # of c |det J|, over the cube
     reaction = mean_mass / float(np.prod(averages))
     values, vectors = zip(*(_eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
     spectrum = values[0][:, None, None] + values[1][space.columns, None] + values[2] + reaction
     scaling = _scaling(operator, _diagonal(space, slopes, masses, reaction))
-    singular = not space.dirichlet and reaction == 0.0 and not any(robin.values())
+    singular = not space.dirichlet and reaction == 0.0 and not any(stiff.values())
     if singular:
         spectrum[0, : int(space.columns.start == 0), 0] = np.inf
     u, v, w = vectors
@@ -170,12 +170,12 @@ def _of_the_diagonal(operator: Operator, singular: bool) -> FastDiagonalization:
 
 
 def _directional_matrices(
-    operator: Operator, robin: Mapping[str, float]
+    operator: Operator, stiff: Mapping[str, float]
 ) -> tuple[list[Array], list[Array], list[float]]:
     """Return per direction the stiffness matrix K_d and the mass matrix M_d on the free coefficients, and M_d's mean.
 
-    The mean is that of the weight b_d over the direction's parameter. robin: of each face, the average over its
-    parameters of alpha times the surface element.
+    The mean is that of the weight b_d over the direction's parameter. stiff: of each face, the average over its
+    parameters of the factor of u v, Robin's or Nitsche's, times the surface element.
     """
     along, across = _separable_coefficients(operator)
     averages = [float(w @ b) for w, b in zip(operator.rule.weights, across, strict=True)]
@@ -186,7 +186,7 @@ def _directional_matrices(
         slope = _gram(operator, axis, operator.rule.weights[axis] * along[axis], 1)
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
             # one function only is nonzero at the end, with value 1
-            slope[end, end] += robin[name] * averages[axis] / float(np.prod(averages))
+            slope[end, end] += stiff[name] * averages[axis] / float(np.prod(averages))
         slopes.append(slope[free, free])
         masses.append(mass[free, free])
     return slopes, masses, averages

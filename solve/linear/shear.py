@@ -121,7 +121,7 @@ def _places() -> IntArray:
 def _stencils(operator: Operator) -> Array:
     """Return the lower half of the elements' stiffness matrix on the free nodes, (n_u, n_v, n_w, 14).
 
-    G of a cell is that of the quadrature point nearest to its middle.
+    G of a cell is that of the quadrature point nearest to its middle. Terms on faces are lumped.
     """
     space, widths, picks = operator.space, *_nearest_points(operator)
     start, _ = _place(space, operator.rule.shape[0])
@@ -141,6 +141,8 @@ def _stencils(operator: Operator) -> Array:
         if place < len(OFFSETS):
             there = tuple(slice(c, c + len(h)) for c, h in zip(corner + origin, widths, strict=True))
             lower[place][there] += np.tensordot(reference[:, i, j], cells, 1)
+    for face in operator.faces.values():
+        face.add_lumped(operator.component, lower[-1])
     space.add(lower)
     lower = lower[:, *space.window]
     for entries, offset in zip(lower, OFFSETS, strict=True):

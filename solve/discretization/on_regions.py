@@ -1,0 +1,282 @@
+"""What a problem's conditions on regions give at the points of a face: the terms of `weak.WeakFace`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from parameterize.arrays import Array, in_brackets
+from parameterize.spline.bspline import basis_derivatives, breakpoints, sparse_rows
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+
+from ..field import Points
+from ..forms.condition import Condition
+from ..forms.problem import BoundaryValueProblem
+from .boundary import has_face
+from .space import TrialSpace
+from .surface_rule import SurfaceRule, surface_rule
+from .weak import WeakFace
+
+MOST = 60  # conditions: a bit of a code each
+MARGIN = 2.0  # gamma over the least that keeps the form coercive
+DEPTHS = (0.5, 1.0)  # of the span behind a face, at which the map's change is looked at
+CONTRADICTION = 1e-6  # share of their size by which two values of one component may differ
+RIM = 1e-6  # share of a region's area on a face that may lie in another one, too, as "y < 1e-9" beside "x > 1"
+PARALLEL = 1e-6  # length of a direction's part that no other direction holds, from which on it is held too
+LOOSE = 1e-10  # of the best held motion, from which on one counts as free
+WHOLE = 0.999  # share of a face's parameters that a region must cover to count as all of it
+
+
+def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace) -> list[WeakFace]:
+    """Return the terms of a problem's conditions on regions, a face each; none where they act on no part of it.
+
+    Raises ValueError where a region has no area, and where conditions contradict each other.
+    """
+    if len(problem.conditions) > MOST:
+        raise ValueError(f"at most {MOST} regions, got {len(problem.conditions)}")
+    found = []
+    for name in FACE_NAMES:
+        if name not in space.dirichlet and has_face(space, name):
+            axis, side = divmod(FACE_NAMES.index(name), 2)
+            rule = surface_rule(volume, space, axis, side, _coder(problem, name))
+            if rule is not None:
+                found.append(_Builder(volume, problem, space, name, rule).face())
+    return found
+
+
+def demand_area(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, faces: list[WeakFace]) -> None:
+    """Raise ValueError where a region has no area on the boundary."""
+    for i, condition in enumerate(problem.conditions):
+        if not condition.is_strong and space.total(sum(face.weights[face.holds(i)].sum() for face in faces)) == 0.0:
+            points = volume.control_points.reshape(-1, 3)
+            low, high = (in_brackets(ends.tolist()) for ends in (points.min(axis=0), points.max(axis=0)))
+            raise ValueError(
+                f"{condition.role}: no part of the boundary lies there; the body lies between {low} and {high}"
+            )
+
+
+def demand_held(problem: BoundaryValueProblem, space: TrialSpace, faces: list[WeakFace], size: float) -> None:
+    """Raise ValueError where the supports leave a motion free that the law does not resist (`Form.free_motions`).
+
+    size: of the body.
+    """
+    holding = [face.weights * (np.einsum("ccm->m", face.projector) + (face.factor > 0.0)) for face in faces]
+    area = space.total(sum(float(weights.sum()) for weights in holding))
+    if space.dirichlet or not problem.form.free_motions(np.zeros((3, 1))).size:
+        return
+    if area == 0.0:
+        raise ValueError("no support holds the body: give fix, roller, symmetry or spring")
+    middle = space.total(sum(face.x @ weights for face, weights in zip(faces, holding, strict=True))) / area
+    gram = 0.0
+    for face in faces:
+        motions = problem.form.free_motions((np.asarray(face.x) - middle[:, None]) / size)
+        held = np.einsum("cdm,kdm->kcm", face.projector, motions)
+        loose = (motions - held) * (face.factor > 0.0)
+        gram = gram + np.einsum("kcm,lcm,m->kl", held, held, face.weights)
+        gram = gram + np.einsum("kcm,lcm,m->kl", loose, loose, face.weights)
+    values, vectors = np.linalg.eigh(space.total(gram) / area)
+    if values[0] < LOOSE * values[-1]:
+        free = ", ".join(f"{part:.2g}" for part in vectors[:, 0].round(3) + 0.0)
+        raise ValueError(
+            "the supports leave the body free to move: of its shifts along and turns about x, y, z, "
+            f"({free}) is not held"
+        )
+
+
+def _coder(problem: BoundaryValueProblem, name: str) -> Callable[[Array, Array], Any]:
+    """Return the function from points and normals to codes: bit i where condition i holds, bit 0 for the exact flux."""
+    rest = int(bool(problem.exact_formulas))
+
+    def codes(x: Array, normal: Array) -> Any:
+        found = np.full(x.shape[1:], rest, dtype=np.int64)
+        for i, condition in enumerate(problem.conditions, 1):
+            found |= condition.region.holds(x, normal, name).astype(np.int64) << i
+        return found
+
+    return codes
+
+
+@dataclass(frozen=True, eq=False)
+class _Builder:
+    volume: BSplineVolume
+    problem: BoundaryValueProblem
+    space: TrialSpace
+    name: str
+    rule: SurfaceRule
+
+    def face(self) -> WeakFace:
+        """Return the terms."""
+        form, at, weights = self.problem.form, self.rule.at, self.rule.weights
+        x, normal = Points.at(np.ascontiguousarray(at.x), at.parameters), at.normal
+        projector, given = self._held(x, normal)
+        gamma, slowest = self._gamma(x, normal)
+        loads, factor = self._natural(x, normal, projector)
+        axis, side = divmod(FACE_NAMES.index(self.name), 2)
+        tables, slope = self._tables(axis, side)
+        ends = [tuple(-end if a == axis else slice(None) for a in range(3)) for end in ((1, 2) if side else (0, -1))]
+        inside = np.einsum("ccm->m", projector) > 0.5
+        return WeakFace(
+            name=self.name,
+            form=form,
+            x=x,
+            normal=normal,
+            weights=weights,
+            inverse=np.moveaxis(np.linalg.inv(at.jacobian), 0, -1),
+            codes=self.rule.codes,
+            projector=projector,
+            values=given,
+            gamma=gamma,
+            slowest=slowest,
+            factor=factor,
+            loads=np.einsum("cdm,dm->cm", np.eye(form.components)[:, :, None] - projector, loads),
+            is_whole=bool((weights[inside] / at.size[inside]).sum() > WHOLE),
+            tables=tables,
+            slope=slope,
+            layers=(ends[0], ends[1]),
+        )
+
+    def _holding(self, condition: int) -> Any:
+        return self.rule.codes >> (condition + 1) & 1 == 1
+
+    def _held(self, x: Points, normal: Array) -> tuple[Array, Array]:
+        """Return the projector P (c, c, m) on the directions along which u is given, and P g (c, m)."""
+        c, m = self.problem.form.components, len(self.rule.weights)
+        projector, given = np.zeros((c, c, m)), np.zeros((c, m))
+        for i, condition in enumerate(self.problem.conditions):
+            here = np.flatnonzero(self._holding(i))
+            if not condition.is_essential or not len(here):
+                continue
+            points = Points.at(np.ascontiguousarray(x[:, here]), x.places[here])  # type: ignore[index]
+            for direction in condition.directions(c, normal[:, here]):
+                value = self.problem.values_on(condition, direction, points)
+                new = direction - np.einsum("cdm,dm->cm", projector[:, :, here], direction)
+                size = np.linalg.norm(new, axis=0)
+                missing = value - (direction * given[:, here]).sum(axis=0)
+                held, is_new = size <= PARALLEL, size > PARALLEL
+                wrong = held & (np.abs(missing) > CONTRADICTION * (np.abs(value).max() + np.abs(given).max()))
+                if self._is_area(here[wrong], here):
+                    self._refuse_contradiction(i, here[wrong][0])
+                new, place = new[:, is_new] / size[is_new], here[is_new]
+                projector[:, :, place] += new[:, None] * new
+                given[:, place] += new * (missing[is_new] / size[is_new])
+        return projector, given
+
+    def _refuse_contradiction(self, condition: int, point: int) -> None:
+        conditions = self.problem.conditions
+        others = [c.role for i, c in enumerate(conditions[:condition]) if self._holding(i)[point] and c.is_essential]
+        raise ValueError(
+            f"{conditions[condition].role} and {others[-1]} overlap and contradict each other at {self._place(point)}"
+        )
+
+    def _is_area(self, points: Any, region: Any) -> bool:
+        """Return whether some points are more of a region than the rim along which two regions touch."""
+        return bool(self.rule.weights[points].sum() > RIM * self.rule.weights[region].sum())
+
+    def _place(self, point: int) -> str:
+        return "(" + ", ".join(f"{value:.4g}" for value in self.rule.at.x[:, point]) + ")"
+
+    def _natural(self, x: Points, normal: Array, projector: Array) -> tuple[Array, Array]:
+        """Return what is given as flux into the body (c, m), and the factor (m,) of exchanges.
+
+        Raises ValueError where a load acts on what is held.
+        """
+        loads, factor = np.zeros((self.problem.form.components, len(self.rule.weights))), np.zeros(len(x[0]))
+        named = np.zeros(len(factor), dtype=bool)
+        for i, condition in enumerate(self.problem.conditions):
+            here = np.flatnonzero(self._holding(i))
+            named[here] = True
+            if condition.is_essential or not len(here):
+                continue
+            points = Points.at(np.ascontiguousarray(x[:, here]), x.places[here])  # type: ignore[index]
+            found = self.problem.flux_on(condition, points, normal[:, here])
+            lost = np.abs(np.einsum("cdm,dm->cm", projector[:, :, here], found)).max(axis=0)
+            wrong = here[lost > CONTRADICTION * np.abs(found).max()]
+            if condition.data is not None and self._is_area(wrong, here):
+                self._refuse_load(condition, wrong[0])
+            loads[:, here] += found
+            if f"{condition.role}: factor" in self.problem.data:
+                factor[here] += self.problem.factor_on(condition, points)
+        rest = np.flatnonzero((self.rule.codes & 1 == 1) & ~named | self._partly_held(projector, named))
+        if self.problem.exact_formulas and len(rest):
+            points = Points.at(np.ascontiguousarray(x[:, rest]), x.places[rest])  # type: ignore[index]
+            loads[:, rest] += self.problem.flux_on(None, points, normal[:, rest])
+        return loads, factor
+
+    def _partly_held(self, projector: Array, named: Array) -> Array:
+        """Return where the exact solution's flux is that of the components which a value leaves free."""
+        natural = np.zeros(len(named), dtype=bool)
+        for i, condition in enumerate(self.problem.conditions):
+            natural |= self._holding(i) & (not condition.is_essential)
+        trace = np.einsum("ccm->m", projector)
+        return (trace > 0.5) & (trace < self.problem.form.components - 0.5) & ~natural
+
+    def _refuse_load(self, condition: Condition, point: int) -> None:
+        held = [c for i, c in enumerate(self.problem.conditions) if c.is_essential and self._holding(i)[point]]
+        raise ValueError(
+            f"{condition.role} acts on what {held[0].role} holds, as at {self._place(point)}: "
+            f"write '{condition.region} and not ({held[0].region})'"
+        )
+
+    def _gamma(self, x: Points, normal: Array) -> tuple[Array, Array]:
+        """Return Nitsche's parameter (m,) at points with normals (3, m), and the law's factor over the cube's depth.
+
+        On the span behind a face |t(u)|^2 integrates to at most (p + 1)^2 / thickness times the energy, times the
+        largest eigenvalue of the law's matrix n . C . n (a polynomial of degree p on [0, 1] has
+        f(0)^2 <= (p + 1)^2 int f^2), times what the map's change across the span adds.
+        """
+        form, at, c = self.problem.form, self.rule.at, self.problem.form.components
+        axis, side = divmod(FACE_NAMES.index(self.name), 2)
+        columns = []
+        for d in range(c):
+            unit = np.zeros((c, len(at.parameters)))
+            unit[d] = 1.0
+            flux = np.asarray(form.flux(np.zeros_like(unit), unit[:, None] * normal, x), dtype=np.float64)
+            columns.append((flux * normal).sum(axis=1))
+        matrix = np.moveaxis(np.stack(columns), (0, 1), (-2, -1))
+        strength = np.linalg.eigvalsh(0.5 * (matrix + matrix.swapaxes(-1, -2)))[..., -1]
+        breaks = breakpoints(self.space.whole.knots[axis])
+        span = breaks[-1] - breaks[-2] if side else breaks[1] - breaks[0]
+        det = np.abs(np.linalg.det(at.jacobian))
+        change = np.ones(len(det))
+        inverse = np.linalg.inv(at.jacobian)
+        for depth in DEPTHS:
+            parameters = at.parameters.copy()
+            parameters[:, axis] = 1.0 - depth * span if side else depth * span
+            inside = self.volume.jacobian(parameters)
+            stretch = np.linalg.norm(inside @ inverse, ord=2, axis=(1, 2)) ** 2
+            change = np.maximum(change, stretch * det / np.abs(np.linalg.det(inside)))
+        thickness = span * det / at.size
+        steepest = MARGIN * self._sharing() * (self.space.degrees[axis] + 1) ** 2 * change
+        return steepest * strength / thickness, strength * span / thickness
+
+    def _sharing(self) -> Array:
+        """Return how many faces (m,) may take their part of the energy of the span behind each point."""
+        axis = FACE_NAMES.index(self.name) // 2
+        count = np.ones(len(self.rule.weights))
+        for a in range(3):
+            if a != axis:
+                breaks, t = breakpoints(self.space.whole.knots[a]), self.rule.at.parameters[:, a]
+                count += (t < breaks[1]).astype(float) + (t > breaks[-2])
+        return count
+
+    def _tables(self, axis: int, side: int) -> tuple[tuple[csr_array, csr_array, csr_array], float]:
+        """Return the tables of the face's functions, and the slope across it."""
+        knots, degrees = self.space.knots, self.space.degrees
+        along = [a for a in range(3) if a != axis]
+        found = [basis_derivatives(knots[a], degrees[a], self.rule.at.parameters[:, a], derivatives=1) for a in along]
+        (first_b, b), (first_c, c) = found
+        count_b, count_c = (self.space.shape[a] for a in along)
+        columns = (
+            (first_b[:, None] + np.arange(b.shape[-1]))[:, :, None] * count_c
+            + (first_c[:, None] + np.arange(c.shape[-1]))[:, None, :]
+        ).reshape(len(first_b), -1)
+        tables = [
+            sparse_rows((b[i][:, :, None] * c[j][:, None, :]).reshape(len(columns), -1), columns, count_b * count_c)
+            for i, j in ((0, 0), (1, 0), (0, 1))
+        ]
+        _, ends = basis_derivatives(knots[axis], degrees[axis], np.array([float(side)]), derivatives=1)
+        return (tables[0], tables[1], tables[2]), float(ends[1][0, -1 if side else 0])

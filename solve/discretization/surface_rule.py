@@ -1,0 +1,247 @@
+"""Quadrature on the image of a face of the cube whose parts end between knots, as regions do.
+
+Every point has a code, which says to which regions it belongs. A cell (at first a span) on which the code is constant
+has Gauss points. Any other is cut into lines along one of its directions, the codes' jumps on each are found by
+bisection, and every piece between two jumps has Gauss points: the rule is as exact there as lines meet the rim.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from parameterize.arrays import Array, IntArray
+from parameterize.spline.bspline import evaluate_at
+from parameterize.spline.orientation import orientation
+from parameterize.spline.volume import BSplineVolume
+
+from .space import TrialSpace
+
+Codes = Callable[[Array, Array], IntArray]  # of points (3, m) and outward unit normals (3, m)
+
+SAMPLES = 5  # points a direction at which the code of a cell is looked at, its ends included
+FEWEST = 120  # of these a direction and face: a mesh of few spans is looked at as finely as one of many
+PIECES = 8  # intervals of a line, in each of which a jump is looked for
+BISECTIONS = 40
+TOLERANCE = 1e-4  # share of the area of all regions that halving the cells once more may change
+HALVINGS = 4  # of the cells at a rim, at most
+TANGENTS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class FacePoints:
+    """Points of a face at parameters (m, 3), their images and what the map does there.
+
+    x, area: (3, m), the points in space and the outward normals as long as the surface element. jacobian: (m, 3, 3).
+    """
+
+    parameters: Array
+    x: Array
+    area: Array
+    jacobian: Array
+
+    @classmethod
+    def of(cls, volume: BSplineVolume, hand: int, axis: int, side: int, across: Array) -> "FacePoints":
+        """Return the points with parameters (m, 2) of the two directions along a face; hand: the orientation."""
+        parameters = np.insert(across, axis, float(side), axis=1)
+        spline = volume.degrees, volume.knots, volume.control_points, parameters
+        jacobian = np.stack([evaluate_at(*spline, tangent) for tangent in TANGENTS], axis=-1)
+        area = np.cross(jacobian[..., (axis + 1) % 3], jacobian[..., (axis + 2) % 3]).T
+        return cls(parameters, evaluate_at(*spline).T, (hand if side else -hand) * area, jacobian)
+
+    @property
+    def size(self) -> Array:
+        """The surface element (m,)."""
+        return np.asarray(np.linalg.norm(self.area, axis=0))
+
+    @property
+    def normal(self) -> Array:
+        """The outward unit normals (3, m), zero where the face shrinks to a point."""
+        size = self.size
+        return np.asarray(self.area / np.where(size > 0.0, size, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceRule:
+    """Points on a face, their weights (m,) in space and their codes (m,)."""
+
+    at: FacePoints
+    weights: Array
+    codes: IntArray
+
+
+def surface_rule(volume: BSplineVolume, space: TrialSpace, axis: int, side: int, codes: Codes) -> SurfaceRule | None:
+    """Return the rule of a face, without the points whose code is zero; None where all are.
+
+    The cells at rims are halved until the areas of all codes stay within TOLERANCE of their sum.
+    """
+    return _Cutter(volume, orientation(volume), space, axis, side, codes).rule()
+
+
+@dataclass(frozen=True, eq=False)
+class _Cutter:
+    volume: BSplineVolume
+    hand: int
+    space: TrialSpace
+    axis: int
+    side: int
+    codes: Codes
+
+    def rule(self) -> SurfaceRule | None:
+        """Return the rule."""
+        cells = self._spans()
+        seen = self._seen(cells, max(SAMPLES, -(-FEWEST // int(len(cells) ** 0.5))))
+        constant = (seen == seen[:, :1, :1]).all(axis=(1, 2))
+        whole = [self._gauss(cells[constant], seen[constant, 0, 0])]
+        cut = cells[~constant]
+        lines = self._on_lines(cut)
+        for _ in range(HALVINGS if len(cut) else 0):
+            halves = _quartered(cut)
+            seen = self._seen(halves, SAMPLES)
+            constant = (seen == seen[:, :1, :1]).all(axis=(1, 2))
+            whole.append(self._gauss(halves[constant], seen[constant, 0, 0]))
+            finer = self._on_lines(halves[~constant])
+            changed = _area_of_codes(lines), _area_of_codes(whole[-1], finer)
+            cut, lines = halves[~constant], finer
+            if _difference(*changed) <= TOLERANCE * sum(_area_of_codes(*whole, lines).values()):
+                break
+        parts = [part for part in (*whole, lines) if part is not None]
+        return _joined(parts) if parts else None
+
+    def _spans(self) -> Array:
+        """Return the spans of the face as cells (k, 2, 2): lower and upper ends of both directions."""
+        b, c = (self.space.breaks[a] for a in range(3) if a != self.axis)
+        low = np.stack(np.meshgrid(b[:-1], c[:-1], indexing="ij"), axis=-1).reshape(-1, 2)
+        high = np.stack(np.meshgrid(b[1:], c[1:], indexing="ij"), axis=-1).reshape(-1, 2)
+        return np.stack([low, high], axis=1)
+
+    def _code(self, across: Array) -> tuple[FacePoints, IntArray]:
+        """Return points with parameters (m, 2), and their codes."""
+        at = FacePoints.of(self.volume, self.hand, self.axis, self.side, across)
+        return at, self.codes(at.x, at.normal)
+
+    def _seen(self, cells: Array, samples: int) -> IntArray:
+        """Return the codes (k, samples, samples) of cells on grids that contain their ends."""
+        t = np.linspace(0.0, 1.0, samples)
+        grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
+        points = _placed(cells[:, None, None], grid)
+        return self._code(points.reshape(-1, 2))[1].reshape(points.shape[:3])
+
+    def _gauss(self, cells: Array, codes: IntArray) -> SurfaceRule | None:
+        """Return Gauss points on cells of one code each."""
+        kept = codes != 0
+        t, weights = _unit_rule(max(self.space.degrees) + 1)
+        grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2)
+        points = _placed(cells[kept, None], grid)
+        size = np.prod(cells[kept, 1] - cells[kept, 0], axis=-1)
+        return self._weighted(
+            points.reshape(-1, 2),
+            np.multiply.outer(size, np.multiply.outer(weights, weights).ravel()).ravel(),
+            np.repeat(codes[kept], len(grid)),
+        )
+
+    def _weighted(self, across: Array, weights: Array, codes: IntArray) -> SurfaceRule | None:
+        """Return a rule from weights in the parameters; None where there is no point of a code that is not zero."""
+        if not len(across):
+            return None
+        at = FacePoints.of(self.volume, self.hand, self.axis, self.side, across)
+        return SurfaceRule(at, weights * at.size, codes)
+
+    def _on_lines(self, cells: Array) -> SurfaceRule | None:
+        """Return points on cells at a rim: on lines in that direction in which the code jumps more often."""
+        if not len(cells):
+            return None
+        seen = self._seen(cells, SAMPLES)
+        jumps = [np.count_nonzero(np.diff(seen, axis=1 + along), axis=(1, 2)) for along in (0, 1)]
+        parts = [self._lines_along(cells[chosen], along) for along, chosen in enumerate(_either(jumps))]
+        found = [part for part in parts if part is not None]
+        return _joined(found) if found else None
+
+    def _lines_along(self, cells: Array, along: int) -> SurfaceRule | None:
+        """Return points on lines of one direction through cells."""
+        if not len(cells):
+            return None
+        t, weights = _unit_rule(max(self.space.degrees) + 1)
+        low, size = np.repeat(cells[:, 0], len(t), axis=0), np.repeat(cells[:, 1] - cells[:, 0], len(t), axis=0)
+        fixed, line_weights = np.tile(t, len(cells)), np.tile(weights, len(cells))
+
+        def codes(line: IntArray, s: Array) -> tuple[Array, IntArray]:
+            places = np.empty((len(s), 2))
+            places[:, along], places[:, 1 - along] = s, fixed[line]
+            across = low[line] + places * size[line]
+            return across, self._code(across)[1]
+
+        lines = np.arange(len(low))
+        s = np.linspace(0.0, 1.0, PIECES + 1)
+        seen = codes(np.repeat(lines, len(s)), np.tile(s, len(lines)))[1].reshape(len(lines), -1)
+        line, piece = np.nonzero(np.diff(seen, axis=1))
+        left, right, first = s[piece], s[piece + 1], seen[line, piece]
+        for _ in range(BISECTIONS if len(line) else 0):
+            middle = 0.5 * (left + right)
+            same = codes(line, middle)[1] == first
+            left, right = np.where(same, middle, left), np.where(same, right, middle)
+        ends = np.concatenate([lines, line, lines]), np.concatenate([0.0 * lines, left, 0.0 * lines + 1.0])
+        order = np.lexsort(ends[::-1])
+        of_line, places = ends[0][order], ends[1][order]
+        begins = np.flatnonzero(of_line[:-1] == of_line[1:])
+        start, length, of_line = places[begins], np.diff(places)[begins], of_line[begins]
+        across, found = codes(np.repeat(of_line, len(t)), (start[:, None] + np.multiply.outer(length, t)).ravel())
+        each = np.multiply.outer(length * line_weights[of_line] * np.prod(size[of_line], axis=1), weights).ravel()
+        middles = np.repeat(found.reshape(-1, len(t))[:, len(t) // 2], len(t))  # one code a piece
+        kept = (middles != 0) & (each > 0.0)
+        return self._weighted(across[kept], each[kept], middles[kept])
+
+
+def _placed(cells: Array, places: Array) -> Array:
+    """Return points (.., 2) of cells (.., 2, 2) at places (.., 2) of the unit square."""
+    return np.asarray(cells[..., 0, :] + places * (cells[..., 1, :] - cells[..., 0, :]))
+
+
+def _unit_rule(count: int) -> tuple[Array, Array]:
+    """Return Gauss points and weights on [0, 1]."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (points + 1.0), 0.5 * weights
+
+
+def _quartered(cells: Array) -> Array:
+    """Return the four quarters of every cell."""
+    middle = cells.mean(axis=1)
+    ends = np.stack([cells[:, 0], middle, cells[:, 1]], axis=1)  # (k, 3, 2)
+    parts = [
+        np.stack([np.stack([ends[:, i + di, 0], ends[:, j + dj, 1]], axis=-1) for di, dj in ((0, 0), (1, 1))], axis=1)
+        for i in (0, 1)
+        for j in (0, 1)
+    ]
+    return np.concatenate(parts)
+
+
+def _either(jumps: Sequence[IntArray]) -> tuple[Array, Array]:
+    first = jumps[0] >= jumps[1]
+    return first, ~first
+
+
+def _area_of_codes(*parts: SurfaceRule | None) -> dict[int, float]:
+    """Return the area of every code."""
+    found: dict[int, float] = {}
+    for part in filter(None, parts):
+        values, place = np.unique(part.codes, return_inverse=True)
+        for code, area in zip(values.tolist(), np.bincount(place, part.weights).tolist(), strict=True):
+            found[code] = found.get(code, 0.0) + area
+    return found
+
+
+def _difference(one: dict[int, float], other: dict[int, float]) -> float:
+    return max((abs(one.get(code, 0.0) - other.get(code, 0.0)) for code in one.keys() | other.keys()), default=0.0)
+
+
+def _joined(parts: Sequence[SurfaceRule]) -> SurfaceRule:
+    """Return the points of several rules as one."""
+    at = FacePoints(
+        np.concatenate([part.at.parameters for part in parts]),
+        np.concatenate([part.at.x for part in parts], axis=1),
+        np.concatenate([part.at.area for part in parts], axis=1),
+        np.concatenate([part.at.jacobian for part in parts]),
+    )
+    return SurfaceRule(
+        at, np.concatenate([part.weights for part in parts]), np.concatenate([part.codes for part in parts])
+    )

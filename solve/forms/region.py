@@ -1,0 +1,218 @@
+"""Region: a part of the solid's boundary, named by a condition on position and outward normal."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from parameterize.arrays import Array, IntArray
+from parameterize.spline.volume import FACE_NAMES
+
+from .frame import UnitFrame
+from .jets import Jet
+from .parser import SCALED, VARIABLES, Decider, ExpressionError, Translator, scaled
+
+NORMAL = ("nx", "ny", "nz")
+CALL = re.compile(r"\b(face|box)\s*\(([^()]*)\)")
+GROUP = re.compile(r"""group:("[^"]*"|'[^']*'|[^\s()]+)""")
+ANGLE = 30.0  # degrees between neighbouring triangles beyond which an edge is sharp
+
+Mask = NDArray[np.bool_]
+
+
+class Part(Protocol):
+    """The surface mesh of a part, as regions ask it."""
+
+    def group(self, name: str) -> IntArray:
+        """Return the triangles (k,) of a group of the mesh. Raises ValueError for a name that there is not."""
+
+    def nearest(self, points: Array, normals: Array | None = None) -> IntArray:
+        """Return the triangle (m,) nearest to each point (m, 3); of equally near ones that of the likest normal."""
+
+    def flood(self, triangle: int, angle: float) -> IntArray:
+        """Return the triangles (k,) reached from one across edges that bend by less than an angle in degrees."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of the solid's boundary: where a condition on the position and the outward normal holds.
+
+    Parameters
+    ----------
+    text : str
+        A condition in x, y, z or X, Y, Z (scaled to volume 1 about the middle) and in the outward unit normal nx, ny,
+        nz, such as "nz > 0.99 and abs(x) < 2": comparisons, and, or, not, and the functions of formulas. Also
+        conditions: u0, u1, v0, v1, w0, w1, the images of the cube's faces; box(x0, y0, z0, x1, y1, z1);
+        group:NAME, a group of the input mesh; and face(x, y, z), what is reached from the part's surface nearest to
+        that point up to edges that bend by more than 30 degrees, or by a fourth number in degrees.
+    surface : Part, optional
+        The part's surface mesh (`result.part`), which group:NAME and face(x, y, z) need.
+
+    Raises
+    ------
+    ExpressionError
+        For a text that is refused.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> top = iga_nn.Region("nz > 0.9") - iga_nn.Region("box(0, 0, 0, 1, 1, 2)")
+    >>> print(top)
+    (nz > 0.9) and not (box(0, 0, 0, 1, 1, 2))
+    """
+
+    text: str
+    surface: Part | None = field(default=None, repr=False, compare=False)
+    frame: UnitFrame | None = field(default=None, repr=False, compare=False)
+    _marks: tuple[str, ...] = field(init=False, repr=False, compare=False)
+    _used: frozenset[str] = field(init=False, repr=False, compare=False)
+    _decide: Decider = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.text, str):
+            raise ExpressionError(f"a region must be text, such as 'z < 1', got {type(self.text).__name__}")
+        marks: list[str] = list(FACE_NAMES)
+
+        def mark(kind: str, argument: str) -> str:
+            marks.append(f"{kind} {argument}")
+            return f" _mark{len(marks) - 1} "
+
+        text = GROUP.sub(lambda found: mark("group", found[1].strip("'\"")), self.text)
+        text = CALL.sub(lambda found: mark(found[1], found[2]), text)
+        names = [f"_mark{i}" if i >= len(FACE_NAMES) else name for i, name in enumerate(marks)]
+        try:
+            translator = Translator(text, (*VARIABLES, *NORMAL), names)
+            decide = translator.condition()
+            for entry in marks[len(FACE_NAMES) :]:
+                _check_mark(entry)
+        except ExpressionError as error:
+            raise ExpressionError(f"region {self.text!r:.80}: {_readable(str(error), marks)}") from None
+        for name, value in (("_marks", tuple(marks)), ("_used", frozenset(translator.used)), ("_decide", decide)):
+            object.__setattr__(self, name, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the text, which is parsed again."""
+        return Region, (self.text, self.surface, self.frame)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __or__(self, other: Region) -> Region:
+        return self._with(f"({self}) or ({other})", other)
+
+    def __and__(self, other: Region) -> Region:
+        return self._with(f"({self}) and ({other})", other)
+
+    def __sub__(self, other: Region) -> Region:
+        return self._with(f"({self}) and not ({other})", other)
+
+    def __invert__(self) -> Region:
+        return self._with(f"not ({self})", self)
+
+    def _with(self, text: str, other: Region) -> Region:
+        return Region(text, self.surface or other.surface, self.frame or other.frame)
+
+    @property
+    def is_scaled(self) -> bool:
+        """Whether X, Y or Z occurs in the condition."""
+        return not self._used.isdisjoint(SCALED)
+
+    @cached_property
+    def faces(self) -> tuple[str, ...]:
+        """The names of the cube's faces that make up the region; none where anything else stands in its text."""
+        words = re.split(r"\s+or\s+", self.text.strip())
+        return tuple(words) if all(word in FACE_NAMES for word in words) else ()
+
+    def placed(self, frame: UnitFrame | None = None, surface: Part | None = None) -> Region:
+        """Return the same region with X, Y, Z measured in a frame, and on a surface where it has none."""
+        return replace(self, frame=frame or self.frame, surface=self.surface or surface)
+
+    @property
+    def needs_surface(self) -> bool:
+        """Whether a group or a face of the part occurs in the condition."""
+        return any(entry.startswith(("group ", "face ")) for entry in self._marks)
+
+    def holds(self, x: Array, normal: Array, face: str = "") -> Mask:
+        """Return at which of the points (3, ...) with outward unit normals (3, ...) the condition holds, (...).
+
+        face: the cube's face on whose image they lie, if any.
+        Raises ExpressionError where X, Y, Z mean nothing, ValueError where the surface lacks what is asked for.
+        """
+        x, normal = np.asarray(x), np.asarray(normal)
+        jets = [Jet(row, (), ()) for row in x]
+        if self.is_scaled and self.frame is None:
+            raise ExpressionError(f"region {self.text!r:.80}: X, Y, Z mean nothing without a volume")
+        of_frame = scaled(self.frame, jets) if self.frame is not None else jets
+        values = [*jets, *of_frame, *(Jet(row, (), ()) for row in normal)]
+        shape = x.shape[1:]
+        values += [np.full(shape, name == face) for name in FACE_NAMES]
+        values += [self._marked(*entry.split(" ", 1), x, normal) for entry in self._marks[len(FACE_NAMES) :]]
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(np.asarray(self._decide(values), dtype=bool), shape)
+
+    def _marked(self, kind: str, argument: str, x: Array, normal: Array) -> Mask:
+        """Return at which points a box, a group or a face of the part lies."""
+        if kind == "box":
+            low, high = np.sort(np.reshape(_numbers(argument), (2, 3)), axis=0)
+            sides = (slice(None), *[None] * (x.ndim - 1))
+            inside: Mask = np.all((x >= low[sides]) & (x <= high[sides]), axis=0)
+            return inside
+        if self.surface is None:
+            raise ValueError(
+                f"region {self.text!r:.80}: {kind} needs the part's surface: Region({self.text!r:.40}, result.part)"
+            )
+        members = self._members(kind, argument)
+        found = self.surface.nearest(x.reshape(3, -1).T, normal.reshape(3, -1).T)
+        return np.isin(found, members).reshape(x.shape[1:])
+
+    def _members(self, kind: str, argument: str) -> IntArray:
+        """Return the triangles (k,) of a group or a face of the part."""
+        assert self.surface is not None
+        if kind == "group":
+            return self.surface.group(argument)
+        numbers = _numbers(argument)
+        start = int(self.surface.nearest(np.reshape(numbers[:3], (1, 3)))[0])
+        return self.surface.flood(start, numbers[3] if len(numbers) == 4 else ANGLE)
+
+
+def regions_of(given: Region | str | Sequence[Region | str]) -> list[Region]:
+    """Return a region, a text, or several of these as regions. Raises ExpressionError for what is none."""
+    if isinstance(given, Region):
+        return [given]
+    if isinstance(given, str) or not isinstance(given, Sequence):
+        return [Region(given)]  # type: ignore[arg-type]
+    return [region for entry in given for region in regions_of(entry)]
+
+
+def _numbers(argument: str) -> list[float]:
+    return [float(ast.literal_eval(part.strip())) for part in argument.split(",")]
+
+
+def _check_mark(entry: str) -> None:
+    """Raise ExpressionError for a box or a face without its numbers."""
+    kind, argument = entry.split(" ", 1)
+    if kind == "group":
+        return
+    counts = {"box": ((6,), "box(x0, y0, z0, x1, y1, z1)"), "face": ((3, 4), "face(x, y, z)")}[kind]
+    try:
+        good = len(numbers := _numbers(argument)) in counts[0] and np.all(np.isfinite(numbers))
+    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+        good = False
+    if not good:
+        raise ExpressionError(f"{kind}({argument:.40}): write {counts[1]}, with numbers")
+
+
+def _readable(message: str, marks: Sequence[str]) -> str:
+    """Return a message with what the user wrote in place of the marks."""
+    for i in range(len(marks) - 1, len(FACE_NAMES) - 1, -1):
+        kind, argument = marks[i].split(" ", 1)
+        shown = f"group:{argument}" if kind == "group" else f"{kind}({argument})"
+        message = message.replace(f", _mark{i}", "").replace(f"_mark{i}", shown)
+    return message

@@ -1,0 +1,146 @@
+"""Reactions: what supports do to the body, from the residual of the equations, so that they balance what acts on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from parameterize.arrays import Array, in_brackets
+from parameterize.spline.volume import FACE_NAMES
+
+from .discretization.weak import WeakFace
+from .field import Points
+from .forms.condition import WITH_FACTOR
+
+if TYPE_CHECKING:
+    from .system import System
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What acts on the body, and what its supports answer; of elasticity forces, of a scalar law what flows in.
+
+    Attributes
+    ----------
+    load : tuple of float
+        The integral of the source and of all that is given as flux, (c,).
+    reactions : dict of str to tuple of float
+        By support, a region's condition or a face of the cube: the integral (c,) of what it does to the body.
+    areas : dict of str to float
+        By condition, the area of its region.
+    imbalance : float or None
+        The largest component of the sum of load and reactions, over the sum of their sizes: what the linear solver left.
+        None for a law with a reaction, which takes its part inside.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> bar = iga_nn.Elasticity(fix="u0", load={"u1": (1, 0, 0)})
+    >>> found = iga_nn.solve(benchmark_volume(2), bar).report.balance
+    >>> list(found.reactions), found.imbalance < 1e-8
+    (["fix 'u0'"], True)
+    """
+
+    load: tuple[float, ...]
+    reactions: Mapping[str, tuple[float, ...]]
+    areas: Mapping[str, float]
+    imbalance: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entries of a level in report.json."""
+        found: dict[str, Any] = {"load": list(self.load)}
+        found["reactions"] = {role: list(force) for role, force in self.reactions.items()}
+        found["areas"] = dict(self.areas)
+        return found | ({} if self.imbalance is None else {"imbalance": self.imbalance})
+
+    def __str__(self) -> str:
+        answers = [f"{role} answers {_shown(force)}" for role, force in self.reactions.items()]
+        rest = "" if self.imbalance is None else f" (balanced to {self.imbalance:.0e})"
+        return ", ".join([f"load {_shown(self.load)}", *answers]) + rest
+
+
+def _shown(force: Sequence[float]) -> str:
+    return in_brackets(force) if len(force) == 3 else ", ".join(f"{part:.6g}" for part in force)
+
+
+def balance(system: System, coefficients: Array, loads: Array) -> Balance:
+    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w).
+
+    loads: those of the source and of all conditions, shaped alike, before what values fix is taken from them.
+    """
+    space, faces = system.space, [face for face in system.matrix.faces.values() if isinstance(face, WeakFace)]
+    residual = system.matrix.apply(coefficients) - loads
+    space.add(residual)
+    reactions = _of_faces(system, residual)
+    weak, outside = _of_regions(system, faces, coefficients)
+    lifted = sum(((face.weights * face.gamma * face.values).sum(axis=1) for face in faces), np.zeros(len(loads)))
+    own = loads.sum(axis=(1, 2, 3)) - lifted - outside
+    load = space.total(own)
+    reactions |= {role: space.total(force) for role, force in weak.items()}
+    forces = [load, *reactions.values()]
+    size = float(np.abs(forces).sum())
+    imbalance = None
+    if reactions and not system.problem.form.has_reaction:
+        imbalance = float(np.abs(np.sum(forces, axis=0)).max()) / size if size > 0.0 else 0.0
+    areas = {
+        condition.role: float(space.total(sum(face.weights[face.holds(i)].sum() for face in faces)))
+        for i, condition in enumerate(system.problem.conditions)
+        if not condition.is_strong
+    }
+    as_tuples = {role: tuple(np.atleast_1d(force).tolist()) for role, force in reactions.items()}
+    return Balance(tuple(load.tolist()), as_tuples, areas, imbalance)
+
+
+def _of_faces(system: System, residual: Array) -> dict[str, Array]:
+    """Return what holds the coefficients that the trial space fixes, by face or by the condition that names it."""
+    space, fixed = system.space, np.zeros(residual.shape[1:], dtype=bool)
+    own = slice(0, space.owned[space.comm.rank].stop - space.owned[space.comm.rank].start)
+    found: dict[str, Array] = {}
+    for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
+        here = np.zeros_like(fixed)
+        if axis > 0 or _has_end(system, name):
+            here[tuple((-1 if name[1] == "1" else 0) if a == axis else slice(None) for a in range(3))] = True
+        here &= ~fixed
+        fixed |= here
+        force = space.total((residual * here)[:, own].sum(axis=(1, 2, 3)))
+        role = next((c.role for c in system.problem.conditions if c.is_strong and name in c.region.faces), name)
+        found[role] = found.get(role, 0.0) + force
+    return found
+
+
+def _has_end(system: System, name: str) -> bool:
+    """Return whether the first or the last row of u is among those of this process."""
+    rows = system.space.rows
+    return rows.stop == system.space.whole.shape[0] if name == "u1" else rows.start == 0
+
+
+def _of_regions(system: System, faces: list[WeakFace], coefficients: Array) -> tuple[dict[str, Array], Array]:
+    """Return what supports on regions do, and what an exchange would do to a body of u = 0."""
+    problem = system.problem
+    found = {
+        c.role: np.zeros(len(coefficients))
+        for c in problem.conditions
+        if (c.is_essential and not c.is_strong) or c.kind in WITH_FACTOR
+    }
+    outside = np.zeros(len(coefficients))
+    for face in faces:
+        taken = np.zeros(len(face.weights), dtype=bool)
+        for i, condition in enumerate(problem.conditions):
+            here = face.holds(i)
+            if condition.is_essential and condition.role in found:
+                found[condition.role] += face.force(coefficients, here & ~taken)
+                taken |= here
+            elif condition.kind in WITH_FACTOR:
+                chosen = np.flatnonzero(here)
+                x = Points.at(np.ascontiguousarray(face.x[:, chosen]), face.x.places[chosen])  # type: ignore[index]
+                free = np.eye(len(coefficients))[:, :, None] - face.projector[:, :, chosen]
+                given = problem.flux_on(condition, x, face.normal[:, chosen])
+                pull = problem.factor_on(condition, x) * face.traces(coefficients)[0][:, chosen]
+                weights = face.weights[chosen]
+                found[condition.role] += (weights * np.einsum("cdm,dm->cm", free, given - pull)).sum(axis=1)
+                outside += (weights * np.einsum("cdm,dm->cm", free, given)).sum(axis=1)
+    return found, outside
