@@ -25,6 +25,7 @@ async function post(address, body) {
 async function start(number) {
   const form = document.querySelector("form");
   const wrong = await post(`start/${number}`, new URLSearchParams(form ? new FormData(form) : ""));
+  if (!wrong) sessionStorage.removeItem(kept(`form ${number}`));  // the job has it now
   if (!form) return;
   form.querySelector("[role=alert]").textContent = wrong;
   if (wrong) form.closest("details").open = true;
