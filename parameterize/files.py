@@ -59,8 +59,8 @@ def unfinished(target: Path) -> list[Path]:
     return list(target.parent.glob(f".{escape(target.stem)}.*.part{escape(target.suffix)}"))
 
 
-def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Read the named arrays of an .npz, and no others.
+def load_arrays(path: str | Path, names: tuple[str, ...], extra: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
+    """Read the named arrays of an .npz, those of `extra` where it has them, and no others.
 
     Raises FileNotFoundError, or ValueError for anything that is not such a file: not an archive, a missing array,
     pickled content, a header that does not match the data behind it, or more than 512 MiB once unpacked.
@@ -73,9 +73,10 @@ def load_arrays(path: str | Path, names: tuple[str, ...]) -> dict[str, NDArray[A
             warnings.simplefilter("ignore")  # numpy warns of headers by Python 2, also where they are only damaged
             held = {entry.filename.removesuffix(".npy"): entry for entry in archive.infolist()}
             missing = [name for name in names if name not in held]
-            unpacked = sum(held[name].file_size for name in names if name in held)
+            wanted = [name for name in (*names, *extra) if name in held]
+            unpacked = sum(held[name].file_size for name in wanted)
             refused = missing or unpacked > MAX_UNPACKED_BYTES
-            arrays = {} if refused else {name: _read_array(archive, held[name]) for name in names}
+            arrays = {} if refused else {name: _read_array(archive, held[name]) for name in wanted}
     except Exception as error:  # of a damaged archive: zipfile, its decompressors and numpy raise a dozen kinds
         raise ValueError(f"{source}: not a readable .npz archive ({str(error) or type(error).__name__})") from None
     if missing:

@@ -27,7 +27,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -329,18 +329,25 @@ def any_plies():
     yield Ply(vertices(), ("tristrips", ["list int int vertex_index"], strips), faces(TRIANGLES[10:]))
 
 
+PHYSICAL = '$PhysicalNames\n1\n2 5 "lid"\n$EndPhysicalNames\n'
+PHYSICAL += "$Entities\n0 0 1 0\n1 0 0 0 1 1 1 1 5 0\n$EndEntities\n"
+
+
 def any_mshs():
     """Parametric nodes, version 4.0, either byte order."""
-    yield from (msh2(), msh41(parametric=1), msh41(parametric=1, version="4"))
+    yield from (msh2(more=PHYSICAL), msh41(parametric=1), msh41(parametric=1, version="4"))
+    yield msh41().replace("$Nodes", f"{PHYSICAL}$Nodes", 1)
     yield from (write(order, 1) for write in (msh2_binary, msh41_binary) for order in "<>")
 
 
 def vtk_files():
     """Cells of several kinds in every encoding that VTK writes."""
     cells = [(12, [0, 1, 3, 2, 4, 5, 7, 6]), *((9, quad) for quad in QUADS), (6, [0, 1, 2, 3]), (3, [0, 1])]
+    mesh = grid(cells)
+    mesh.cell_data["part"] = np.arange(len(cells)) // 3
     for mode, packing in (("ascii", None), ("binary", "LZMA"), ("appended", "ZLib"), ("appended", "LZ4")):
         for order, header in (("little", 32), ("big", 64)):
-            yield written(partial(save, grid(cells), mode=mode, compressor=packing, order=order, header=header), ".vtu")
+            yield written(partial(save, mesh, mode=mode, compressor=packing, order=order, header=header), ".vtu")
 
 
 def npz_reader(name, read, *things):
@@ -397,13 +404,16 @@ FORMULAS = ("exp(x+z)*sin(y)", "1e-3*(x**2-y)/(2+z)-3.5", "-tanh(x*y)**(1/3)+abs
 def readers() -> tuple[Reader, ...]:
     """Every reader with its good files."""
     round_ball, textured = ball(subdivisions=1), obj(faces=MIXED).replace("f 1 3", "vt 0 0\nf 1/1 3//1", 1)
+    grouped = obj().replace("f ", "g lid end\nusemtl a\nf ")
+    two_solids = text_stl().replace("endfacet\n", "endfacet\nendsolid\nsolid lid\n", 1)
     volumes = [bent(3, 2), bent(4, 3), benchmark_volume(2, 1, amplitude=0.4)]
     fields = [field_on(v, net) for v in volumes[:2] for net in (v.control_points[..., 0], v.control_points)]
-    box = BoundaryMap(cube().vertices, cube().vertices, cube().faces)
+    plain = BoundaryMap(cube().vertices, cube().vertices, cube().faces)
+    box = replace(plain, part_faces=plain.faces, groups={"lid": np.array([0, 5]), "end": np.array([5])})
     numbers, points = list(range(8)), np.indices((2, 2, 2)).reshape(3, 8).T.tolist()
     return (
-        surface_reader("obj", ".obj", obj(), textured, obj(*round_ball)),
-        surface_reader("stl, text", ".stl", text_stl(), text_stl(*TETRAHEDRON)),
+        surface_reader("obj", ".obj", obj(), textured, obj(*round_ball), grouped),
+        surface_reader("stl, text", ".stl", text_stl(), text_stl(*TETRAHEDRON), two_solids),
         surface_reader("stl, binary", ".stl", binary_stl(*TETRAHEDRON), binary_stl(header=b"solid"), binary_stl()),
         surface_reader("ply, text", ".ply", ply(), ply(faces=MIXED), flagged_ply()),
         surface_reader("ply, binary", ".ply", ply(binary=True), ply(faces=MIXED, binary=True)),

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 from shapes import rounded_cube, turned
 
 from parameterize.config import GrowthConfig, NetworkConfig, preset
@@ -31,4 +32,5 @@ def tiny_config():
 
 def small_surface(stretch=2.0):
     points, faces = rounded_cube(200, power=5.0)
-    return surface_from_arrays(stretch * turned(points) + [10.0, 0.0, -3.0], faces, "pillow")
+    top = np.flatnonzero(points[faces].mean(axis=1)[:, 2] > 0.9 * points[:, 2].max())
+    return surface_from_arrays(stretch * turned(points) + [10.0, 0.0, -3.0], faces, "pillow", groups={"top": top})

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapes import CORNERS
 
-from parameterize.cube.boundary_map import BoundaryMap
+from parameterize.cube.boundary_map import BoundaryMap, read_part
 from parameterize.spline.volume import FACE_NAMES
 
 
@@ -74,6 +74,8 @@ def test_triangle_across_an_edge_has_no_face():
         ({"faces": np.array([[0, 1, 8]])}, "0 to 7, got 0 to 8"),
         ({"faces": np.array([[0, -1, 2]])}, "0 to 7, got -1 to 2"),
         ({"faces": np.array([[0.0, 1.0, 2.0]])}, "whole numbers"),
+        ({"part_faces": np.array([[0, 1, 8]])}, "part_faces must number vertices 0 to 7, got 0 to 8"),
+        ({"groups": {"lid": np.array([12])}}, "group 'lid' must hold face numbers from 0 to 11"),
     ],
 )
 def test_parts_that_do_not_fit(change, message):
@@ -90,6 +92,33 @@ def test_save_and_load(tmp_path):
     for name in ("vertices", "parameters", "faces"):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(mapping, name))
     assert loaded.faces.dtype == np.int64
+
+
+def test_the_surface_before_the_cuts_and_its_groups_are_saved(tmp_path):
+    """The first face is cut by a vertex in the middle of its edge 0-3."""
+    mapping, path = cube_map(), tmp_path / "boundary.npz"
+    cut = np.concatenate([[[0, 1, 8], [8, 1, 3], [0, 8, 2], [8, 3, 2]], mapping.faces[2:]])
+    vertices, parameters = (np.vstack([rows, (rows[0] + rows[3]) / 2]) for rows in (mapping.vertices, CORNERS))
+    groups = {"inlet": np.array([0, 1]), "hot wall": np.array([1, 5])}
+    BoundaryMap(vertices, parameters, cut, mapping.faces, groups).save(path)
+    part = read_part(path)
+    np.testing.assert_array_equal(part.vertices, mapping.vertices)
+    np.testing.assert_array_equal(part.faces, mapping.faces)
+    assert {name: numbers.tolist() for name, numbers in part.groups.items()} == {"inlet": [0, 1], "hot wall": [1, 5]}
+    np.testing.assert_array_equal(BoundaryMap.load(path).faces, cut)
+    with np.load(path, allow_pickle=False) as archive:
+        arrays = dict(archive)
+    np.savez(path, **{**arrays, "group_sizes": np.array([1, 3]), "group_faces": np.array([0, 1, 1, 99])})
+    with pytest.raises(ValueError, match=r"boundary\.npz: group 'hot wall' must hold face numbers from 0 to 11"):
+        read_part(path)
+
+
+def test_a_file_of_an_earlier_version_gives_the_surface_as_it_was_cut(tmp_path):
+    mapping, path = cube_map(), tmp_path / "boundary.npz"
+    np.savez(path, vertices=mapping.vertices, parameters=mapping.parameters, faces=mapping.faces)
+    part = read_part(path)
+    assert part.groups == {} and part.flood(0).tolist() == [0, 1]
+    np.testing.assert_array_equal(part.faces, mapping.faces)
 
 
 def test_load_names_the_file_and_the_fault(tmp_path):

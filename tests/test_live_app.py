@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import http.client
+import json
 import os
 import re
 import socket
@@ -167,10 +168,12 @@ async def refused(tab, folder, capsys):
 
 
 async def dropped_and_started(tab, folder):
+    """What is solved is stated before the run."""
     content = write_ball(folder / "ball.obj").read_text()
     await tab.value(DROP % content)
     await tab.sees("200 vertices, 396 faces", PATIENCE)
     assert "Accepted" in await tab.text()
+    await tab.value(TYPED % ("reaction", "0"))
     await tab.click("Start")
 
 
@@ -207,7 +210,8 @@ async def trained(tab, folder):
 async def finished(tab, folder):
     await tab.until(f"{REPORT}?.includes('iga-nn run poisson')", PATIENCE)  # near its end
     text = await tab.value(REPORT)
-    assert "my ball.obj: Poisson's equation" in text and "iga-nn run poisson 'my ball.obj'" in text
+    assert "my ball.obj: Poisson's equation" in text
+    assert re.search("iga-nn run poisson 'my ball.obj'.* --reaction 0", text)
     (folder / "volume.npz").write_bytes(base64.b64decode(await tab.value(FETCHED)))
     assert load_volume(folder / "volume.npz").shape == (6, 6, 6)
     await shows_faces(tab, folder / "done.png")
@@ -222,7 +226,7 @@ async def another_problem(tab):
     await tab.value(TYPED % ("kappa", "1+X*X"))
     await tab.click("Solve")
     await tab.until(f"{REPORT}?.includes('iga-nn solve poisson')", PATIENCE)
-    assert f"--kappa '1+X*X' --neumann {chosen}\n" in await tab.value(REPORT)
+    assert f"--kappa '1+X*X' --reaction 0 --neumann {chosen}\n" in await tab.value(REPORT)
 
 
 async def kept(tab):
@@ -235,7 +239,7 @@ async def kept(tab):
     await tab.value(RELOADED)
     await tab.until("window.reloaded === undefined && document.querySelector('form [name=source]')?.value === 'x*'")
     heading, values, chosen = await tab.value(SHOWN)
-    assert heading == "3 · my ball.obj" and values == ["1+X*X", "", "", "x*", ""] and len(chosen) == 1
+    assert heading == "3 · my ball.obj" and values == ["1+X*X", "0", "", "x*", ""] and len(chosen) == 1
     await tab.call("Emulation.setDeviceMetricsOverride", width=400, height=900, deviceScaleFactor=1, mobile=False)
     assert await tab.value("document.documentElement.scrollWidth") <= 400
 
@@ -289,6 +293,102 @@ async def read_on(chromium, folder):
         assert await tab.value("document.querySelector('h2').marked") == "the same"
         text = await tab.text()
         assert "1,538 vertices, 3,072 faces" in text and "Start\n" not in text and "Drop a surface" not in text
+
+
+REGIONS = """window.trame.state.set("lists", [
+  {name: "value", title: "Values", empty: "REGION=FORMULA"}, {name: "fix", title: "Fixed", empty: "REGION"}])"""
+PICKED = "document.querySelector('.picked')?.innerText"
+BOX = [1.0, 2.0, 3.0]
+
+
+def test_a_click_on_the_part_names_its_face(chromium, page, tmp_path):
+    asyncio.run(pick(chromium, page, tmp_path))
+
+
+async def pick(chromium, port, folder):
+    """At a screen's and at a phone's width; the lists stand for those of a problem that takes regions."""
+    (folder / "box.obj").write_text(obj(CUBE * BOX, TRIANGLES))
+    async with running(chromium, folder) as browser:
+        tab = await browser.open(f"http://127.0.0.1:{port}/")
+        await tab.until("document.querySelector('#file') !== null", PATIENCE)
+        await tab.choose("#file", folder / "box.obj")
+        await tab.sees("8 vertices, 12 faces", PATIENCE)
+        await tab.until("document.querySelector('.drawing canvas') !== null", PATIENCE)
+        await tab.value(REGIONS)
+        await tab.until("document.querySelectorAll('form textarea').length === 2")
+        first = await clicked_face(tab, folder, 1280, (0.06, 0.06))
+        assert await tab.value("[...document.querySelectorAll('form textarea')].map((one) => one.value)") == [
+            f"{first}=", ""
+        ]  # fmt: skip
+        await tab.value("document.querySelector('form [name=fix]').focus()")
+        second = await clicked_face(tab, folder, 400, (-0.18, 0.04))
+        assert second != first and await tab.value("document.documentElement.scrollWidth") <= 400
+        assert await tab.value("document.querySelector('form [name=fix]').value") == second
+        await drag(tab)
+        assert (await tab.value(PICKED)).startswith(second)
+        assert tab.complaints == []
+        await tab.value(TYPED % ("kappa", "x*"))
+        await tab.click("Start")
+        await tab.until("document.querySelector('form [role=alert]').innerText.includes('kappa')")
+        assert "Start\n" in await tab.text()  # it has not begun
+
+
+async def clicked_face(tab, folder, width, place):
+    """The region that a click gives, at a place counted from the picture's middle in its heights; it is checked."""
+    await tab.picture(folder / "before.png", width=width)
+    before = await tab.value(PICKED)
+    await tab.value("document.querySelector('.drawing').scrollIntoView({block: 'center'})")
+    x, y = await on_drawing(tab, place)
+    for kind in ("mousePressed", "mouseReleased"):
+        await tab.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+    said = await tab.until(f"{PICKED} !== {json.dumps(before)} && {PICKED}")
+    region, facts = said.split("\n")
+    point = np.array([float(number) for number in region[5:-1].split(",")])
+    (axis,) = np.flatnonzero((point == 0.0) | (point == BOX))
+    assert facts == f"area {np.prod(np.delete(BOX, axis)):g}, 2 triangles"
+    await asyncio.sleep(1.0)  # the colours come from the server
+    image = await tab.picture(folder / f"picked {width}.png", width=width)
+    x, y = await on_drawing(tab, place)
+    red, green, blue = image[round(y), round(x)]
+    assert red > 1.3 * green > 1.3 * blue, "the face is not coloured where it was clicked"
+    return region
+
+
+async def on_drawing(tab, place):
+    """A place in the window, counted from the picture's middle in its heights."""
+    x, y, width, height = await tab.value(
+        "(({x, y, width, height}) => [x, y, width, height])(document.querySelector('.drawing').getBoundingClientRect())"
+    )
+    return x + 0.5 * width + place[0] * height, y + (0.5 + place[1]) * height
+
+
+async def drag(tab):
+    """Turning the part picks nothing."""
+    start, end = await on_drawing(tab, (0.06, 0.06)), await on_drawing(tab, (0.16, 0.06))
+    for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+        await tab.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+    await asyncio.sleep(1.0)
+
+
+SIGHT = [[0.5, 0.5, 9.0], [0.5, 0.5, 8.0]]
+
+
+def test_a_face_is_named_only_for_a_line_of_sight_of_a_part(page):
+    number = ask(page, "POST", "/sample/cube")[1]
+    for _ in range(200):
+        status, said = ask(page, "POST", f"/face/{number}", json.dumps(SIGHT))
+        if status == 200:
+            break
+        time.sleep(0.1)
+    assert set(json.loads(said)) == {"region", "triangles", "area"}
+    assert ask(page, "POST", f"/face/{number}", json.dumps([SIGHT[1], SIGHT[0]])) == (200, "null")
+    for body in ("", "[", "null", "[[1, 2, 3]]", "[[1, 2, 3], [4, 5, 1e999]]", '[[1, 2, 3], [4, 5, "x"]]', "[" * 9999):
+        assert ask(page, "POST", f"/face/{number}", body) == (
+            400,
+            "a line of sight is two points of three numbers each",
+        )
+    assert ask(page, "POST", "/face/999", json.dumps(SIGHT))[0] == 404
+    assert ask(page, "POST", f"/face/{number}", json.dumps(SIGHT), Origin="http://example.org")[0] == 403
 
 
 def test_other_sites_and_other_computers_are_not_answered(page):

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import pytest
 
 from iga_nn.errors import InputError
@@ -44,9 +46,33 @@ def test_data_that_cannot_be_solved_with_are_refused_by_name(form, says):
 
 
 def test_the_form_lists_the_options_of_a_problem_and_the_faces():
-    known = described()
+    known = described(KEPT)
     assert {field["name"] for field in known["fields"]} <= set(PoissonOptions.__dataclass_fields__)
     assert [face["name"] for face in known["faces"]] == ["u0", "u1", "v0", "v1", "w0", "w1"]
+
+
+@dataclass(frozen=True)
+class WithRegions(PoissonOptions):
+    """A problem that takes data on regions."""
+
+    value: tuple[str, ...] = ()
+    flux: tuple[str, ...] = ()
+
+
+def test_lists_of_regions_are_asked_for_where_the_problem_has_them():
+    assert [field["name"] for field in described(WithRegions())["lists"]][:2] == ["value", "flux"]
+    problem = WithRegions(exact="x", value=("face(0,0,1)=x", "nx > 0.9=0"), refine=(0,))
+    assert filled(problem) == {"exact": "x", "value": "face(0,0,1)=x\nnx > 0.9=0"}
+    form = {"exact": "x", "value": " face(0,0,1)=x \r\n\n nx > 0.9=0\n", "flux": " \n"}
+    assert stated(form, WithRegions(refine=(0,))) == problem
+    assert in_words(problem) == "u = x, value on face(0,0,1)=x, nx > 0.9=0"
+
+
+def test_a_form_without_faces_leaves_the_data_of_the_faces():
+    kept = PoissonOptions(source="1", neumann=("u1=0",), robin=("w0=3:0",))
+    assert stated({"source": "2"}, kept, has_faces=False) == PoissonOptions(
+        source="2", neumann=("u1=0",), robin=("w0=3:0",)
+    )
 
 
 def test_a_form_is_filled_with_what_it_has_stated():

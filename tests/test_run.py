@@ -47,6 +47,8 @@ def test_end_to_end(surface, undisturbed):
     assert result.volume.shape == (6, 6, 6) and result.volume.degrees == (3, 3, 3)
     assert certify(result.volume).verdict == result.certificate.verdict
     assert np.array_equal(result.boundary.vertices[:n], surface.vertices)
+    assert np.array_equal(result.boundary.part.faces, surface.faces)
+    assert result.boundary.part.group("top").tolist() == surface.groups["top"].tolist()
     gaps = np.linalg.norm(result.volume(result.boundary.parameters[:n]) - surface.vertices, axis=1)
     assert np.sqrt((gaps**2).mean()) < 0.1  # of a body two units wide
     assert result.certificate.mean_det == pytest.approx(surface.volume, rel=0.1)

@@ -59,6 +59,13 @@ def volume_in_words(facts: reports.Report) -> str:
     return "\n".join([*(f"{name:16s} {text}" for name, text in proved.items()), facts_in_words(others)])
 
 
+def surface_in_words(facts: dict[str, Any]) -> str:
+    """Return the facts that `check` found out about a surface, and a line for each group of its faces."""
+    others = {key: value for key, value in facts.items() if key != "groups"}
+    groups = [f"{'group:':16s} {g['name']}, {g['faces']} faces, area {g['area']:.6g}" for g in facts["groups"]]
+    return "\n".join([facts_in_words(others), *groups])
+
+
 def facts_in_words(facts: dict[str, Any]) -> str:
     """Return the facts that `check` found out, one a line."""
     return "\n".join(f"{key + ':':16s} {_text(value)}" for key, value in facts.items())

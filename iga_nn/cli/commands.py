@@ -274,7 +274,7 @@ def check(path: str, /, *, surface: SurfaceOptions = SURFACE, strict: bool = Fal
         if strict:
             given.refuse_crossings()
         facts = given.summary()
-        _print(reports.as_json(facts) if as_json else "accepted\n" + answer.facts_in_words(facts))
+        _print(reports.as_json(facts) if as_json else "accepted\n" + answer.surface_in_words(facts))
         return DONE
     if surface != SURFACE or strict:
         raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")

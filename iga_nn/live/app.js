@@ -1,4 +1,6 @@
 "use strict";
+const CLICK = 4;  // pixels that the pointer may move while a face is clicked
+
 // Files come in by dropping them anywhere on the page, or by choosing one; the server's answer is the job's number.
 // What this tab keeps for itself, the job it shows and what was typed, is in its session storage: it outlives a reload.
 
@@ -17,6 +19,43 @@ async function post(address, body) {
   } catch {
     return "The page's program does not answer.";
   }
+}
+
+// Starts a job with the problem that its form states, where it has one.
+async function start(number) {
+  const form = document.querySelector("form");
+  const wrong = await post(`start/${number}`, new URLSearchParams(form ? new FormData(form) : ""));
+  if (!wrong) sessionStorage.removeItem(kept(`form ${number}`));  // the job has it now
+  if (!form) return;
+  form.querySelector("[role=alert]").textContent = wrong;
+  if (wrong) form.closest("details").open = true;
+}
+
+// Where the pointer went down: a face is clicked where it has hardly moved since.
+let down = [0, 0], moved = 0;
+document.addEventListener("pointerdown", (event) => { [down, moved] = [[event.clientX, event.clientY], 0]; }, true);
+document.addEventListener("pointermove", (event) => {
+  moved = Math.max(moved, Math.hypot(event.clientX - down[0], event.clientY - down[1]));
+}, true);
+
+// A face of the part that is clicked is named by the server; its region goes into the list that was chosen last.
+let aimed = null;
+function aim(list) {
+  aimed = list;
+}
+
+async function pick(number, hit) {
+  if (!hit?.ray || moved > CLICK) return;
+  const sight = {method: "POST", body: JSON.stringify(hit.ray)};
+  const found = await fetch(`face/${number}`, sight).then((answer) => answer.ok ? answer.json() : null, () => null);
+  if (!found) return;
+  window.trame.state.set("picked", {...found, job: number});
+  const list = aimed?.isConnected ? aimed : document.querySelector("form [data-regions]");
+  if (!list) return;
+  const before = list.value.trimEnd();
+  list.value = `${before}${before && "\n"}${found.region}${list.placeholder.includes("=") ? "=" : ""}`;
+  list.dispatchEvent(new Event("input", {bubbles: true}));
+  list.closest("details").open = true;
 }
 
 // Sends the form of a problem; what the server says against it is shown in the form.

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event, Lock
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.progress import Progress
 from parameterize.surface.surface import MeshError, Surface
 
@@ -35,10 +35,11 @@ STARTS, DELETED = ("ready", "stopped", "failed"), ("refused", "ready", "done", "
 class Job:
     """Hold the file of a surface, or of a volume to solve on, in a folder of its own, and its state.
 
-    problem: what is solved on a volume; None for a surface, whose problem is that of the page's options. parent: number
-    of the job that made the volume. text: why it was refused or failed. mapped: where the training maps the surface's
-    vertices, (n, 3) in the cube. losses: those of the training that were reported. log: the lines of the run. begun:
-    when the run began, in seconds of the system's clock.
+    problem: what is solved on a volume; None for a surface. wanted: what is solved on the volume of a surface; None for
+    the problem of the page's options. picked: triangles of the face that was clicked, (k,). parent: number of the job
+    that made the volume. text: why it was refused or failed. mapped: where the training maps the surface's vertices,
+    (n, 3) in the cube. losses: those of the training that were reported. log: the lines of the run. begun: when the run
+    began, in seconds of the system's clock.
     """
 
     number: int
@@ -46,9 +47,11 @@ class Job:
     folder: Path
     state: str = "checking"
     problem: PoissonOptions | None = None
+    wanted: PoissonOptions | None = None
     parent: int = 0
     text: str = ""
     surface: Surface | None = None
+    picked: IntArray | None = None
     progress: Progress | None = None
     mapped: Array | None = None
     losses: list[float] = field(default_factory=list)

@@ -6,6 +6,7 @@ needs no graphics library for them.
 """
 
 import asyncio
+import json
 import logging
 import re
 import secrets
@@ -17,12 +18,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from aiohttp import ClientError, http_exceptions, web
 from trame.app import get_server
 from trame.ui.html import DivLayout
 from trame.widgets import client, vtk
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.surface.surface import Surface
 
 from ..errors import InputError, one_line
@@ -32,8 +34,9 @@ from ..samples import SAMPLES, sample, write_obj
 from ..workflow.output_folder import has_checkpoint
 from . import form
 from . import worker as job_process
+from .picking import picked
 from .queue import Job, Jobs
-from .state import CONTENT, MEGABYTE, colors, is_solvable, places, row, triangles
+from .state import CONTENT, MEGABYTE, as_placed, colors, is_ahead, is_solvable, places, row, triangles
 from .worker import Message
 
 HOST = "127.0.0.1"  # the page is for this computer's user: there is no option for another one
@@ -44,6 +47,7 @@ POLICY = (  # the browser itself refuses to fetch anything from elsewhere; Vue c
 
 TICK = 1.0  # seconds between two looks at a running job
 NUMBER = "{number:[1-9][0-9]{0,8}}"  # of a job, in a route: digits of ASCII
+FARTHEST = 1e6  # of a point on a line of sight from the part, whose volume is 1
 LONGEST = 255  # bytes of a path that is asked for
 ARRAYS = ("polys", "colors", "points")  # of a job, that vtk.js draws
 ENDED = "trame_error_report_msg"  # trame's client sets it when the connection is lost
@@ -58,7 +62,7 @@ class Page:
         self._server: Any = get_server("iga-nn", client_type="vue3")
         self._limit, self._mapping, self._poisson = max_upload * MEGABYTE, mapping, poisson
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._drawn: dict[int, Array] = {}  # points last sent, by job
+        self._drawn: dict[int, tuple[Array, IntArray | None]] = {}  # points and the face picked last sent, by job
         self.jobs = Jobs(root, self._check, self._run, self._tell)
         logging.getLogger("aiohttp.server").addFilter(_not_the_clients)
 
@@ -66,12 +70,12 @@ class Page:
         """Serve until interrupted; `say` is told the address."""
         server = self._server
         server.state.update({"jobs": [], "current": 0, "latest": 0, "trame__title": "iga-nn"})
-        server.state.update(
-            {"page": secrets.token_hex(8), "shown": 0, "paper": None, "webgl": True, "asked": 0, ENDED: ""}
-        )
-        server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES), **form.described()})
-        server.state.client_only("shown", "paper", "webgl", "asked", ENDED)
-        for name, act in {"start": self.jobs.start, "stop": self.jobs.stop, "delete": self.jobs.delete}.items():
+        own = {"shown": 0, "paper": None, "webgl": True, "asked": 0, "picked": None, ENDED: ""}
+        server.state.update({"page": secrets.token_hex(8), **own})
+        server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES)})
+        server.state.update(form.described(self._poisson))
+        server.state.client_only(*own)
+        for name, act in {"stop": self.jobs.stop, "delete": self.jobs.delete}.items():
             server.trigger(name)(partial(self._act, act))
         self._lay_out()
         server.controller.on_server_bind.add(self._bind)
@@ -110,7 +114,7 @@ class Page:
 
     def _run(self, job: Job) -> Iterator[Message]:
         mapping = None if job.problem else replace(self._mapping, resume=has_checkpoint(job.results))
-        return job_process.run(job.folder, job.name, mapping, job.problem or self._poisson, job.stop)
+        return job_process.run(job.folder, job.name, mapping, job.problem or job.wanted or self._poisson, job.stop)
 
     def _act(self, act: Callable[[Job], None], number: int) -> None:
         if job := self.jobs.find(number):
@@ -147,13 +151,16 @@ class Page:
         if job.surface is None:
             return
         points = job.surface.unit_vertices if job.mapped is None else job.mapped
-        if self._drawn.get(job.number) is points:
+        drawn, face = self._drawn.get(job.number, (None, None))
+        if drawn is points and face is job.picked:
             return
-        if job.number not in self._drawn:
+        if drawn is None:
             state[f"polys_{job.number}"] = triangles(job.surface)
-        self._drawn[job.number] = points
-        state[f"colors_{job.number}"] = colors(points, job.surface, mapped=job.mapped is not None)
-        state[f"points_{job.number}"] = places(points)
+        self._drawn[job.number] = points, job.picked
+        mapped = job.mapped is not None
+        state[f"colors_{job.number}"] = colors(points, job.surface, mapped=mapped, picked=job.picked)
+        if drawn is not points:
+            state[f"points_{job.number}"] = places(points)
 
     # Routes
 
@@ -167,6 +174,8 @@ class Page:
             [
                 web.post("/upload", self._upload),
                 web.post("/sample/{name}", self._sample),
+                web.post(f"/face/{NUMBER}", self._face),
+                web.post(f"/start/{NUMBER}", self._start),
                 web.post(f"/solve/{NUMBER}", self._solve),
                 web.post("/paraview/", self._session),
                 web.get(f"/files/{NUMBER}/{{name}}", self._file),
@@ -216,6 +225,42 @@ class Page:
         job = self.jobs.add(f"{name}.obj")
         await asyncio.to_thread(lambda: write_obj(sample(name), job.path))
         self.jobs.check(job)
+        return web.Response(text=str(job.number))
+
+    async def _face(self, request: web.Request) -> web.Response:
+        """Take a line of sight, two points as the browser places them; answer with the face of the part it meets.
+
+        The answer has the face's region, its number of triangles and its area; it is null where no face is met.
+        """
+        job = self._named(request)
+        if job is None or job.surface is None or job.mapped is not None:
+            raise web.HTTPNotFound(text="there is no part of this job to pick a face of")
+        try:
+            sight = np.array(json.loads(await request.text()), dtype=np.float64)
+        except (ValueError, TypeError, RecursionError):
+            sight = np.empty(0)
+        if sight.shape != (2, 3) or not np.all(abs(sight) < FARTHEST):
+            raise web.HTTPBadRequest(text="a line of sight is two points of three numbers each")
+        start, end = job.surface.from_unit(as_placed(sight))
+        found = await asyncio.to_thread(picked, job.surface.part, start, end)
+        if found is None:
+            return web.json_response(None)
+        job.picked = found.triangles
+        self._tell(job)
+        said = {"region": found.region, "triangles": len(found.triangles), "area": float(f"{found.area:.6g}")}
+        return web.json_response(said)
+
+    async def _start(self, request: web.Request) -> web.Response:
+        """Start a job; the form of the problem, where it was shown, says what is solved on the volume."""
+        job, given = self._named(request), await request.post()
+        if job is None:
+            raise web.HTTPNotFound
+        try:
+            if given and is_ahead(job):
+                job.wanted = form.stated(given, self._poisson, has_faces=False)
+        except InputError as error:
+            raise web.HTTPBadRequest(text=one_line(error)) from None
+        self.jobs.start(job)
         return web.Response(text=str(job.number))
 
     async def _solve(self, request: web.Request) -> web.Response:

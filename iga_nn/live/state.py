@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.cube.cube import nearest_faces
 from parameterize.progress import Progress
 from parameterize.surface.surface import Surface
@@ -36,6 +36,7 @@ CONTENT = {artifact.file: artifact.shows for artifact in ARTIFACTS}
 VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # shows three sides of the cube
 ENDED = ("done", "failed", "stopped")
 GREY = 190  # of 255
+PICKED = (240, 140, 20)
 EDGES_UP_TO = 3_000  # edges are drawn on surfaces of at most so many faces
 
 
@@ -59,8 +60,9 @@ def row(job: Job, before: int, problem: PoissonOptions) -> dict[str, Any]:
         "mapped": job.mapped is not None,
         "files": _files(job) if job.state in ENDED else [],
     }
-    if is_solvable(job):
-        said["form"] = form.filled(job.problem or problem)
+    if is_solvable(job) or is_ahead(job):
+        said["form"] = form.filled(job.problem or job.wanted or problem)
+        said["ahead"] = is_ahead(job)
     if job.surface is not None:
         vertices, faces = len(job.surface.vertices), len(job.surface.faces)
         said["size"] = f"{vertices:,} vertices, {faces:,} faces"
@@ -76,6 +78,11 @@ def row(job: Job, before: int, problem: PoissonOptions) -> dict[str, Any]:
 def is_solvable(job: Job) -> bool:
     """Return whether another problem can be solved on the job's volume."""
     return job.state in ENDED and job.volume.is_file()
+
+
+def is_ahead(job: Job) -> bool:
+    """Return whether a problem can be stated before the job's surface becomes a volume."""
+    return job.state in STARTS and job.surface is not None and not is_solvable(job)
 
 
 def _facts(job: Job, now: Progress) -> list[list[str]]:
@@ -130,10 +137,21 @@ def places(points: Array) -> dict[str, str]:
     return _packed((points @ VIEW.T).astype(np.float32))
 
 
-def colors(points: Array, surface: Surface, *, mapped: bool) -> dict[str, str]:
-    """Return red, green and blue (m, 3) of the triangles: of the cube's face each is nearest to; grey if not mapped."""
+def as_placed(points: Array) -> Array:
+    """Return points (n, 3) as they were before `places` rotated them."""
+    return np.asarray(points @ VIEW)
+
+
+def colors(points: Array, surface: Surface, *, mapped: bool, picked: IntArray | None = None) -> dict[str, str]:
+    """Return red, green and blue (m, 3) of the triangles: of the cube's face each is nearest to.
+
+    If not mapped, they are grey, and those that are picked (k,) orange.
+    """
     if not mapped:
-        return _packed(np.full(surface.faces.shape, GREY, dtype=np.uint8))
+        plain = np.full(surface.faces.shape, GREY, dtype=np.uint8)
+        if picked is not None:
+            plain[picked] = PICKED
+        return _packed(plain)
     palette = np.array([[int(color[at : at + 2], 16) for at in (1, 3, 5)] for color in FACE_COLORS], dtype=np.uint8)
     return _packed(palette[nearest_faces(points[surface.faces].mean(axis=1))])  # (m, 3)
 

@@ -1,6 +1,6 @@
 """BoundaryMap: the surface laid on the six faces of the cube, one-to-one, cut along its edges (boundary.npz)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -12,9 +12,13 @@ from ..display import Brief
 from ..files import load_arrays, save_arrays
 from ..spline.bspline import real_array
 from ..spline.volume import FACE_NAMES, BSplineVolume
+from ..surface.groups import Groups, as_arrays, checked, from_arrays
+from ..surface.part import PartSurface
 from .cube import damped_fit, snap
 from .cutting import CutMesh, cut_along_rays
 from .flips import orientation, untangle_whole
+
+PART = ("part_faces", "group_names", "group_sizes", "group_faces")  # arrays of boundary.npz that older files lack
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,6 +33,10 @@ class BoundaryMap(Brief):
         On the faces of the cube: all in [0, 1], at least one of the three exactly 0 or 1.
     faces : (m, 3) array of int
         Vertex numbers, outward.
+    part_faces : (k, 3) array of int, optional
+        The triangles of the surface before they were cut along the cube's edges; its vertices come first.
+    groups : dict of str to array of int
+        Triangles of the surface by the names of their groups; numbers are rows of part_faces.
 
     Raises
     ------
@@ -47,19 +55,19 @@ class BoundaryMap(Brief):
     vertices: Array
     parameters: Array
     faces: IntArray
+    part_faces: IntArray | None = None
+    groups: Groups = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         vertices = _rows_of_three(self.vertices, "vertices")
         parameters = _rows_of_three(self.parameters, "parameters")
-        faces = np.asarray(self.faces)
         if len(parameters) != len(vertices):
             raise ValueError(
                 f"parameters must have one row for each of the {len(vertices)} vertices, got {len(parameters)}"
             )
-        if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
-            raise ValueError(f"faces must be whole numbers of shape (m, 3), got {faces.dtype} of shape {faces.shape}")
-        if faces.size and (faces.min() < 0 or faces.max() >= len(vertices)):
-            raise ValueError(f"faces must number vertices 0 to {len(vertices) - 1}, got {faces.min()} to {faces.max()}")
+        faces = _checked_faces(self.faces, "faces", len(vertices))
+        part_faces = None if self.part_faces is None else _checked_faces(self.part_faces, "part_faces", len(vertices))
+        groups = checked(self.groups, len(faces if part_faces is None else part_faces))
         inside = np.all((parameters >= 0.0) & (parameters <= 1.0), axis=1)
         off = np.flatnonzero(~(inside & np.any(_on_faces(parameters), axis=1)))
         if off.size:
@@ -69,7 +77,15 @@ class BoundaryMap(Brief):
             )
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "parameters", parameters)
-        object.__setattr__(self, "faces", faces.astype(np.int64))
+        object.__setattr__(self, "faces", faces)
+        object.__setattr__(self, "part_faces", part_faces)
+        object.__setattr__(self, "groups", groups)
+
+    @cached_property
+    def part(self) -> PartSurface:
+        """Return the surface as it was before it was cut, with its groups; as it was cut where that is unknown."""
+        faces = self.faces if self.part_faces is None else self.part_faces
+        return PartSurface(self.vertices[: faces.max(initial=-1) + 1], faces, self.groups)
 
     @cached_property
     def cube_faces(self) -> IntArray:
@@ -96,16 +112,39 @@ class BoundaryMap(Brief):
 
     def save(self, path: str | Path) -> None:
         """Write boundary.npz; atomic."""
-        save_arrays(path, vertices=self.vertices, parameters=self.parameters, faces=self.faces)
+        part = {} if self.part_faces is None else {"part_faces": self.part_faces, **as_arrays(self.groups)}
+        save_arrays(path, vertices=self.vertices, parameters=self.parameters, faces=self.faces, **part)
 
     @classmethod
     def load(cls, path: str | Path) -> "BoundaryMap":
         """Read boundary.npz. Raises FileNotFoundError, or ValueError naming what is wrong with the file."""
-        data = load_arrays(path, ("vertices", "parameters", "faces"))
+        data = load_arrays(path, ("vertices", "parameters", "faces"), PART)
+        places = data["vertices"], data["parameters"], data["faces"]
         try:
-            return cls(data["vertices"], data["parameters"], data["faces"])
+            if any(name not in data for name in PART):
+                return cls(*places)
+            part_faces, names, sizes, numbers = (data[name] for name in PART)
+            return cls(*places, part_faces, from_arrays(names, sizes, numbers, len(part_faces)))
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: {error}") from None
+
+
+def read_part(path: str | Path) -> PartSurface:
+    """Read from boundary.npz the surface that a run was made of, with its groups.
+
+    A file written before it held these gives the surface as it was cut along the cube's edges. Raises
+    FileNotFoundError, or ValueError naming what is wrong with the file.
+    """
+    return BoundaryMap.load(path).part
+
+
+def _checked_faces(values: IntArray, name: str, count: int) -> IntArray:
+    faces = np.asarray(values)
+    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
+        raise ValueError(f"{name} must be whole numbers of shape (m, 3), got {faces.dtype} of shape {faces.shape}")
+    if faces.size and (faces.min() < 0 or faces.max() >= count):
+        raise ValueError(f"{name} must number vertices 0 to {count - 1}, got {faces.min()} to {faces.max()}")
+    return faces.astype(np.int64)
 
 
 def _rows_of_three(values: Array, name: str) -> Array:

@@ -6,6 +6,8 @@ import igl
 import numpy as np
 
 from .errors import MeshError, check_face_limit
+from .geometry import doubled_areas
+from .groups import renumbered
 from .surface import Surface, surface_from_arrays
 
 
@@ -27,5 +29,10 @@ def decimate(surface: Surface, max_faces: int) -> Surface:
     moved = igl.hausdorff(unit, surface.faces, vertices, faces) / surface.scale
     notice = f"decimated from {before} to {len(faces)} faces: moved by at most {moved:.3g}"
     smaller = surface_from_arrays(surface.from_unit(vertices), faces, surface.name, max_faces=max_faces)
+    old = surface.part.nearest(
+        smaller.vertices[smaller.faces].mean(axis=1), doubled_areas(smaller.vertices, smaller.faces)
+    )
+    groups = renumbered(surface.groups, old)
     # Notices before this one are about the surface as it came, those after it about the surface as it is now.
-    return replace(smaller, source=surface.source, notices=(*surface.notices, notice, *smaller.notices))
+    notices = (*surface.notices, notice, *smaller.notices)
+    return replace(smaller, source=surface.source, notices=notices, groups=groups)

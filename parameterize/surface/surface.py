@@ -2,7 +2,9 @@
 
 import hashlib
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +23,8 @@ from .errors import (
     without_unused_defects,
 )
 from .geometry import deepest_point, signed_volume
+from .groups import Groups, checked, renumbered
+from .part import PartSurface
 from .readers.file import RawMesh, read_mesh
 from .readers.objects import READERS, class_of, read_object
 from .welding import weld_and_drop, wind_outward
@@ -65,6 +69,9 @@ class Surface(Brief, Shown):
         unit or at another place then gives the same numbers, and with them the same map.
     crossings : (k, 2) array of int
         Pairs of faces that intersect.
+    groups : dict of str to array of int
+        The faces of each group of the input, ascending: OBJ groups, materials and objects, STL solids, physical groups
+        of Gmsh, whole numbers given with faces. A face may be in several.
 
     Examples
     --------
@@ -86,6 +93,7 @@ class Surface(Brief, Shown):
     center: Array
     unit_vertices: Array
     crossings: IntArray
+    groups: Groups
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Return points (..., 3), given in the user's units, as placed."""
@@ -105,6 +113,11 @@ class Surface(Brief, Shown):
         """Return the lowest and the highest corner of the bounding box, (3,) each, in the user's units."""
         return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
+    @cached_property
+    def part(self) -> PartSurface:
+        """Return the triangles with what finds some of them: by a group, by a point, up to sharp edges."""
+        return PartSurface(self.vertices, self.faces, self.groups)
+
     def summary(self) -> dict[str, Any]:
         """Return the section `input` of report.json."""
         first = self.crossings[: topology.SHOWN]
@@ -122,6 +135,10 @@ class Surface(Brief, Shown):
                     {"faces": pair, "near": place} for pair, place in zip(first.tolist(), places.tolist(), strict=True)
                 ],
             },
+            "groups": [
+                {"name": name, "faces": len(numbers), "area": self.part.area(numbers)}
+                for name, numbers in self.groups.items()
+            ],
             "notices": list(self.notices),
         }
 
@@ -200,6 +217,7 @@ def surface_from_arrays(
     *,
     component: int | None = None,
     max_faces: int = MAX_FACES,
+    groups: Mapping[str, ArrayLike] | None = None,
 ) -> Surface:
     """Make a surface of arrays, with the checks of `load_surface`.
 
@@ -215,6 +233,8 @@ def surface_from_arrays(
         Which one to take where there are several, 0 the largest.
     max_faces : int
         Refuse more.
+    groups : dict of str to array of int, optional
+        Numbers of the faces of each group, counted from 0.
 
     Raises
     ------
@@ -243,7 +263,8 @@ def surface_from_arrays(
         check_indices(points, triangles)
         check_finite(points, triangles)
         points, notices = without_unused_defects(points, triangles)
-        return _gate(RawMesh(points, triangles, digest, notices), name, "", component, max_faces)
+        named = checked(groups or {}, len(triangles))
+        return _gate(RawMesh(points, triangles, digest, notices, named), name, "", component, max_faces)
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
 
@@ -264,11 +285,11 @@ def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces
         raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
     middle, size, remarks = _box(vertices, faces)
     unit = (vertices - middle) / size
-    triangles, mended = weld_and_drop(unit, faces)
+    triangles, left, mended = weld_and_drop(unit, faces)
     if len(triangles) < 4:
         raise MeshError(f"{len(triangles)} faces that are not degenerate, at least 4 are needed: export it again")
-    triangles, chosen = topology.choose_component(unit, triangles, component)
-    kept, compact = np.unique(triangles, return_inverse=True)
+    own, chosen = topology.choose_component(unit, triangles, component)
+    kept, compact = np.unique(triangles[own], return_inverse=True)
     points, triangles = unit[kept], compact.reshape(-1, 3).astype(np.int64)
 
     def where(vertex: int) -> str:
@@ -295,6 +316,7 @@ def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces
         center=deepest * size + middle,
         unit_vertices=placed.astype(np.float32).astype(np.float64),
         crossings=crossings,
+        groups=renumbered(raw.groups, left[own]),
     )
 
 

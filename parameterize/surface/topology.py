@@ -21,10 +21,10 @@ SHOWN = 5  # pairs of faces that cross
 
 
 def choose_component(vertices: Array, faces: IntArray, component: int | None) -> tuple[IntArray, list[str]]:
-    """Return the faces of the only component, or of the one asked for (0 the largest), and notices."""
+    """Return the numbers of the faces of the only component, or of the one asked for (0 the largest), and notices."""
     groups = _components(faces)
     if component is None and len(groups) == 1:
-        return faces, []
+        return np.arange(len(faces)), []
     sizes = ", ".join(f"{i}: {len(group)} faces" for i, group in enumerate(groups[:LISTED]))
     sizes += f", and {len(groups) - LISTED} more" if len(groups) > LISTED else ""
     if component is not None:
@@ -33,7 +33,7 @@ def choose_component(vertices: Array, faces: IntArray, component: int | None) ->
         if not 0 <= component < len(groups):
             raise MeshError(f"component {component} does not exist: there are {len(groups)}, counted from 0 ({sizes})")
         notice = [f"component {component} taken of {len(groups)} ({sizes})"] if len(groups) > 1 else []
-        return faces[groups[component]], notice
+        return groups[component], notice
     outer, nested = _inside(vertices, faces, groups)
     if nested:
         raise MeshError(

@@ -18,24 +18,29 @@ def is_closed(faces: IntArray) -> bool:
     return len(faces) > 0 and bool(np.all(edge_table(faces)[1] == 2))
 
 
-def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
+def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray, list[str]]:
     """Weld duplicates, drop degenerate faces and unused vertices of a mesh whose box has side 1.
 
     A mesh that is closed as numbered keeps vertices that merely touch; only edges of no length are collapsed there.
-    Returns the faces (m, 3) that are left, in the same vertex numbers, and notices.
+    Returns the faces (m, 3) that are left, in the same vertex numbers, which of the given faces they were (m,), and
+    notices.
     """
     notices = []
-    solid = faces[_distinct(faces)]
+    kept = np.flatnonzero(_distinct(faces))
+    solid = faces[kept]
     closed = is_closed(solid)
     edges = edge_table(solid)[0]
     short = edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
     label = connected(short if closed else _close_pairs(vertices, solid), len(vertices))
     welded = np.unique(label, return_index=True)[1][label][solid]  # the lowest vertex of those that are joined
-    welded = welded[_distinct(welded)]
-    if closed and not is_closed(welded):
+    apart = _distinct(welded)
+    if closed and not is_closed(welded[apart]):
         welded = solid  # collapsing would tear the surface: keep its edges of no length
+    else:
+        welded, kept = welded[apart], kept[apart]
     if not is_closed(welded):
-        welded = welded[_areas(vertices, welded) > FLAT]
+        thick = _areas(vertices, welded) > FLAT
+        welded, kept = welded[thick], kept[thick]
     removed = len(np.unique(faces)) - len(np.unique(welded)) if len(welded) else 0
     if removed:
         notices.append(f"welded {removed} duplicate vertices (closer than {WELD_TOLERANCE:g} of the size)")
@@ -44,7 +49,7 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]
     unused = len(vertices) - len(np.unique(faces))
     if unused:
         notices.append(f"dropped {unused} vertices that no face uses")
-    return welded, notices
+    return welded, kept, notices
 
 
 def wind_outward(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:

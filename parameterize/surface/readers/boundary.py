@@ -28,8 +28,8 @@ FACES = {  # of each kind of cell, outward where its volume is positive
 
 def boundary_and_inner(
     vertices: Array, solids: list[tuple[str, IntArray]], polygons: list[list[int]]
-) -> tuple[list[list[int]], list[list[int]], tuple[str, ...]]:
-    """Return the boundary of solid cells, the polygons that are no face of a cell, and notices.
+) -> tuple[list[list[int]], IntArray, tuple[str, ...]]:
+    """Return the boundary of solid cells, the numbers of the polygons that are no face of a cell, and notices.
 
     solids: cells by their kind, corners (k, corners) in range. Raises MeshError where more than two cells share a face.
     """
@@ -45,7 +45,7 @@ def boundary_and_inner(
     free = {size: table[_met_once(table)] for size, table in tables.items()}
     outer = _without_matched_quads(free)
     notices = (f"left out {twice} cells that are given twice",) if twice else ()
-    outside = [polygon for polygon, inside in zip(polygons, _are_faces(polygons, tables), strict=True) if not inside]
+    outside = np.flatnonzero(~_are_faces(polygons, tables))
     return [row for table in outer.values() for row in table.tolist()], outside, notices
 
 
@@ -130,16 +130,46 @@ def _without_matched_quads(faces: dict[int, IntArray]) -> dict[int, IntArray]:
 def _are_faces(polygons: list[list[int]], faces: dict[int, IntArray]) -> Mask:
     """Return which polygons are faces of cells, half of a quadrangular one, or two triangular ones together."""
     found = np.zeros(len(polygons), dtype=bool)
-    sizes = np.array([len(polygon) for polygon in polygons])
     empty = np.empty((0, 3), dtype=np.int64)
     quads = faces.get(4, np.empty((0, 4), dtype=np.int64))
     triangles = np.concatenate([faces.get(3, empty), quads[:, HALVES].reshape(-1, 3)])
-    for size in np.unique(sizes).tolist():
-        mine = np.flatnonzero(sizes == size)
-        rows = np.array([polygons[i] for i in mine], dtype=np.int64)
+    for size in sorted({len(polygon) for polygon in polygons}):
+        mine, rows = _of_size(polygons, size)
         table = triangles if size == 3 else faces.get(size, np.empty((0, size), dtype=np.int64))
         found[mine] = _places(rows, table) >= 0
         if size == 4:
             met = _places(rows[:, HALVES].reshape(-1, 3), faces.get(3, empty)).reshape(-1, 2, 2)
             found[mine] |= np.any(np.all(met >= 0, axis=2), axis=1)
+    return found
+
+
+def faces_alike(faces: list[list[int]], polygons: list[list[int]]) -> IntArray:
+    """Return for each face (m,) the number of the polygon with the same corners, -1 where there is none."""
+    return _found(faces, {size: [_of_size(polygons, size)] for size in {len(row) for row in polygons}})
+
+
+def cells_behind(faces: list[list[int]], solids: list[tuple[str, IntArray]]) -> IntArray:
+    """Return for each face (m,) of the boundary its solid cell, counted through `solids`; -1 for collapsed cells."""
+    tables: dict[int, list[tuple[IntArray, IntArray]]] = {}
+    first = 0
+    for kind, rows in solids:
+        for face in FACES[kind]:
+            tables.setdefault(len(face), []).append((np.arange(first, first + len(rows)), rows[:, face]))
+        first += len(rows)
+    return _found(faces, tables)
+
+
+def _of_size(polygons: list[list[int]], size: int) -> tuple[IntArray, IntArray]:
+    """Return numbers (k,) and corners (k, size) of the polygons of that many corners."""
+    numbers = np.array([i for i, polygon in enumerate(polygons) if len(polygon) == size], dtype=np.int64)
+    return numbers, np.array([polygons[i] for i in numbers], dtype=np.int64).reshape(-1, size)
+
+
+def _found(faces: list[list[int]], tables: dict[int, list[tuple[IntArray, IntArray]]]) -> IntArray:
+    """Return for each face (m,) the number beside the row with its corners in tables by their size, or -1."""
+    found = np.full(len(faces), -1)
+    for size, parts in tables.items():
+        numbers, rows = (np.concatenate(column) for column in zip(*parts, strict=True))
+        mine, asked = _of_size(faces, size)
+        found[mine] = np.append(numbers, -1)[_places(asked, rows)]
     return found

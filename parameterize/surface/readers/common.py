@@ -5,7 +5,7 @@ import logging
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..errors import MeshError
+from ..groups import Groups
 
 DAMAGED = "the file is truncated or damaged, export it again"
 BYTES_PER_FACE = 500  # an ASCII STL facet, the most wasteful of the formats, takes about 300
@@ -27,12 +28,13 @@ class Content:
     """What a surface file holds.
 
     vertices: (n, 3). polygons: the vertex numbers of each face, counted from 0; they may be out of range.
-    notices: what the user should know about how the file was read, one line each.
+    notices: what the user should know about how the file was read, one line each. groups: numbers of polygons by name.
     """
 
     vertices: Array
     polygons: list[list[int]]
     notices: tuple[str, ...] = ()
+    groups: Groups = field(default_factory=dict)
 
 
 def most_bytes(max_faces: int) -> int:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...arrays import Array, IntArray
 from ..errors import MeshError, check_face_count, check_finite, check_indices, without_unused_defects
+from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
 from .common import DAMAGED, Content, most_bytes
 from .gmsh import read_gmsh
@@ -38,12 +39,13 @@ FORMATS = tuple(READERS)
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """Triangles as they are given: vertices (n, 3), faces (m, 3), indices in range; sha256 of file or arrays."""
+    """Triangles as they are given: vertices (n, 3), faces (m, 3), indices in range, groups; sha256 of what was read."""
 
     vertices: Array
     faces: IntArray
     sha256: str
     notices: tuple[str, ...]
+    groups: Groups
 
 
 def read_mesh(path: Path, max_faces: int) -> RawMesh:
@@ -62,26 +64,28 @@ def read_mesh(path: Path, max_faces: int) -> RawMesh:
     if not data.strip():
         raise MeshError("the file is empty: export it again")
     content = READERS[suffix](data, max_faces)
-    vertices, faces, notices = triangles_of(content, max_faces)
+    vertices, faces, notices, groups = triangles_of(content, max_faces)
     unpacked = ("unpacked from .gz",) * packed
-    return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices)
+    return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices, groups)
 
 
-def triangles_of(content: Content, max_faces: int) -> tuple[Array, IntArray, tuple[str, ...]]:
-    """Check vertices and polygons; return vertices, the triangles (m, 3) that polygons are cut into, all notices."""
+def triangles_of(content: Content, max_faces: int) -> tuple[Array, IntArray, tuple[str, ...], Groups]:
+    """Check vertices and polygons; return vertices, the triangles (m, 3) that these are cut into, notices, groups."""
     corners = np.fromiter(chain.from_iterable(content.polygons), dtype=np.int64)
     check_indices(content.vertices, corners)
     check_finite(content.vertices, corners)
     vertices, unused = without_unused_defects(content.vertices, corners)
-    notices = content.notices + unused
+    groups, too_many = few(content.groups)
+    notices = content.notices + unused + too_many
     fewest = min(map(len, content.polygons), default=0)
     if fewest < 3:
         raise MeshError(f"a face has {fewest} corners, expected at least 3; {DAMAGED}")
     check_face_count(len(corners) - 2 * len(content.polygons), max_faces)  # before the time is spent on them
     faces = triangulate(vertices, content.polygons)
+    pieces = [len(polygon) - 2 for polygon in content.polygons]
     if len(faces) > len(content.polygons):
         notices = (*notices, f"{len(content.polygons)} polygons cut into {len(faces)} triangles")
-    return vertices, faces, notices
+    return vertices, faces, notices, renumbered(groups, np.repeat(np.arange(len(pieces)), pieces))
 
 
 def _read_bytes(path: Path, limit: int) -> bytes:

@@ -1,4 +1,4 @@
-"""Gmsh .msh of the versions 2 to 4.1, text and binary: nodes and elements; other sections are skipped.
+"""Gmsh .msh of the versions 2 to 4.1, text and binary: nodes, elements and their physical groups.
 
 Source: the Gmsh reference manual, "MSH file format" and "Legacy formats".
 """
@@ -12,7 +12,8 @@ from ...arrays import Array, IntArray
 from ..errors import MeshError
 from .cells import Rows, from_cells
 from .common import DAMAGED, Content
-from .words import Binary, Text
+from .gmsh_groups import Physical, groups_of, physical_names, physical_of_entities
+from .words import Binary, Source, Text
 
 # Of Gmsh's element types: their kind, and their number of nodes.
 KINDS = {1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4), 4: ("tetra", 4), 5: ("hexahedron", 8), 6: ("wedge", 6)}
@@ -24,8 +25,8 @@ VERSIONS = ("2", "2.0", "2.1", "2.2", "4", "4.0", "4.1")
 BEGIN = re.compile(rb"^[ \t]*\$(\w+)[ \t]*\r?\n?", re.MULTILINE)
 FORMAT = re.compile(rb"\s*(\S+)\s+([01])\s+(\d+)[ \t]*(?:\r?\n|$)")
 
-Source = Text | Binary
 Found = tuple[IntArray, Array]  # numbers (n,) and places (n, 3) of nodes
+Block = tuple[int, IntArray, IntArray]  # Gmsh's type of elements, their nodes (k, nodes), entity or physical group (k,)
 
 
 def read_gmsh(data: bytes, _: int) -> Content:
@@ -45,8 +46,15 @@ def read_gmsh(data: bytes, _: int) -> Content:
     read_nodes, read_elements = READERS[version if version == "4.1" else version[0]]
     nodes, elements = (_opened(sections, form, name) for name in (b"Nodes", b"Elements"))
     numbers, places = read_nodes(nodes)
-    cells = [(KINDS[kind][0], rows) for kind, rows in read_elements(elements)]
-    return from_cells(places, _renumbered(cells, numbers))
+    blocks = list(read_elements(elements))
+    cells = [(KINDS[kind][0], rows) for kind, rows, _ in blocks]
+    physical: Physical | None = None
+    if version[0] == "4":
+        given = b"Entities" in sections
+        physical = physical_of_entities(_opened(sections, form, b"Entities"), version) if given else {}
+    owners = [(kind, owner) for (kind, _), (_, _, owner) in zip(cells, blocks, strict=True)]
+    groups = groups_of(owners, physical, physical_names(sections.get(b"PhysicalNames", b"")))
+    return from_cells(places, _renumbered(cells, numbers), groups=groups)
 
 
 def _opened(sections: dict[bytes, bytes], form: re.Match[bytes], name: bytes) -> Source:
@@ -100,10 +108,10 @@ def _nodes_2(source: Source) -> Found:
     return table[0].ravel(), table[1]
 
 
-def _elements_2(source: Source) -> Iterator[tuple[int, IntArray]]:
+def _elements_2(source: Source) -> Iterator[Block]:
     """Read the count; in text then rows `number type tags ... nodes`, in binary blocks of rows of the same kind.
 
-    Tags are counted where they begin.
+    Tags are counted where they begin; the first is the physical group.
     """
     left = source.count()
     if isinstance(source, Text):
@@ -114,13 +122,15 @@ def _elements_2(source: Source) -> Iterator[tuple[int, IntArray]]:
         _check_tags(tags)
         if not 0 < count <= left:
             raise MeshError(f"a block of {count} elements where {left} are left; {DAMAGED}")
-        yield number, source.table(count, [("i4", 1 + tags), ("i4", _kind(number)[1])])[1]
+        marks, nodes = source.table(count, [("i4", 1 + tags), ("i4", _kind(number)[1])])
+        yield number, nodes, marks[:, 1] if tags else np.zeros(count, dtype=np.int64)
         left -= count
 
 
-def _text_elements_2(source: Text, count: int) -> Iterator[tuple[int, IntArray]]:
+def _text_elements_2(source: Text, count: int) -> Iterator[Block]:
     """Read rows `number type tags ... nodes`."""
     rows: dict[int, list[list[int]]] = {}
+    physical: dict[int, list[int]] = {}
     numbers, at = source.whole(source.left), 0
     for _ in range(count):
         if at + 3 > len(numbers):
@@ -129,9 +139,11 @@ def _text_elements_2(source: Text, count: int) -> Iterator[tuple[int, IntArray]]
         _check_tags(tags)
         start, at = at + 3 + tags, at + 3 + tags + _kind(number)[1]
         rows.setdefault(number, []).append(numbers[start:at])
+        physical.setdefault(number, []).append(numbers[start - tags] if tags else 0)
     if at > len(numbers):
         raise MeshError(f"$Elements of the .msh ends within its last element; {DAMAGED}")
-    yield from ((number, np.array(found, dtype=np.int64)) for number, found in rows.items())
+    for number, found in rows.items():
+        yield number, np.array(found, dtype=np.int64), np.array(physical[number], dtype=np.int64)
 
 
 def _check_tags(count: int) -> None:
@@ -151,11 +163,12 @@ def _nodes_4(source: Source) -> Found:
     return _together(found)
 
 
-def _elements_4(source: Source) -> Iterator[tuple[int, IntArray]]:
+def _elements_4(source: Source) -> Iterator[Block]:
     """Read of version 4.0 the counts, then blocks `entity dimension type count` of rows `number nodes`."""
     for _ in range(source.large(2)[0]):
-        number = source.whole(3)[2]
-        yield number, source.table(source.large(1)[0], [("i4", 1), ("i4", _kind(number)[1])])[1]
+        entity, _, number = source.whole(3)
+        nodes = source.table(source.large(1)[0], [("i4", 1), ("i4", _kind(number)[1])])[1]
+        yield number, nodes, np.full(len(nodes), entity)
 
 
 def _nodes_41(source: Source) -> Found:
@@ -173,11 +186,12 @@ def _nodes_41(source: Source) -> Found:
     return _together(found)
 
 
-def _elements_41(source: Source) -> Iterator[tuple[int, IntArray]]:
+def _elements_41(source: Source) -> Iterator[Block]:
     """Read the counts, then blocks `dimension entity type count` of rows `number nodes`."""
     for _ in range(source.large(4)[0]):
-        number = source.whole(3)[2]
-        yield number, source.table(source.large(1)[0], [("i8", 1 + _kind(number)[1])])[0][:, 1:]
+        _, entity, number = source.whole(3)
+        nodes = source.table(source.large(1)[0], [("i8", 1 + _kind(number)[1])])[0][:, 1:]
+        yield number, nodes, np.full(len(nodes), entity)
 
 
 def _parameters(dimension: int, parametric: int) -> int:

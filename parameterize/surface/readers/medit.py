@@ -1,4 +1,4 @@
-"""Medit text: the sections that hold vertices and cells; marks on them are skipped, and so are reference numbers."""
+"""Medit text: the sections that hold vertices and cells, whose references are groups; marks on them are skipped."""
 
 import re
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ...arrays import IntArray
 from ..errors import MeshError, check_indices
+from ..groups import by_value
 from .cells import from_cells
 from .common import DAMAGED, NUMBERS, WHOLE_NUMBERS, Content, header_count, text_lines
 
@@ -25,27 +26,30 @@ def read_medit(data: bytes, _: int) -> Content:
         raise MeshError("not a .mesh: expected the text format that starts with MeshVersionFormatted")
     vertices = np.empty((0, 3))
     cells: list[tuple[str, IntArray]] = []
+    references: list[IntArray] = []
     for name, body in zip(parts[::2], parts[1::2], strict=True):
         words = body.split()
         if name == "Dimension" and words != ["3"]:
             raise MeshError("the .mesh is not of dimension 3: export three coordinates each")
         if name == "Vertices":
-            vertices = _table(name, words, 3, NUMBERS).astype(np.float64)
+            vertices = _table(name, words, 3, NUMBERS)[:, :-1].astype(np.float64)
         elif name in CELLS:
             kind, size = CELLS[name]
-            rows = _table(name, words, size, WHOLE_NUMBERS).astype(np.int64) - 1
-            cells.append((kind, rows))
+            rows = _table(name, words, size, WHOLE_NUMBERS).astype(np.int64)
+            cells.append((kind, rows[:, :-1] - 1))
+            references.append(rows[:, -1])
         elif CURVED.fullmatch(name) and words[:1] != ["0"]:
             raise MeshError(
                 f"holds {' '.join(words[:1])[:20]} curved cells, {name}: save linear tetrahedra or triangles"
             )
     for _kind, table in cells:
         check_indices(vertices, table, first=1)
-    return from_cells(vertices, cells)
+    marks = np.concatenate([*references, np.empty(0, dtype=np.int64)])
+    return from_cells(vertices, cells, groups=by_value({"ref": marks}, len(marks)))
 
 
 def _table(name: str, words: list[str], columns: int, numbers: re.Pattern[str]) -> NDArray[np.str_]:
-    """Return the rows of a section (count, columns) without the reference number at the end of each, still as words."""
+    """Return the rows of a section (count, columns + 1), the reference number at the end of each, still as words."""
     count = header_count(words[0] if words else "")
     size = count * (columns + 1)
     if size > len(words) - 1:
@@ -53,4 +57,4 @@ def _table(name: str, words: list[str], columns: int, numbers: re.Pattern[str]) 
     rows = words[1 : size + 1]
     if count and not numbers.fullmatch(" ".join(rows)):
         raise MeshError(f"the .mesh has a word that is not a number among its {name}; {DAMAGED}")
-    return np.array(rows, dtype=np.str_).reshape(count, columns + 1)[:, :-1]
+    return np.array(rows, dtype=np.str_).reshape(count, columns + 1)

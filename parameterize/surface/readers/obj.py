@@ -1,7 +1,7 @@
-"""Wavefront OBJ: vertices and faces alone, each word checked, so that errors name the line.
+"""Wavefront OBJ: vertices, faces and their groups, each number checked, so that errors name the line.
 
-References to texture coordinates and normals are dropped: at a seam they would split a vertex. Records that are no part
-of the surface, such as lines, are left out with a notice.
+References to texture coordinates and normals are dropped: at a seam they would split a vertex. Groups, materials and
+objects name the faces after them. Records that are no part of the surface, such as lines, are left out with a notice.
 """
 
 from array import array
@@ -11,12 +11,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..errors import MeshError
+from ..groups import Groups, gathered
 from .common import Content, coordinates, corners, text_lines
 
 FACES = ("f", "fo")
 PATCHES = ("surf", "bsp", "bzp", "call")  # free-form surfaces, and other files
 BESIDE = ("p", "l", "curv", "curv2")  # points, lines, curves
-SKIPPED = {"vt", "vn", "vp", "g", "s", "o", "mg", "usemtl", "mtllib", "usemap", "maplib", "bevel", "lod", "shadow_obj"}
+NAMING = ("g", "usemtl", "o")  # the faces that follow, until the next of the same kind
+SKIPPED = {"vt", "vn", "vp", "s", "mg", "mtllib", "usemap", "maplib", "bevel", "lod", "shadow_obj"}
 SKIPPED |= {"trace_obj", "c_interp", "d_interp", "ctech", "stech", "cstype", "deg", "bmat", "step", "parm", "end"}
 LISTED = 5  # kinds of records left out
 
@@ -27,6 +29,7 @@ def read_obj(data: bytes, _: int) -> Content:
         raise MeshError("not an OBJ: it holds binary data; export as OBJ text")
     places = array("d")
     polygons: list[list[int]] = []
+    named: list[tuple[int, list[str]]] = []
     relative = False
     highest, highest_line = 0, 0
     left_out: Counter[str] = Counter()
@@ -43,6 +46,8 @@ def read_obj(data: bytes, _: int) -> Content:
             if max(numbers) > highest:
                 highest, highest_line = max(numbers), line
             polygons.append([i - 1 if i > 0 else i + len(places) // 3 for i in numbers])
+        elif words and words[0] in NAMING:
+            named.append((len(polygons), words))
         elif words and words[0] in PATCHES:
             raise MeshError(f"line {line}: a record {words[0]!r}, which is not read: export the surface as polygons")
         elif words and words[0] not in SKIPPED:
@@ -60,7 +65,18 @@ def read_obj(data: bytes, _: int) -> Content:
         listed = ", ".join(f"{count} {ascii(word[:20])}" for word, count in left_out.most_common(LISTED))
         more = f" and {len(left_out) - LISTED} more kinds" if len(left_out) > LISTED else ""
         notices.append(f"left out records that are no vertices or faces: {listed}{more}")
-    return Content(vertices, polygons, tuple(notices))
+    return Content(vertices, polygons, tuple(notices), _groups(named, len(polygons)))
+
+
+def _groups(named: list[tuple[int, list[str]]], count: int) -> Groups:
+    """Return the groups of `count` faces of the records that name them, each with the number of the next face."""
+    parts = []
+    for kind in NAMING:
+        mine = [(start, words[1:]) for start, words in named if words[0] == kind]
+        ends = [*(start for start, _ in mine[1:]), count]
+        for (start, names), end in zip(mine, ends, strict=False):
+            parts += [(name, range(start, end)) for name in (names if kind == "g" else [" ".join(names)])]
+    return gathered(parts)
 
 
 def _out_of_range(number: int, line: int, present: int) -> MeshError:

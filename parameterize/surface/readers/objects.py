@@ -2,12 +2,13 @@
 
 import hashlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ..errors import MeshError
+from ..groups import by_value, gathered
 from .cells import Rows, arrays_of, from_cells
 from .common import Content
 from .file import RawMesh, triangles_of
@@ -31,9 +32,36 @@ def read_object(mesh: Any, kind: str, max_faces: int) -> RawMesh:
         raise MeshError(" ".join(str(error).split())) from None
     if not content.polygons:
         raise MeshError("has no faces: give a closed surface")
-    vertices, faces, notices = triangles_of(content, max_faces)
+    vertices, faces, notices, groups = triangles_of(content, max_faces)
     digest = hashlib.sha256(vertices.tobytes() + faces.tobytes()).hexdigest()
-    return RawMesh(vertices, faces, digest, notices)
+    return RawMesh(vertices, faces, digest, notices, groups)
+
+
+def _read_trimesh(mesh: Any) -> Content:
+    """Return the triangles; whole numbers of the faces, also those among the metadata, are groups."""
+    faces = np.asarray(mesh.faces)
+    held = {name: values for name, values in mesh.metadata.items() if isinstance(values, np.ndarray)}
+    groups = by_value(_named({**held, **mesh.face_attributes}), len(faces))
+    return Content(np.array(mesh.vertices, np.float64), faces.tolist(), groups=groups)
+
+
+def _read_meshio(mesh: Any) -> Content:
+    """Return the cells; their sets and their whole numbers are groups."""
+    points, cells = arrays_of(mesh)
+    count = sum(len(rows) for _, rows in cells)
+    starts = np.cumsum([0, *(len(rows) for _, rows in cells)]).tolist()
+    data = {name: np.concatenate(blocks) for name, blocks in mesh.cell_data.items()}
+    sets = [
+        (str(name), start + np.asarray(numbers, dtype=np.int64))
+        for name, blocks in mesh.cell_sets.items()
+        for start, numbers in zip(starts, blocks, strict=False)
+        if numbers is not None
+    ]
+    return from_cells(points, cells, groups={**by_value(_named(data), count), **gathered(sets)})
+
+
+def _named(arrays: Mapping[Any, Any]) -> dict[str, Any]:
+    return {str(name): values for name, values in arrays.items()}
 
 
 def _read_pyvista(mesh: Any) -> Content:
@@ -48,11 +76,14 @@ def _read_pyvista(mesh: Any) -> Content:
         ("vertex", [()] * mesh.n_verts),
         ("line", [()] * mesh.n_lines),
     ]
-    return from_cells(np.array(mesh.points, dtype=np.float64), cells)
+    before = mesh.n_verts + mesh.n_lines  # VTK has these first
+    data = {name: np.asarray(mesh.cell_data[name]) for name in mesh.cell_data}
+    marks = {name: np.concatenate([values[before:], values[:before]]) for name, values in data.items()}
+    return from_cells(np.array(mesh.points, dtype=np.float64), cells, groups=by_value(marks, mesh.n_cells))
 
 
 READERS: dict[str, Callable[[Any], Content]] = {
-    "trimesh.Trimesh": lambda mesh: Content(np.array(mesh.vertices, np.float64), np.asarray(mesh.faces).tolist()),
+    "trimesh.Trimesh": _read_trimesh,
     "pyvista.PolyData": _read_pyvista,
-    "meshio.Mesh": lambda mesh: from_cells(*arrays_of(mesh)),
+    "meshio.Mesh": _read_meshio,
 }

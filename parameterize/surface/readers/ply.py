@@ -1,18 +1,20 @@
-"""PLY, text and binary: the places of its vertices, the corners of its faces and its triangle strips.
+"""PLY, text and binary: the places of its vertices, the corners of its faces and its triangle strips, groups.
 
-Other elements are left out with a notice; other properties are skipped.
+Whole numbers that faces have are their groups. Other elements are left out with a notice, other properties skipped.
 """
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ...arrays import Array
+from ...arrays import Array, IntArray
 from ..errors import MeshError, check_face_count
+from ..groups import Groups, by_value, renumbered
 from .cells import triangles_of_strips
-from .common import DAMAGED, Content, coordinates, corners, header_count, text_lines
+from .common import DAMAGED, WHOLE_NUMBERS, Content, coordinates, corners, header_count, text_lines
 from .ply_elements import Element, binary_rows, elements_of
 
 NEWLINE = rb"(\r\n|\r|\n)"
@@ -20,7 +22,8 @@ BEGIN = re.compile(rb"ply[ \t]*" + NEWLINE)
 END = re.compile(NEWLINE + rb"[ \t]*end_header[ \t]*(?=[\r\n]|$)")
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 CORNERS = ("vertex_index", "vertex_indices")
-Found = tuple[Array, list[list[int]]]  # places (n, 3) and polygons
+WHOLE = "bBhHiIqQ"  # types of a number that may be a group
+Found = tuple[Array, list[list[int]], Groups]  # places (n, 3), polygons and their groups
 READ = ("vertex", "face", "tristrips")
 
 
@@ -43,54 +46,81 @@ def read_ply(data: bytes, max_faces: int) -> Content:
     ends = re.match(begin[1] + b"|" + NEWLINE + b"|", data[end.end() : end.end() + 2])  # first as the first line
     body = data[end.end() + (ends.end() if ends else 0) :]
     if ORDERS[forms[0]]:
-        places, polygons = _binary(body, elements, ORDERS[forms[0]])
+        places, polygons, groups = _binary(body, elements, ORDERS[forms[0]])
     else:
-        places, polygons = _text(body, elements, len(header) + 2)
+        places, polygons, groups = _text(body, elements, len(header) + 2)
     besides = ", ".join(f"{e.count} {e.name[:20]!r}" for e in elements if e.count and e.name not in READ)
-    return Content(places, polygons, (f"left out other elements: {besides}",) if besides else ())
+    return Content(places, polygons, (f"left out other elements: {besides}",) if besides else (), groups)
 
 
 def _binary(body: bytes, elements: list[Element], order: str) -> Found:
-    """Return places and polygons of the rows of a binary file."""
+    """Return places, polygons and groups of the rows of a binary file."""
     least = sum(element.least for element in elements)
     if len(body) < least:
         raise _too_few(elements, least, len(body), "bytes")
     places: Array = np.empty((0, 3))
     polygons: list[list[int]] = []
+    groups: Groups = {}
     at = 0
     for element in elements:
-        wanted = _wanted(element)
-        columns, at = binary_rows(body, at, element, order, wanted)
+        wanted, marks = _wanted(element), _marks(element)
+        columns, at = binary_rows(body, at, element, order, wanted + marks)
         if element.name == "vertex":
             with np.errstate(invalid="ignore"):  # a signalling NaN, which is refused where a face uses it
                 places = np.stack(columns, axis=1).astype(np.float64)
         elif element.name in READ and element.count:
             rows = _whole(columns[0])
+            groups = _groups(element, marks, columns[1:], len(polygons)) or groups
             polygons += rows if element.name == "face" else triangles_of_strips(_parted(rows))
-    return places, polygons
+    return places, polygons, groups
 
 
 def _text(body: bytes, elements: list[Element], first: int) -> Found:
-    """Return places and polygons of the rows of a text, whose first line has the number `first`."""
+    """Return places, polygons and groups of the rows of a text, whose first line has the number `first`."""
     rows = [(line, text.split()) for line, text in enumerate(text_lines(body), first) if text.strip()]
     needed = sum(element.count for element in elements if element.properties)
     if len(rows) < needed:
         raise _too_few(elements, needed, len(rows), "rows")
     places: list[list[float]] = []
     polygons: list[list[int]] = []
+    groups: Groups = {}
     at = 0
     for element in elements:
-        wanted = _wanted(element)
+        wanted, marks = _wanted(element), _marks(element)
+        marked: list[list[str]] = []
+        before = len(polygons)
         for line, words in rows[at : at + element.count] if wanted else []:
-            found = _words(words, element, wanted, line)
+            found = _words(words, element, wanted + marks, line)
             if element.name == "vertex":
                 places.append(coordinates(found, line))
             elif element.name == "face":
-                polygons.append(corners(found, line))
+                polygons.append(corners(found[: len(found) - len(marks)], line))
+                marked.append(found[len(found) - len(marks) :])
             else:
                 polygons += triangles_of_strips(_parted([corners(found, line)]))
+        if marked and marks:
+            groups = _groups(element, marks, [_numbers(column) for column in zip(*marked, strict=True)], before)
         at += element.count if element.properties else 0
-    return np.array(places), polygons
+    return np.array(places), polygons, groups
+
+
+def _marks(element: Element) -> list[int]:
+    """Return the numbers of the properties of faces that may be groups: whole numbers."""
+    if element.name != "face":
+        return []
+    return [k for k, (_, types) in enumerate(element.properties) if len(types) == 1 and types in WHOLE]
+
+
+def _numbers(words: Sequence[str]) -> IntArray:
+    """Return words as whole numbers; none where some are no such numbers."""
+    return np.array(words if WHOLE_NUMBERS.fullmatch(" ".join(words)) else [], dtype=np.int64)
+
+
+def _groups(element: Element, marks: list[int], columns: Sequence[ArrayLike], before: int) -> Groups:
+    """Return the groups of faces, which `before` other polygons come before, by the columns of their marks."""
+    names = [element.properties[k][0] for k in marks]
+    found = by_value(dict(zip(names, columns, strict=True)), element.count)
+    return renumbered(found, np.append(np.full(before, -1), np.arange(element.count)))
 
 
 def _wanted(element: Element) -> list[int]:

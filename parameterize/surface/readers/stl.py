@@ -1,6 +1,7 @@
 """STL, text and binary, read by trimesh once the counts are checked.
 
-Of a text, the names of the solids, which may be any words, and what stands before the first one are cut out first.
+Of a text, the names of the solids, which may be any words, and what stands before the first one are cut out first;
+where there are several solids, these names are groups.
 """
 
 import io
@@ -9,9 +10,11 @@ import re
 import numpy as np
 
 from ..errors import MeshError, check_face_count
+from ..groups import Groups, gathered
 from .common import DAMAGED, Content, library
 
-SOLID = re.compile(rb"^[ \t]*((?:end)?solid)\b.*$", re.IGNORECASE | re.MULTILINE)
+SOLID = re.compile(rb"^[ \t]*((?:end)?solid)\b(.*)$", re.IGNORECASE | re.MULTILINE)
+ENDED = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 BEFORE = 4096  # bytes in which the first solid begins
 
 
@@ -36,14 +39,39 @@ def read_stl(data: bytes, max_faces: int) -> Content:
         vertices, triangles = np.array(mesh.vertices, dtype=np.float64), mesh.faces.tolist()
     if len(triangles) < promised:
         raise MeshError(f"{promised} faces promised, {len(triangles)} read; {DAMAGED}")
-    return Content(vertices, triangles, ("binary STL although it starts with 'solid'",) * (is_binary and says_solid))
+    notices = ("binary STL although it starts with 'solid'",) * (is_binary and says_solid)
+    return Content(vertices, triangles, notices, {} if is_binary else _solids(data))
 
 
 def _trimmed(data: bytes) -> bytes:
     r"""Return a text that begins with `solid`, its lines ended by \n and its solids without names; others as it is."""
-    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    text = _with_newlines(data)
     first = SOLID.search(text[:BEFORE])
     return SOLID.sub(rb"\1", text[first.start() :]) if first else data
+
+
+def _solids(data: bytes) -> Groups:
+    """Return the facets of each solid by its name where there are several; "solid 2" where the second has none."""
+    text = _with_newlines(data)
+    begun = [match for match in SOLID.finditer(text) if match[1].lower() == b"solid"]
+    if len(begun) < 2:
+        return {}
+    facets = [match.start() for match in ENDED.finditer(SOLID.sub(_blanked, text))]
+    starts = np.searchsorted(facets, [match.start() for match in begun])
+    ends = [*starts[1:], len(facets)]
+    names = [match[2].decode("utf-8", errors="replace").strip() for match in begun]
+    parts = zip(names, starts, ends, strict=True)
+    return gathered((name or f"solid {k}", range(start, end)) for k, (name, start, end) in enumerate(parts, 1))
+
+
+def _blanked(line: re.Match[bytes]) -> bytes:
+    """Return a line of the same length whose name, which may hold any words, is blank."""
+    return b" " * len(line[0])
+
+
+def _with_newlines(data: bytes) -> bytes:
+    r"""Return a text without its byte order mark, its lines ended by \n."""
+    return data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
 def _facets(text: bytes) -> int:

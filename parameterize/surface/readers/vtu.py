@@ -1,20 +1,24 @@
-"""VTK's .vtu: points and cells of all its pieces; point data, cell data and field data are skipped."""
+"""VTK's .vtu: points and cells of all its pieces, whole numbers of cells as groups; other data are skipped."""
 
 import re
 import warnings
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array, IntArray
 from ..errors import MeshError, check_indices
+from ..groups import Groups, by_value
 from .cells import Rows, from_cells
 from .common import DAMAGED, Content, header_count, most_bytes
-from .vtk_arrays import WORDS, Decoder
+from .vtk_arrays import TYPES, WORDS, Decoder
 
 KINDS = {0: "empty", 1: "vertex", 2: "poly_vertex", 3: "line", 4: "poly_line", 5: "triangle", 6: "triangle_strip"}
 KINDS |= {7: "polygon", 8: "pixel", 9: "quad", 10: "tetra", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid"}
 KINDS |= {15: "penta_prism", 16: "hexa_prism", 21: "line3", 35: "line4"}
+Marks = dict[str, NDArray[Any]]  # by the name of an array, a number of each cell
 APPENDED = re.compile(rb"<AppendedData\b([^>]*)>\s*_?")
 
 
@@ -27,15 +31,17 @@ def read_vtu(data: bytes, max_faces: int) -> Content:
     root, decoder = _opened(data, most_bytes(max_faces))
     steps = [grid.get("TimeValues", "").split() for grid in root.iter("UnstructuredGrid")]
     notices = tuple(f"the first of {len(times)} time steps read" for times in steps if len(times) > 1)
-    points, cells = [np.empty((0, 3))], []
+    points, cells, marks = [np.empty((0, 3))], [], []
     for piece in root.iter("Piece"):
         first = sum(map(len, points))
-        found, held = _piece(piece, decoder)
+        found, held, marked = _piece(piece, decoder)
         points.append(found)
         cells += [(kind, _shifted(rows, first)) for kind, rows in held]
+        marks += [marked] * bool(held)
+    groups = _groups(marks, sum(len(rows) for _, rows in cells))
     if len(points) <= 2:
-        return from_cells(points[-1], cells, notices)
-    return _joined(np.concatenate(points), cells, (*notices, f"{len(points) - 1} pieces joined"))
+        return from_cells(points[-1], cells, notices, groups)
+    return _joined(np.concatenate(points), cells, (*notices, f"{len(points) - 1} pieces joined"), groups)
 
 
 def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
@@ -58,11 +64,11 @@ def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
     return root, decoder
 
 
-def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tuple[str, Rows]]]:
-    """Return points (n, 3) and cells of a piece, by kind; of one without cells, nothing."""
+def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tuple[str, Rows]], Marks]:
+    """Return points (n, 3), cells of a piece, by kind, and numbers of these; of one without cells, nothing."""
     n, m = (header_count(piece.get(name, "")) for name in ("NumberOfPoints", "NumberOfCells"))
     if not m:
-        return np.empty((0, 3)), []
+        return np.empty((0, 3)), [], {}
     points = _array(piece, "Points", None)
     if points.get("NumberOfComponents", "3") != "3":
         raise MeshError("points of the .vtu have not three coordinates each: export three")
@@ -73,7 +79,22 @@ def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tu
     if sizes.min() < 0:
         raise MeshError(f"the offsets of the .vtu's cells decrease; {DAMAGED}")
     corners = decoder.numbers(_array(piece, "Cells", "connectivity"), int(ends[-1])).astype(np.int64)
-    return places, _by_kind(types, sizes, ends, corners)
+    order = np.argsort(types, kind="stable")  # in which they are returned
+    marks = {name: decoder.numbers(array, m)[order] for name, array in _marks(piece).items()}
+    return places, _by_kind(types, sizes, ends, corners), marks
+
+
+def _marks(piece: ElementTree.Element) -> dict[str, ElementTree.Element]:
+    """Return the arrays of a piece that give each cell one whole number, by their names."""
+    arrays = piece.iterfind("CellData/DataArray")
+    whole = [array for array in arrays if TYPES.get(array.get("type", ""), "f")[0] != "f"]
+    return {array.get("Name", ""): array for array in whole if array.get("NumberOfComponents", "1") == "1"}
+
+
+def _groups(marks: list[Marks], count: int) -> Groups:
+    """Return the groups of `count` cells of all pieces, by the arrays that every piece has."""
+    names = [name for name in (marks[0] if marks else {}) if all(name in held for held in marks)]
+    return by_value({name: np.concatenate([held[name] for held in marks]) for name in names}, count)
 
 
 def _array(piece: ElementTree.Element, part: str, name: str | None) -> ElementTree.Element:
@@ -115,7 +136,7 @@ def _shifted(rows: Rows, first: int) -> Rows:
     return rows + first if isinstance(rows, np.ndarray) else [[i + first for i in row] for row in rows]
 
 
-def _joined(points: Array, cells: list[tuple[str, Rows]], notices: tuple[str, ...]) -> Content:
+def _joined(points: Array, cells: list[tuple[str, Rows]], notices: tuple[str, ...], groups: Groups) -> Content:
     """Return the content of several pieces, whose cells share points that are in exactly the same place."""
     _, first, label = np.unique(points, axis=0, return_index=True, return_inverse=True)
     number = first[label.ravel()]
@@ -126,4 +147,4 @@ def _joined(points: Array, cells: list[tuple[str, Rows]], notices: tuple[str, ..
         (kind, number[rows] if isinstance(rows, np.ndarray) else [number[row].tolist() for row in rows])
         for kind, rows in cells
     ]
-    return from_cells(points, same, notices)
+    return from_cells(points, same, notices, groups)

@@ -96,5 +96,8 @@ class Binary:
         return [held[f"f{k}"].astype(np.float64 if kind[0] == "f" else np.int64) for k, (kind, _) in enumerate(columns)]
 
 
+Source = Text | Binary
+
+
 def _too_few(what: str, needed: int, left: int, unit: str) -> MeshError:
     return MeshError(f"{what} promises {needed} more {unit}, where {left} follow; {DAMAGED}")

@@ -1,0 +1,54 @@
+"""Names the face of a part that is clicked on the live page: by a point on it, up to the sharp edges around."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from parameterize.arrays import Array, IntArray
+from parameterize.surface.part import PartSurface
+
+FEWEST, MOST = 2, 9  # digits of the point, of the box's size
+
+
+@dataclass(frozen=True, eq=False)
+class Picked:
+    """Hold a face of a part: its region as text, its triangles (k,) and its area in the user's units."""
+
+    region: str
+    triangles: IntArray
+    area: float
+
+
+def picked(part: PartSurface, start: Array, end: Array) -> Picked | None:
+    """Return the face that is met first on the way from one point (3,) through another; None where none is."""
+    shares = _shares(part, start, end - start)
+    triangle = int(np.argmin(shares))
+    if not math.isfinite(shares[triangle]):
+        return None
+    face = part.flood(triangle)
+    return Picked(_region(part, face, start + shares[triangle] * (end - start)), face, part.area(face))
+
+
+def _shares(part: PartSurface, start: Array, way: Array) -> Array:
+    """Return how far along the way each triangle is met (m,), infinite where it is not (Moller and Trumbore, 1997)."""
+    a, b, c = np.moveaxis(part.vertices[part.faces], 1, 0)
+    across = np.cross(way, c - a)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # triangles along the way are not met
+        scale = 1.0 / np.sum((b - a) * across, axis=1)
+        u = scale * np.sum((start - a) * across, axis=1)
+        along = np.cross(start - a, b - a)
+        v = scale * (along @ way)
+        share = scale * np.sum((c - a) * along, axis=1)
+        met = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (share >= 0.0)
+    return np.where(met, share, np.inf)
+
+
+def _region(part: PartSurface, face: IntArray, place: Array) -> str:
+    """Return the text of a point with as few digits as still lead to the face, seen from which it is written."""
+    size = float(np.ptp(part.vertices[part.faces.ravel()], axis=0).max())
+    for digits in range(FEWEST, MOST + 1):
+        rounded = np.round(place, digits - math.ceil(math.log10(size))) + 0.0  # no -0
+        if part.nearest(rounded[None])[0] in face:
+            break
+    return f"face({','.join(f'{value:.12g}' for value in rounded)})"

@@ -1,0 +1,166 @@
+"""PartSurface: the triangles of a part by which its faces are named: groups, nearest triangles, faces up to an edge."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import igl
+import numba
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, IntArray
+from ..display import Brief
+from .geometry import connected, directed_edges, doubled_areas
+from .groups import Groups
+
+NEAR = 1e-6  # of the box's diagonal: triangles whose distances differ by less are equally near
+THIN = 1e-6  # of the box's diagonal: the normal of a lower triangle is rounding
+AGREES = 1e-6  # by how much a cosine must be larger for a triangle to be preferred
+SHARP = 30.0  # degrees
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PartSurface(Brief):
+    """The triangle mesh of a part, as it was read, with its groups.
+
+    `Surface.part` and `BoundaryMap.part` return it, `read_part` reads it from boundary.npz.
+
+    Attributes
+    ----------
+    vertices : (n, 3) array
+        In the user's units.
+    faces : (m, 3) array of int
+        Vertex numbers of the triangles, outward.
+    groups : dict of str to array of int
+        The triangles of each group of the input, ascending.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> cube = iga_nn.sample("cube").part
+    >>> top = cube.flood(int(cube.nearest([[0.4, 0.3, 1.0]])[0]))
+    >>> len(cube.faces), len(top), round(cube.area(top), 12)
+    (3072, 512, 1.0)
+    """
+
+    vertices: Array
+    faces: IntArray
+    groups: Groups
+
+    def group(self, name: str) -> IntArray:
+        """Return the triangles (k,) of a group. Raises ValueError, which lists the groups, where there is none."""
+        if name in self.groups:
+            return self.groups[name]
+        known = ", ".join(self.groups) or "none"
+        raise ValueError(f"group {name!r:.80} does not exist; the mesh has these groups: {known:.400}")
+
+    def area(self, triangles: IntArray) -> float:
+        """Return the area of triangles (k,) in the user's units."""
+        return 0.5 * float(np.linalg.norm(doubled_areas(self.vertices, self.faces[triangles]), axis=1).sum())
+
+    def nearest(self, points: ArrayLike, normals: ArrayLike | None = None) -> IntArray:
+        """Return the triangle (k,) that is nearest to each of the points (k, 3).
+
+        normals: (k, 3), of any length. Of triangles that are equally near, as on both sides of an edge, the one whose
+        outward normal agrees best with the given one is taken.
+        """
+        where = np.ascontiguousarray(points, dtype=np.float64)
+        squared, index, _ = igl.point_mesh_squared_distance(where, self.vertices, self.faces)
+        found = np.asarray(index, dtype=np.int64).reshape(-1)
+        if normals is None or not len(where):
+            return found
+        reach = np.sqrt(np.asarray(squared).reshape(-1)) + NEAR * self._diagonal
+        given = np.ascontiguousarray(normals, dtype=np.float64)
+        given = given / np.maximum(np.linalg.norm(given, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        starts, around = self._around
+        return _best_aligned(where, given, reach, found, self.vertices, self.faces, self._normals, starts, around)
+
+    def flood(self, triangle: int, angle: float = SHARP) -> IntArray:
+        """Return the triangles (k,), ascending, reached from one across edges that bend by less than `angle` degrees.
+
+        Raises ValueError where there is no such triangle.
+        """
+        if not 0 <= triangle < len(self.faces):
+            raise ValueError(f"triangle must lie between 0 and {len(self.faces) - 1}, got {triangle}")
+        sides = self._neighbours
+        first, side = np.nonzero(sides >= 0)
+        second = sides[first, side]
+        smooth = np.sum(self._normals[first] * self._normals[second], axis=1) > np.cos(np.radians(angle))
+        label = connected(np.stack([first[smooth], second[smooth]], axis=1), len(self.faces))
+        return np.flatnonzero(label == label[triangle])
+
+    @cached_property
+    def _diagonal(self) -> float:
+        used = self.vertices[self.faces.ravel()]
+        return float(np.linalg.norm(np.ptp(used, axis=0)))
+
+    @cached_property
+    def _neighbours(self) -> IntArray:
+        """Return the triangle across each side 0-1, 1-2, 2-0 of each triangle (m, 3), -1 where there is none."""
+        sides = np.sort(directed_edges(self.faces), axis=1)
+        order = np.lexsort(sides.T)
+        same = np.flatnonzero(np.all(sides[order[1:]] == sides[order[:-1]], axis=1))
+        found = np.full(3 * len(self.faces), -1, dtype=np.int64)
+        found[order[same]], found[order[same + 1]] = order[same + 1] // 3, order[same] // 3
+        return found.reshape(-1, 3)
+
+    @cached_property
+    def _normals(self) -> Array:
+        """Return unit normals (m, 3); a triangle too low to have one has that of its neighbour at its longest side."""
+        cross = doubled_areas(self.vertices, self.faces)
+        double = np.linalg.norm(cross, axis=1)
+        corners = self.vertices[self.faces]
+        lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)  # (m, 3)
+        longest = lengths.argmax(axis=1)
+        across = self._neighbours[np.arange(len(longest)), longest]
+        thin = (double <= THIN * self._diagonal * lengths.max(axis=1)) & (across >= 0)
+        source = np.where(thin, across, np.arange(len(longest)))
+        for _ in range(4):  # slivers beside slivers: twice as far each time
+            source = source[source]
+        return (cross / np.maximum(double, np.finfo(np.float64).tiny)[:, None])[source]
+
+    @cached_property
+    def _around(self) -> tuple[IntArray, IntArray]:
+        """Return the triangles at each vertex one after another (3 m,), and where those of each begin (n + 1,)."""
+        order = np.argsort(self.faces.ravel(), kind="stable")
+        counts = np.bincount(self.faces.ravel(), minlength=len(self.vertices))
+        return np.concatenate([[0], np.cumsum(counts)]), order // 3
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _best_aligned(
+    points: Array,
+    given: Array,
+    reach: Array,
+    found: IntArray,
+    vertices: Array,
+    faces: IntArray,
+    normals: Array,
+    starts: IntArray,
+    around: IntArray,
+) -> IntArray:
+    """Return of the triangles at the corners of `found` (k,) that are within `reach` (k,) the one that agrees best."""
+    best = found.copy()
+    for i in range(len(points)):
+        agreement = np.dot(normals[found[i]], given[i])
+        for corner in faces[found[i]]:
+            for t in around[starts[corner] : starts[corner + 1]]:
+                other = np.dot(normals[t], given[i])
+                if other > agreement + AGREES and _distance(points[i], vertices, faces[t]) <= reach[i]:
+                    best[i], agreement = t, other
+    return best
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _distance(point: Array, vertices: Array, face: IntArray) -> float:
+    """Return the distance of a point (3,) to a triangle: to its inside, or to the nearest of its sides."""
+    normal = np.cross(vertices[face[1]] - vertices[face[0]], vertices[face[2]] - vertices[face[0]])
+    inside, nearest = True, np.inf
+    for k in range(3):
+        start, end = vertices[face[k]], vertices[face[(k + 1) % 3]]
+        along, away = end - start, point - start
+        inside = inside and np.dot(np.cross(along, away), normal) >= 0.0
+        share = np.dot(away, along) / max(np.dot(along, along), 1e-300)
+        nearest = min(nearest, float(np.linalg.norm(away - min(max(share, 0.0), 1.0) * along)))
+    size = float(np.linalg.norm(normal))
+    return float(abs(np.dot(point - vertices[face[0]], normal))) / size if inside and size > 0.0 else nearest
