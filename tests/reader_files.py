@@ -107,8 +107,11 @@ def msh41_binary(order, parametric):
     nodes += b"".join(packed("3d", *p) + packed("2d", 0.5, 0.5) * parametric for p in CUBE)
     elements = packed("4q", 1, 12, 1, 12) + packed("3iq", 2, 1, 2, 12)
     elements += b"".join(packed("4q", i, *(NUMBERS[k] for k in face)) for i, face in enumerate(TRIANGLES))
+    entities = packed("4q", 1, 0, 1, 0) + packed("i3dq", 1, 0, 0, 0, 0)
+    entities += packed("i6dq2iq", 1, *[0.0] * 6, 2, 5, 8, 0)  # in two physical groups
     form = b"$MeshFormat\n4.1 1 8\n" + packed("i", 1) + b"\n$EndMeshFormat\n"
-    return form + b"$Nodes\n%b\n$EndNodes\n$Elements\n%b\n$EndElements\n" % (nodes, elements)
+    sections = {b"Entities": entities, b"Nodes": nodes, b"Elements": elements}
+    return form + b"".join(b"$%b\n%b\n$End%b\n" % (name, body, name) for name, body in sections.items())
 
 
 def msh2_binary(order, several):

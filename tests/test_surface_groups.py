@@ -8,7 +8,7 @@ import pytest
 import pyvista
 import trimesh
 from mesh_files import CUBE, QUADS, TRIANGLES, ball, joined, obj
-from reader_files import CORNERS, Ply, grid, msh2, msh2_binary, rows, save, section, vertices
+from reader_files import CORNERS, Ply, grid, msh2, msh2_binary, msh41_binary, rows, save, section, vertices
 
 from iga_nn.cli.commands import main
 from parameterize.surface.decimation import decimate
@@ -160,6 +160,7 @@ def test_physical_groups_of_binary_msh_4_1(order, tmp_path):
     for name, body in ((b"Entities", entities), (b"Nodes", nodes), (b"Elements", elements)):
         content += b"$%b\n%b\n$End%b\n" % (name, body, name)
     check_groups(load_surface(write(tmp_path, "a.msh", content)), {"inlet": [0]})
+    check_groups(load_surface(write(tmp_path, "b.msh", msh41_binary(order, 0))), {"5": range(6), "8": range(6)})
 
 
 @pytest.mark.parametrize(("mode", "compressor"), [("ascii", None), ("binary", "ZLib"), ("appended", "LZ4")])

@@ -138,8 +138,9 @@ def _text_elements_2(source: Text, count: int) -> Iterator[Block]:
         number, tags = numbers[at + 1 : at + 3]
         _check_tags(tags)
         start, at = at + 3 + tags, at + 3 + tags + _kind(number)[1]
+        marks = numbers[start - tags : start]
         rows.setdefault(number, []).append(numbers[start:at])
-        physical.setdefault(number, []).append(numbers[start - tags] if tags else 0)
+        physical.setdefault(number, []).append(marks[0] if marks else 0)
     if at > len(numbers):
         raise MeshError(f"$Elements of the .msh ends within its last element; {DAMAGED}")
     for number, found in rows.items():

@@ -35,17 +35,18 @@ def physical_of_entities(source: Source, version: str) -> Physical:
         for _ in range(count):
             number = source.whole(1)[0]
             source.table(1, [("f8", 3 if dimension == 0 and version == "4.1" else 6)])
-            found[dimension, number] = source.whole(_counted(source))
+            found[dimension, number] = _listed(source)
             if dimension > 0:
-                source.whole(_counted(source))
+                _listed(source)
     return found
 
 
-def _counted(source: Source) -> int:
+def _listed(source: Source) -> list[int]:
+    """Read a count, then as many numbers."""
     count = source.large(1)[0]
     if count < 0:
         raise MeshError(f"an entity with {count} groups or neighbours in the .msh; {DAMAGED}")
-    return count
+    return source.whole(count) if count else []
 
 
 def groups_of(
