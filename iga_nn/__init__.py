@@ -30,6 +30,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "Poisson": "solve",
     "PoissonOptions": "iga_nn.options",
     "Problem": "solve",
+    "Region": "solve",
     "SplineField": "solve",
     "Surface": "parameterize.surface.surface",
     "System": "solve",

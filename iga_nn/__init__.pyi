@@ -10,6 +10,7 @@ from solve import Elasticity as Elasticity
 from solve import Form as Form
 from solve import Poisson as Poisson
 from solve import Problem as Problem
+from solve import Region as Region
 from solve import SplineField as SplineField
 from solve import System as System
 from solve import convergence as convergence

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
@@ -155,6 +157,12 @@ class PoissonOptions(ProblemOptions):
         neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for that of the exact solution.
         robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
             solution.
+        value: regions of the boundary with given values of u, each as "REGION=FORMULA", or REGION for zero or the exact
+            solution. A region is a condition on position and outward normal, "nz > 0.9 and x < 2", a face of the part,
+            "face(x, y, z)", a group of the mesh, group:NAME, a box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where
+            regions are given, all else of the boundary has no flux, and the source is zero unless it is given.
+        flux: regions with a given flux kappa du/dn into the body, each as "REGION=FORMULA".
+        exchange: regions where kappa du/dn = alpha (outside - u), each as "REGION=ALPHA:OUTSIDE".
 
     Examples:
         >>> import iga_nn
@@ -168,6 +176,9 @@ class PoissonOptions(ProblemOptions):
     reaction: Formula | None = None
     neumann: tuple[str, ...] = ()
     robin: tuple[str, ...] = ()
+    value: tuple[str, ...] = ()
+    flux: tuple[str, ...] = ()
+    exchange: tuple[str, ...] = ()
 
     section: ClassVar[str] = "poisson"
     title: ClassVar[str] = "Poisson's equation"
@@ -192,6 +203,9 @@ class PoissonOptions(ProblemOptions):
                 reaction=self.reaction,
                 neumann=_faces("neumann", self.neumann),
                 robin=robin,
+                value=_on_regions("value", self.value, str),
+                inflow=_on_regions("flux", self.flux, str),
+                exchange=_on_regions("exchange", self.exchange, _pair),
             )
 
 
@@ -212,6 +226,15 @@ class ElasticityOptions(ProblemOptions):
             that of the exact solution.
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
+        fix: regions of the boundary that are held, each as REGION, or "REGION=VECTOR" for a given displacement; an
+            entry of the vector that is left out is free: "x < 1=0;;". A region is a condition on position and outward
+            normal, "nz > 0.9 and x < 2", a face of the part, "face(x, y, z)", a group of the mesh, group:NAME, a
+            box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where regions are given, all else of the boundary is free.
+        roller: regions held along their normal alone.
+        symmetry: the same: where a plane of symmetry cuts the body.
+        load: regions with a force per area, each as "REGION=VECTOR".
+        pressure: regions with a force per area against the outward normal, each as "REGION=FORMULA".
+        spring: regions on an elastic foundation, force per area and displacement, each as "REGION=FORMULA".
 
     Examples:
         >>> import iga_nn
@@ -224,6 +247,12 @@ class ElasticityOptions(ProblemOptions):
     traction: tuple[str, ...] = ()
     young: float = 1.0
     poisson_ratio: float = 0.3
+    fix: tuple[str, ...] = ()
+    roller: tuple[str, ...] = ()
+    symmetry: tuple[str, ...] = ()
+    load: tuple[str, ...] = ()
+    pressure: tuple[str, ...] = ()
+    spring: tuple[str, ...] = ()
 
     section: ClassVar[str] = "elasticity"
     title: ClassVar[str] = "linear elasticity"
@@ -233,8 +262,11 @@ class ElasticityOptions(ProblemOptions):
         from solve import Elasticity
 
         check_space(self.refine, self.degree)
-        if self.exact is None and self.body_force is None and self.displacement is None and not self.traction:
-            raise InputError("no load is given: --traction 'u1=0;0;-1', --body-force '0;0;-1' or --displacement")
+        loads = self.exact, self.body_force, self.displacement, self.traction, self.load, self.pressure, self.fix
+        if not any(loads):
+            raise InputError(
+                "no load is given: --load 'nz > 0.9=0;0;-1', --pressure, --body-force '0;0;-1' or --traction"
+            )
         traction = _faces("traction", self.traction)
         with input_errors():
             return Elasticity(
@@ -244,6 +276,12 @@ class ElasticityOptions(ProblemOptions):
                 traction={face: _vector(f"--traction {face}", text) for face, text in traction.items()},
                 young=self.young,
                 poisson_ratio=self.poisson_ratio,
+                fix=_on_regions("fix", self.fix, _parts),
+                roller=_on_regions("roller", self.roller, str),
+                symmetry=_on_regions("symmetry", self.symmetry, str),
+                load=_on_regions("load", self.load, partial(_vector, "--load")),
+                pressure=_on_regions("pressure", self.pressure, str),
+                spring=_on_regions("spring", self.spring, str),
             )
 
 
@@ -406,6 +444,42 @@ def _faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
             raise InputError(f"{name}: face {face} is given twice")
         found[face] = text if equals else None
     return found
+
+
+def _on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) -> dict[str, Any] | None:
+    """Return REGION=DATA and REGION entries as a table, None without entries. Raises InputError for a region twice.
+
+    read: makes data of their text; an entry without data has None. The = of <= and >=, and what stands between quotes,
+    belongs to the region.
+    """
+    found: dict[str, Any] = {}
+    for entry in entries:
+        split = _EQUALS.search(_QUOTED.sub(lambda text: "." * len(text[0]), entry))
+        region = (entry if split is None else entry[: split.start()]).strip()
+        if not region:
+            raise InputError(f"{kind} {entry!r:.80}: write a region before the =, such as 'nz > 0.9'")
+        if region in found:
+            raise InputError(f"{kind}: region {region!r:.80} is given twice")
+        found[region] = None if split is None else read(entry[split.end() :].strip())
+    return found or None
+
+
+_EQUALS = re.compile("(?<![<>=])=(?!=)")
+_QUOTED = re.compile("\"[^\"]*\"|'[^']*'")
+
+
+def _pair(text: str) -> tuple[str, str]:
+    """Return a factor and what the outside has, from ALPHA:OUTSIDE. Raises InputError."""
+    factor, colon, outside = text.partition(":")
+    if not (factor.strip() and colon and outside.strip()):
+        raise InputError(f"exchange {text!r:.80}: write REGION=ALPHA:OUTSIDE, such as 'nz > 0.9=25:20'")
+    return factor, outside
+
+
+def _parts(text: str) -> list[str | None] | None:
+    """Return the formulas of a vector, None for an entry that is left out."""
+    entries = _vector("--fix", text)
+    return None if entries is None else [entry if entry.strip() else None for entry in entries]
 
 
 def _vector(flag: str, text: str | None) -> list[str] | None:

@@ -25,9 +25,11 @@ from .forms.parser import Expression as Expression
 from .forms.parser import ExpressionError as ExpressionError
 from .forms.poisson import Poisson as Poisson
 from .forms.problem import Problem as Problem
+from .forms.region import Region as Region
 from .integrals import integrate as integrate
 from .integrals import resultant as resultant
 from .quantities import Extremes as Extremes
+from .reactions import Balance as Balance
 from .solution import Solution as Solution
 from .solution import SolveReport as SolveReport
 from .solver import check_problem as check_problem

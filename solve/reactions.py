@@ -32,8 +32,8 @@ class Balance:
     areas : dict of str to float
         By condition, the area of its region.
     imbalance : float or None
-        The largest component of the sum of load and reactions, over the sum of their sizes: what the linear solver left.
-        None for a law with a reaction, which takes its part inside.
+        The largest component of the sum of load and reactions, over the sum of their sizes: what the linear solver
+        left. None for a law with a reaction, which takes its part inside.
 
     Examples
     --------

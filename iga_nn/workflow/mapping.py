@@ -31,6 +31,7 @@ from ..report import document as reports
 from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
+from .regions import check_regions
 from .verdict import tell
 
 if TYPE_CHECKING:
@@ -180,6 +181,10 @@ def _check_data(equation: Equation, surface: Surface) -> None:
     for _, notice in empty_formulas(equation, points):
         log.warning("%s", notice)
     normals = vertex_normals(surface.vertices, surface.faces)
+    if equation.conditions:
+        with input_errors():
+            check_regions(equation.on_surface(surface.part), surface)
+        return
     for face in FACE_NAMES:
         if face not in equation.dirichlet:
             _check_somewhere(partial(equation.on_face, face), surface.vertices, normals)

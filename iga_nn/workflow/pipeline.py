@@ -121,10 +121,11 @@ def parameterize_to(
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
             return _finished_by(command, state.finished, vector, problem)
-        volume = map_surface(state, mesh, mapping, progress, command, equation, unknowns).volume
+        result = map_surface(state, mesh, mapping, progress, command, equation, unknowns)
         if problem is None or equation is None:
-            return _finish(state, volume)
-        return _finish(state, volume, solve_levels(state, volume, equation, problem), equation)
+            return _finish(state, result.volume)
+        equation = equation.on_surface(result.boundary.part)
+        return _finish(state, result.volume, solve_levels(state, result.volume, equation, problem), equation)
 
 
 def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, problem: ProblemOptions | None) -> str:
@@ -174,7 +175,7 @@ def solve_to(
     options, path = problem or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
-    equation = options.problem()
+    equation = with_part(options.problem(), path)
     loaded = load_volume(path)
     processes = 1 if comm is None else comm.size
     if comm is not None and processes == 1:
@@ -199,6 +200,22 @@ def solve_to(
             return None
         solution = solve_levels(state, loaded, equation, options, comm=comm, **elsewhere)
         return _finish(state, loaded, solution, equation)
+
+
+def with_part(equation: Equation, volume: Path) -> Equation:
+    """Return a problem whose regions know the surface that a volume was made of, where they name its faces or groups.
+
+    Raises InputError where boundary.npz is not beside the volume.
+    """
+    if not equation.needs_surface:
+        return equation
+    from parameterize.cube.boundary_map import read_part
+
+    beside = volume.with_name("boundary.npz")
+    if not beside.is_file():
+        raise InputError(f"{beside}: is not there, and without it group:NAME and face(x, y, z) mean nothing")
+    with input_errors():
+        return equation.on_surface(read_part(beside))
 
 
 def study_to(

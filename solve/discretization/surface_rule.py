@@ -153,7 +153,8 @@ class _Cutter:
             return None
         seen = self._seen(cells, SAMPLES)
         jumps = [np.count_nonzero(np.diff(seen, axis=1 + along), axis=(1, 2)) for along in (0, 1)]
-        parts = [self._lines_along(cells[chosen], along) for along, chosen in enumerate(_either(jumps))]
+        first = jumps[0] >= jumps[1]
+        parts = [self._lines_along(cells[chosen], along) for along, chosen in enumerate((first, ~first))]
         found = [part for part in parts if part is not None]
         return _joined(found) if found else None
 
@@ -213,11 +214,6 @@ def _quartered(cells: Array) -> Array:
         for j in (0, 1)
     ]
     return np.concatenate(parts)
-
-
-def _either(jumps: Sequence[IntArray]) -> tuple[Array, Array]:
-    first = jumps[0] >= jumps[1]
-    return first, ~first
 
 
 def _area_of_codes(*parts: SurfaceRule | None) -> dict[int, float]:

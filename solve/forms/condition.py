@@ -65,30 +65,31 @@ class Condition:
         return [unit for unit, is_free in zip(units, self.free or (False,) * components, strict=True) if not is_free]
 
 
-def conditions_of(components: int, exact: Any = None, **given: GivenRegions | None) -> tuple[Condition, ...]:
+def conditions_of(components: int, exact: Any = None, **kinds: GivenRegions | None) -> tuple[Condition, ...]:
     """Return the conditions that keywords of a problem give, each kind a dictionary of regions, or regions alone.
 
     Regions alone have the data of the exact solution, where there is one, and else zero.
     Raises ValueError for data of a wrong kind, ExpressionError for a region that is refused.
     """
     found = []
-    for kind, entries in given.items():
+    for kind, entries in kinds.items():
         if entries is None:
             continue
         pairs: Iterable[tuple[Any, Any]]
         if isinstance(entries, Mapping):
             pairs = [(region, data) for key, data in entries.items() for region in regions_of(key)]
         else:
-            data = None if exact is not None else _nothing(kind, components)
-            pairs = [(region, data) for region in regions_of(entries)]
-        found += [_condition(kind, region, data, components) for region, data in pairs]  # type: ignore[arg-type]
+            pairs = [(region, None) for region in regions_of(entries)]
+        for region, data in pairs:
+            given = _nothing(kind, region, components) if data is None and exact is None else data
+            found.append(_condition(kind, region, given, components))  # type: ignore[arg-type]
     return tuple(found)
 
 
-def _nothing(kind: str, components: int) -> Any:
-    """Return the data of a kind that is given by its regions alone. Raises ValueError where it needs data."""
+def _nothing(kind: str, region: Region, components: int) -> Any:
+    """Return the data of a kind that is given without any: zero. Raises ValueError for a kind that needs some."""
     if kind not in ESSENTIAL:
-        raise ValueError(f'{kind} needs data: a dictionary such as {{"z > 1": ...}}')
+        raise ValueError(f"{kind} {str(region)!r}: has no data")
     return 0.0 if kind in ALONG_NORMAL or components == 1 else [0.0] * components
 
 

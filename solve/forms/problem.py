@@ -19,6 +19,7 @@ from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
 from .jets import Jet, Numbers, coordinates, known
 from .parser import Expression
+from .region import Part
 
 Natural = Mapping[str, Data | None]
 Robin = Mapping[str, tuple[Data, Data | None]]
@@ -143,6 +144,18 @@ class BoundaryValueProblem:
         return any(formula.is_scaled for _, _, formula in self.formulas) or any(
             condition.region.is_scaled for condition in self.conditions
         )
+
+    def on_surface(self, part: Part) -> Self:
+        """Return the same problem with the faces and groups of its regions found on a part's surface mesh."""
+        other = copy(self)
+        regions = (replace(condition, region=condition.region.placed(surface=part)) for condition in self.conditions)
+        object.__setattr__(other, "conditions", tuple(regions))
+        return other
+
+    @property
+    def needs_surface(self) -> bool:
+        """Whether a face or a group of the part is among the regions, and its surface is not known."""
+        return any(c.region.needs_surface and c.region.surface is None for c in self.conditions)
 
     @property
     def fixes_nothing(self) -> bool:

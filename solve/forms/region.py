@@ -53,7 +53,7 @@ class Region:
         group:NAME, a group of the input mesh; and face(x, y, z), what is reached from the part's surface nearest to
         that point up to edges that bend by more than 30 degrees, or by a fourth number in degrees.
     surface : Part, optional
-        The part's surface mesh (`result.part`), which group:NAME and face(x, y, z) need.
+        The part's surface mesh (`result.boundary.part`), which group:NAME and face(x, y, z) need.
 
     Raises
     ------
@@ -135,6 +135,11 @@ class Region:
         return replace(self, frame=frame or self.frame, surface=self.surface or surface)
 
     @property
+    def needs_cube(self) -> bool:
+        """Whether a face of the cube occurs in the condition."""
+        return not self._used.isdisjoint(FACE_NAMES)
+
+    @property
     def needs_surface(self) -> bool:
         """Whether a group or a face of the part occurs in the condition."""
         return any(entry.startswith(("group ", "face ")) for entry in self._marks)
@@ -150,15 +155,16 @@ class Region:
         if self.is_scaled and self.frame is None:
             raise ExpressionError(f"region {self.text!r:.80}: X, Y, Z mean nothing without a volume")
         of_frame = scaled(self.frame, jets) if self.frame is not None else jets
-        values = [*jets, *of_frame, *(Jet(row, (), ()) for row in normal)]
+        values: list[Any] = [*jets, *of_frame, *(Jet(row, (), ()) for row in normal)]
         shape = x.shape[1:]
         values += [np.full(shape, name == face) for name in FACE_NAMES]
-        values += [self._marked(*entry.split(" ", 1), x, normal) for entry in self._marks[len(FACE_NAMES) :]]
+        values += [self._marked(entry, x, normal) for entry in self._marks[len(FACE_NAMES) :]]
         with np.errstate(all="ignore"):
             return np.broadcast_to(np.asarray(self._decide(values), dtype=bool), shape)
 
-    def _marked(self, kind: str, argument: str, x: Array, normal: Array) -> Mask:
+    def _marked(self, entry: str, x: Array, normal: Array) -> Mask:
         """Return at which points a box, a group or a face of the part lies."""
+        kind, argument = entry.split(" ", 1)
         if kind == "box":
             low, high = np.sort(np.reshape(_numbers(argument), (2, 3)), axis=0)
             sides = (slice(None), *[None] * (x.ndim - 1))
@@ -166,7 +172,8 @@ class Region:
             return inside
         if self.surface is None:
             raise ValueError(
-                f"region {self.text!r:.80}: {kind} needs the part's surface: Region({self.text!r:.40}, result.part)"
+                f"region {self.text!r:.80}: {kind} needs the part's surface, result.boundary.part, as the second "
+                "argument of Region"
             )
         members = self._members(kind, argument)
         found = self.surface.nearest(x.reshape(3, -1).T, normal.reshape(3, -1).T)
@@ -187,7 +194,7 @@ def regions_of(given: Region | str | Sequence[Region | str]) -> list[Region]:
     if isinstance(given, Region):
         return [given]
     if isinstance(given, str) or not isinstance(given, Sequence):
-        return [Region(given)]  # type: ignore[arg-type]
+        return [Region(given)]
     return [region for entry in given for region in regions_of(entry)]
 
 
