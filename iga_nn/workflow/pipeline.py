@@ -203,15 +203,15 @@ def solve_to(
 
 
 def with_part(equation: Equation, volume: Path) -> Equation:
-    """Return a problem whose regions know the surface that a volume was made of, where they name its faces or groups.
+    """Return a problem whose regions know the surface that a volume was made of, from the boundary.npz beside it.
 
-    Raises InputError where boundary.npz is not beside the volume.
+    Raises InputError where regions name faces or groups of that surface, and there is no such file.
     """
-    if not equation.needs_surface:
+    beside = volume.with_name("boundary.npz")
+    if not equation.conditions or not (equation.needs_surface or beside.is_file()):
         return equation
     from parameterize.cube.boundary_map import read_part
 
-    beside = volume.with_name("boundary.npz")
     if not beside.is_file():
         raise InputError(f"{beside}: is not there, and without it group:NAME and face(x, y, z) mean nothing")
     with input_errors():

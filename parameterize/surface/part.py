@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import igl
 import numba
@@ -65,7 +66,7 @@ class PartSurface(Brief):
         outward normal agrees best with the given one is taken.
         """
         where = np.ascontiguousarray(points, dtype=np.float64)
-        squared, index, _ = igl.point_mesh_squared_distance(where, self.vertices, self.faces)
+        squared, index, _ = self._tree.squared_distance(self.vertices, self.faces, where)
         found = np.asarray(index, dtype=np.int64).reshape(-1)
         if normals is None or not len(where):
             return found
@@ -73,7 +74,7 @@ class PartSurface(Brief):
         given = np.ascontiguousarray(normals, dtype=np.float64)
         given = given / np.maximum(np.linalg.norm(given, axis=1, keepdims=True), np.finfo(np.float64).tiny)
         starts, around = self._around
-        return _best_aligned(where, given, reach, found, self.vertices, self.faces, self._normals, starts, around)
+        return _best_aligned(where, given, reach, found, self.vertices, self.faces, self.normals, starts, around)
 
     def flood(self, triangle: int, angle: float = SHARP) -> IntArray:
         """Return the triangles (k,), ascending, reached from one across edges that bend by less than `angle` degrees.
@@ -85,7 +86,7 @@ class PartSurface(Brief):
         sides = self._neighbours
         first, side = np.nonzero(sides >= 0)
         second = sides[first, side]
-        smooth = np.sum(self._normals[first] * self._normals[second], axis=1) > np.cos(np.radians(angle))
+        smooth = np.sum(self.normals[first] * self.normals[second], axis=1) > np.cos(np.radians(angle))
         label = connected(np.stack([first[smooth], second[smooth]], axis=1), len(self.faces))
         return np.flatnonzero(label == label[triangle])
 
@@ -93,6 +94,13 @@ class PartSurface(Brief):
     def _diagonal(self) -> float:
         used = self.vertices[self.faces.ravel()]
         return float(np.linalg.norm(np.ptp(used, axis=0)))
+
+    @cached_property
+    def _tree(self) -> Any:
+        """Return the tree of boxes in which the nearest triangle is sought."""
+        tree = igl.AABB()
+        tree.init(self.vertices, self.faces)
+        return tree
 
     @cached_property
     def _neighbours(self) -> IntArray:
@@ -105,7 +113,7 @@ class PartSurface(Brief):
         return found.reshape(-1, 3)
 
     @cached_property
-    def _normals(self) -> Array:
+    def normals(self) -> Array:
         """Return unit normals (m, 3); a triangle too low to have one has that of its neighbour at its longest side."""
         cross = doubled_areas(self.vertices, self.faces)
         double = np.linalg.norm(cross, axis=1)

@@ -30,6 +30,10 @@ Mask = NDArray[np.bool_]
 class Part(Protocol):
     """The surface mesh of a part, as regions ask it."""
 
+    @property
+    def normals(self) -> Array:
+        """The outward unit normals (m, 3) of the triangles."""
+
     def group(self, name: str) -> IntArray:
         """Return the triangles (k,) of a group of the mesh. Raises ValueError for a name that there is not."""
 
@@ -53,7 +57,8 @@ class Region:
         group:NAME, a group of the input mesh; and face(x, y, z), what is reached from the part's surface nearest to
         that point up to edges that bend by more than 30 degrees, or by a fourth number in degrees.
     surface : Part, optional
-        The part's surface mesh (`result.boundary.part`), which group:NAME and face(x, y, z) need.
+        The part's surface mesh (`result.boundary.part`), which group:NAME and face(x, y, z) need. Where it is known,
+        normals are those of its triangles: a spline rounds the edges off, and there its own normals turn.
 
     Raises
     ------
@@ -142,7 +147,12 @@ class Region:
     @property
     def needs_surface(self) -> bool:
         """Whether a group or a face of the part occurs in the condition."""
-        return any(entry.startswith(("group ", "face ")) for entry in self._marks)
+        return bool(self._of_part)
+
+    @property
+    def _of_part(self) -> list[str]:
+        """The marks that are groups or faces of the part."""
+        return [f"_mark{i}" for i, entry in enumerate(self._marks) if entry.startswith(("group ", "face "))]
 
     def holds(self, x: Array, normal: Array, face: str = "") -> Mask:
         """Return at which of the points (3, ...) with outward unit normals (3, ...) the condition holds, (...).
@@ -155,29 +165,31 @@ class Region:
         if self.is_scaled and self.frame is None:
             raise ExpressionError(f"region {self.text!r:.80}: X, Y, Z mean nothing without a volume")
         of_frame = scaled(self.frame, jets) if self.frame is not None else jets
+        nearest = None
+        if self.surface is not None and not self._used.isdisjoint((*NORMAL, *self._of_part)):
+            nearest = self.surface.nearest(x.reshape(3, -1).T, normal.reshape(3, -1).T).reshape(x.shape[1:])
+            normal = np.moveaxis(self.surface.normals[nearest], -1, 0)
         values: list[Any] = [*jets, *of_frame, *(Jet(row, (), ()) for row in normal)]
         shape = x.shape[1:]
         values += [np.full(shape, name == face) for name in FACE_NAMES]
-        values += [self._marked(entry, x, normal) for entry in self._marks[len(FACE_NAMES) :]]
+        values += [self._marked(entry, x, nearest) for entry in self._marks[len(FACE_NAMES) :]]
         with np.errstate(all="ignore"):
             return np.broadcast_to(np.asarray(self._decide(values), dtype=bool), shape)
 
-    def _marked(self, entry: str, x: Array, normal: Array) -> Mask:
-        """Return at which points a box, a group or a face of the part lies."""
+    def _marked(self, entry: str, x: Array, nearest: IntArray | None) -> Mask:
+        """Return at which points, with nearest triangles of the part (...), a box, a group or a face of it lies."""
         kind, argument = entry.split(" ", 1)
         if kind == "box":
             low, high = np.sort(np.reshape(_numbers(argument), (2, 3)), axis=0)
             sides = (slice(None), *[None] * (x.ndim - 1))
             inside: Mask = np.all((x >= low[sides]) & (x <= high[sides]), axis=0)
             return inside
-        if self.surface is None:
+        if nearest is None:
             raise ValueError(
                 f"region {self.text!r:.80}: {kind} needs the part's surface, result.boundary.part, as the second "
                 "argument of Region"
             )
-        members = self._members(kind, argument)
-        found = self.surface.nearest(x.reshape(3, -1).T, normal.reshape(3, -1).T)
-        return np.isin(found, members).reshape(x.shape[1:])
+        return np.isin(nearest, self._members(kind, argument))
 
     def _members(self, kind: str, argument: str) -> IntArray:
         """Return the triangles (k,) of a group or a face of the part."""
