@@ -1,6 +1,7 @@
 """Solves a problem on the volume of an output folder, level after level, and writes what is found."""
 
 import logging
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -16,6 +17,7 @@ from ..errors import InputError, input_errors, one_line
 from ..options import Equation, ProblemOptions
 from ..report import document as reports
 from ..report import html
+from ..report.extremes import growth_notices
 from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
@@ -29,23 +31,40 @@ def solve_levels(
     solution.npz holds the finest so far. solver: keywords of `solve.solve_problem`.
     """
     solutions: list[Solution] = []
+    levels: list[dict[str, Any]] = []
     with reported(state, volume), state.timed("solve"):
         for solution in each_level(volume, equation, options, certified=verdict_of(state), **solver):
             solution.save(state.folder / "solution.npz")
             solutions.append(solution)
+            levels.append(level_of(solution))
     found = [solution.report for solution in solutions]
+    growth = growth_notices(levels)
+    for notice in growth:
+        log.warning("%s", notice)
     asked = {name: given for name, given in asdict(options).items() if name not in ("refine", "degree")}
     known = asked | described(equation, volume)
     state.write(
         **{
             options.section: {name: value for name, value in known.items() if value is not None and value != ()}
-            | {"levels": [item.as_dict() for item in found], "rates": rates(found), "notices": notices_of(found)}
+            | {"levels": levels, "rates": rates(found), "notices": [*notices_of(found), *growth]}
         }
     )
     _draw(state, volume, solutions, equation)
     if len(equation.dirichlet) < 6:  # the user names faces: show which is which
         state.draw("solution", named_volume=volume)
     return solutions[-1]
+
+
+def level_of(solution: Solution) -> dict[str, Any]:
+    """Return a level of report.json: the report of its solve and the extremes, where the solution has finite ones."""
+    level, extremes = solution.report.as_dict(), {}
+    started = time.process_time()
+    try:
+        extremes = {name: found.as_dict() for name, found in solution.all_extremes().items()}
+    except ValueError as error:  # not finite: the solver broke down, or det J is zero somewhere
+        log.info("no extremes are told: %s", one_line(error))
+    seconds = level["seconds"] | {"extremes": time.process_time() - started}
+    return level | {"extremes": extremes, "seconds": seconds}
 
 
 def each_level(volume: BSplineVolume, equation: Equation, options: ProblemOptions, **solver: Any) -> Iterator[Solution]:
