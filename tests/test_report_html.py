@@ -35,6 +35,13 @@ def drawn(image: np.ndarray) -> np.ndarray:
     return pixels[(pixels[:, 1] > 0.35) & (pixels[:, 2] > 0.2)]
 
 
+def test_extremes_stand_beside_each_other_with_their_place(result):
+    text = (result / "report.html").read_text()
+    assert "<tr><td>u at most</td><td>1</td><td>1</td><td>at (1, 1, 1)</td></tr>" in text.replace("\n", "")
+    found = json.loads((result / "report.json").read_text())["poisson"]["levels"][1]["extremes"]
+    assert found["u"]["largest"] == pytest.approx(1.0) and found["u"]["largest_at"] == pytest.approx([1.0] * 3)
+
+
 @pytest.mark.parametrize("width", [1280, 400])
 def test_browser_draws_the_scene_and_fetches_nothing(chromium, result, tmp_path, width):
     image, console, asked = browse(chromium, tmp_path, f"{(result / 'report.html').as_uri()}", width)

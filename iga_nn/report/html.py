@@ -17,6 +17,7 @@ from ..errors import one_line
 from ..levels import TITLES, as_rows, capitalized
 from ..rounding import rounded
 from . import document as reports
+from . import extremes
 from .advice import in_words
 from .artifacts import PAGE, SOLVED, figures_of
 from .document import Report
@@ -77,6 +78,7 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         advice=in_words(report),
         exact=section.get("exact"),
         levels=_levels(section),
+        extremes=extremes.table(section),
         notices=_notices(report),
         figures=_figures(report, folder),
         details=_details(report),
