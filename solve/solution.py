@@ -180,7 +180,7 @@ class Solution(SplineField, Shown):
         by default stress and von_mises of elasticity, gradient and flux of other laws. () for none.
         Raises ValueError for a name the law does not give, and for quantities without samples.
         """
-        return above("io.vtk").grid(self.geometry, self, self.problem, samples, quantities)
+        return above("io.view").grid(self.geometry, self, self.problem, samples, quantities)
 
     def to_splinepy(self) -> Any:
         """Return u_h as a splinepy.BSpline of one coordinate, or of three for displacements, in the parameters.

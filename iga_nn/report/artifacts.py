@@ -55,6 +55,9 @@ _ERROR = (*_SOLVED, "problem")
 ARTIFACTS = (  # in the order of the pages
     Artifact("volume.npz", "map", "the spline volume", arrays=(*_KNOTS, "control_points")),
     Artifact("solution.npz", "solution", "the solution on the finest mesh", arrays=(*_KNOTS, "coefficients")),
+    Artifact(
+        "solution.vtu", "solution", "the solution with stress, or gradient and flux, on linear cells for ParaView"
+    ),
     Artifact("boundary.npz", "map", "the map from the surface to the cube's faces", arrays=_BOUNDARY),
     Artifact(PAGE, "report", "the report to read: verdict, figures, tables and an interactive view, in one file"),
     Artifact(REPORT, "report", "the report for programs: input, configuration, versions, certificate, errors, seconds"),

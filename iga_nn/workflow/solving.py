@@ -49,6 +49,7 @@ def solve_levels(
             | {"levels": levels, "rates": rates(found), "notices": [*notices_of(found), *growth]}
         }
     )
+    _write_cells(state, solutions[-1])
     _draw(state, volume, solutions, equation)
     if len(equation.dirichlet) < 6:  # the user names faces: show which is which
         state.draw("solution", named_volume=volume)
@@ -101,6 +102,19 @@ def reported(state: RunFolder, volume: BSplineVolume) -> Iterator[None]:
 def verdict_of(state: RunFolder) -> str:
     """Return the verdict on det J, which every solve on the volume repeats."""
     return str(state.report["parameterization"]["bijective"])
+
+
+def _write_cells(state: RunFolder, solution: Solution) -> None:
+    """Write solution.vtu, where the solution is finite; a failure ends no run."""
+    if not np.all(np.isfinite(solution.coefficients)):
+        return
+    with state.timed("report"), state.drawing("solution.vtu"):
+        from ..io import view
+
+        spans = view.write_solution(state.folder / "solution.vtu", solution)
+        if spans > 1:
+            every = "`iga-nn export --to view --samples 1` writes one for each"
+            log.info("solution.vtu: a cell stands for %d x %d x %d elements; %s", spans, spans, spans, every)
 
 
 def _draw(state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation) -> None:
