@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 Equation: TypeAlias = "Poisson | Elasticity | Problem"
 Formula = str  # one that starts with a minus is written --option=-x
 
+LONGEST_UNIT = 20  # letters
 MAX_REFINE = 6
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
 MAX_WORKERS = 256  # on one machine
@@ -117,6 +118,7 @@ class ProblemOptions(Checked, ABC):
         degree: degree of the trial space; that of the map by default.
         quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
             points a span; "gauss", degree points a span.
+        unit: of lengths, such as mm: free text, which stands behind lengths and places and changes no number.
     """
 
     exact: Formula | None = None
@@ -124,6 +126,7 @@ class ProblemOptions(Checked, ABC):
     refine: tuple[int, ...] = (0, 1)
     degree: int | None = None
     quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
+    unit: str | None = None
 
     section: ClassVar[str]  # its name on the command line and in report.json
     title: ClassVar[str]
@@ -131,6 +134,14 @@ class ProblemOptions(Checked, ABC):
     @abstractmethod
     def problem(self) -> Equation:
         """Return the problem of these options. Raises InputError."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("unit", "stress_unit"):
+            text = getattr(self, name, None)
+            if text is not None and not (text.strip() and text.isprintable() and len(text) <= LONGEST_UNIT):
+                flag = "--" + name.replace("_", "-")
+                raise InputError(f"{flag} {text!r:.80}: give a short text such as mm, at most {LONGEST_UNIT} letters")
 
     def solver(self) -> dict[str, Any]:
         """Return the keywords of `solve.solve_problem` that are the same on every level."""
@@ -212,6 +223,7 @@ class ElasticityOptions(ProblemOptions):
             that of the exact solution.
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
+        stress_unit: of stresses, such as MPa: free text, which stands behind stresses and changes no number.
 
     Examples:
         >>> import iga_nn
@@ -224,6 +236,7 @@ class ElasticityOptions(ProblemOptions):
     traction: tuple[str, ...] = ()
     young: float = 1.0
     poisson_ratio: float = 0.3
+    stress_unit: str | None = None
 
     section: ClassVar[str] = "elasticity"
     title: ClassVar[str] = "linear elasticity"

@@ -48,7 +48,7 @@ def test_least_and_largest_value_of_a_scalar():
 @pytest.mark.parametrize("levels", [[], [{"h": 1.0, "dofs": 8}], [{"h": 1.0, "dofs": 8, "extremes": {}}]])
 def test_reports_without_extremes(levels):
     assert extremes.lines({"levels": levels}) == extremes.table({"levels": levels}) == []
-    assert extremes.growth_notices(levels * 2) == []
+    assert extremes.growth_notices({"levels": levels * 2}) == []
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,11 @@ def test_reports_without_extremes(levels):
     [(level(0.5, von_mises=109.0), False), (level(0.5, von_mises=111.0), True), (level(0.25, von_mises=120.0), False)],
 )
 def test_growth_is_that_of_a_halved_h(fine, grows):
-    notices = extremes.growth_notices([level(1.0, von_mises=100.0), fine])
+    notices = extremes.growth_notices({"levels": [level(1.0, von_mises=100.0), fine], "stress_unit": "MPa"})
     assert bool(notices) == grows
     if grows:
-        assert "grew from 100 to 111" in notices[0] and "at (12.5, 0, 3.1)" in notices[0] and "infinite" in notices[0]
+        assert (
+            "grew from 100 to 111 MPa under" in notices[0]
+            and "at (12.5, 0, 3.1)" in notices[0]
+            and "infinite" in notices[0]
+        )

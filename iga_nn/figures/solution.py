@@ -22,22 +22,36 @@ from .style import PANEL, color_bar, colors, panels_of, save, show_around, show_
 
 
 def draw_error(
-    path: str | Path | None, volume: BSplineVolume, solution: Solution, problem: BoundaryValueProblem
+    path: str | Path | None,
+    volume: BSplineVolume,
+    solution: Solution,
+    problem: BoundaryValueProblem,
+    unit: str | None = None,
 ) -> Figure:
-    """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms."""
+    """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms.
+
+    unit: of u, which stands beside the colour bar, as in all figures here.
+    """
     field = error_of(volume, solution, problem)
     figure, rows = panels_of(2, 3)
     patches = _colored(points_of(volume).patches, field)
     show_around(rows[0][:2], patches[:6])
     _write_numbers(rows[0][2], solution)
     _show_sections(rows[1], patches[6:])
-    color_bar(figure, rows, field.limits, r"$|u - u_h|$")
+    color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", unit))
     return save(figure, path, "Error on the boundary and on the mid-sections")
 
 
-def draw_solution(path: str | Path | None, volume: BSplineVolume, solution: SplineField) -> Figure:
+def draw_solution(
+    path: str | Path | None, volume: BSplineVolume, solution: SplineField, unit: str | None = None
+) -> Figure:
     """Draw u_h, or the length of a vector u_h, as `draw_values` does."""
-    return draw_values(path, volume, solution, solution_of(solution).title)
+    return draw_values(path, volume, solution, with_unit(solution_of(solution).title, unit))
+
+
+def with_unit(title: str, unit: str | None) -> str:
+    """Return the label of a colour bar; a dollar of the unit begins no formula of matplotlib."""
+    return title if unit is None else title + " [" + unit.replace("$", r"\$") + "]"
 
 
 def draw_values(

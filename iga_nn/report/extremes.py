@@ -38,10 +38,9 @@ def table(section: dict[str, Any]) -> list[list[str]]:
     return [["", *(f"{level['dofs']:,} unknowns" for level in _known(section)), "where"], *rows] if rows else []
 
 
-def growth_notices(levels: Sequence[Level]) -> list[str]:
+def growth_notices(section: dict[str, Any]) -> list[str]:
     """Return a notice where the largest stress, or gradient, grew by more than GROWTH for each time h was halved."""
-    known = [level for level in levels if level.get("extremes")]
-    if len(known) < 2:
+    if len(known := _known(section)) < 2:
         return []
     coarse, fine = known[-2:]
     for name, title in DERIVATIVES.items():
@@ -49,18 +48,25 @@ def growth_notices(levels: Sequence[Level]) -> list[str]:
             continue
         before, now = (level["extremes"][name]["largest"] for level in (coarse, fine))
         if before > 0.0 and now > before * GROWTH ** math.log2(coarse["h"] / fine["h"]):
+            grew = f"grew from {before:.4g} to {now:.4g}{_behind(section.get(SAYINGS[name][2]))}"
+            where = _place(fine["extremes"][name]["largest_at"], section)
             return [
-                f"the largest {title} grew from {before:.4g} to {now:.4g} under the last refinement, at "
-                f"{place(fine['extremes'][name]['largest_at'])}: where it keeps growing, as at a clamped rim or a "
-                "re-entrant edge, it is infinite there and the number is no result; one more --refine tells"
+                f"the largest {title} {grew} under the last refinement, at {where}: where it keeps growing, as at a "
+                "clamped rim or a re-entrant edge, it is infinite there and the number is no result; one more --refine "
+                "tells"
             ]
     return []
 
 
-def place(point: Sequence[float]) -> str:
-    """Return a point for a reader: "(12.5, 0, 3.1)"."""
+def _place(point: Sequence[float], section: dict[str, Any]) -> str:
+    """Return a point for a reader: "(12.5, 0, 3.1) mm"."""
     least = TINY * max(map(abs, point))
-    return f"({', '.join(f'{x if abs(x) > least else 0.0:.4g}' for x in point)})"
+    coordinates = ", ".join(f"{x if abs(x) > least else 0.0:.4g}" for x in point)
+    return f"({coordinates}){_behind(section.get('unit'))}"
+
+
+def _behind(unit: str | None) -> str:
+    return f" {unit}" if unit else ""
 
 
 def _known(section: dict[str, Any]) -> list[Level]:
@@ -72,13 +78,14 @@ def _rows(section: dict[str, Any]) -> list[list[str]]:
     levels, found = _known(section), []
     for name in levels[-1]["extremes"] if levels else ():
         said, end, unit = SAYINGS.get(name, (f"{name} at most", "largest", ""))
-        found.append(_row(levels, name, said, end, section.get(unit), section.get("unit")))
+        found.append(_row(section, name, said, end, unit))
         if name == "u":
-            found.append(_row(levels, name, "u at most", "largest", None, section.get("unit")))
+            found.append(_row(section, name, "u at most", "largest", unit))
     return found
 
 
-def _row(levels: Sequence[Level], name: str, said: str, end: str, unit: str | None, length: str | None) -> list[str]:
-    values = [f"{level['extremes'][name][end]:.4g}" if name in level["extremes"] else "–" for level in levels]
-    values[-1] += f" {unit}" if unit else ""
-    return [said, *values, f"at {place(levels[-1]['extremes'][name][f'{end}_at'])}" + (f" {length}" if length else "")]
+def _row(section: dict[str, Any], name: str, said: str, end: str, unit: str) -> list[str]:
+    levels = [level["extremes"].get(name) for level in _known(section)]
+    values = ["–" if level is None else f"{level[end]:.4g}" for level in levels]
+    values[-1] += _behind(section.get(unit))
+    return [said, *values, f"at {_place(levels[-1][f'{end}_at'], section)}"]

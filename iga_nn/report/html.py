@@ -155,7 +155,10 @@ def _levels(section: Report) -> list[list[str]]:
     """Return the table of levels: the titles of the numbers that are known, then a row a level."""
     levels = section.get("levels", [])
     rates = {f"rate_{norm}": [None, *values] for norm, values in section.get("rates", {}).items()}
-    return as_rows([level | {name: values[i] for name, values in rates.items()} for i, level in enumerate(levels)])
+    rows = as_rows([level | {name: values[i] for name, values in rates.items()} for i, level in enumerate(levels)])
+    if rows and (unit := section.get("unit")):
+        rows[0] = [f"h [{unit}]" if title == TITLES["h"] else title for title in rows[0]]
+    return rows
 
 
 def _notices(report: Report) -> list[str]:

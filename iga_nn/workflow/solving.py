@@ -38,7 +38,7 @@ def solve_levels(
             solutions.append(solution)
             levels.append(level_of(solution))
     found = [solution.report for solution in solutions]
-    growth = growth_notices(levels)
+    growth = growth_notices({**asdict(options), "levels": levels})
     for notice in growth:
         log.warning("%s", notice)
     asked = {name: given for name, given in asdict(options).items() if name not in ("refine", "degree")}
@@ -50,7 +50,7 @@ def solve_levels(
         }
     )
     _write_cells(state, solutions[-1])
-    _draw(state, volume, solutions, equation)
+    _draw(state, volume, solutions, equation, options)
     if len(equation.dirichlet) < 6:  # the user names faces: show which is which
         state.draw("solution", named_volume=volume)
     return solutions[-1]
@@ -117,14 +117,21 @@ def _write_cells(state: RunFolder, solution: Solution) -> None:
             log.info("solution.vtu: a cell stands for %d x %d x %d elements; %s", spans, spans, spans, every)
 
 
-def _draw(state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation) -> None:
+def _draw(
+    state: RunFolder,
+    volume: BSplineVolume,
+    solutions: Sequence[Solution],
+    equation: Equation,
+    options: ProblemOptions,
+) -> None:
     """Draw the solution, its error where the exact one is known, and then the convergence if there are several levels.
 
     Coefficients that are not finite, for the solver broke down, are not drawn.
     """
     if not all(np.all(np.isfinite(solution.coefficients)) for solution in solutions):
         return
-    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1]}
+    unit = options.unit if equation.form.components == 3 else None  # u is a displacement
+    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1], "unit": unit}
     if equation.exact is not None:
         known["problem"] = equation
         if len(solutions) > 1:
