@@ -344,6 +344,25 @@ def export_volume(
     _print(str(export(volume, to, out, solution=solution, samples=samples, quantity=quantity, force=force)))
 
 
+@app.command(name="compare")
+def compare_runs(one: Path, other: Path, /, *, out: Path = Path("compare.html"), force: bool = False) -> None:
+    """Put two finished runs side by side: verdicts, errors, largest values and figures, in one page.
+
+    Args:
+        one: output folder of a run.
+        other: that of another; ratios are those of its numbers to the numbers of the first.
+        out: page to write.
+        force: replace that file where it exists.
+    """
+    from ..new_file import check_new, save_new
+    from ..report import comparison
+
+    runs = comparison.Run.of(one), comparison.Run.of(other)
+    target = check_new(out, ".html")
+    save_new(target, comparison.page(*runs).encode(), force)
+    _print(f"{comparison.as_text(*runs)}\nopen {target}")
+
+
 @app.command(name="app")
 def serve_page(
     *,

@@ -38,6 +38,18 @@ def table(section: dict[str, Any]) -> list[list[str]]:
     return [["", *(f"{level['dofs']:,} unknowns" for level in _known(section)), "where"], *rows] if rows else []
 
 
+def finest(section: dict[str, Any]) -> dict[str, tuple[float, str]]:
+    """Return the extremes of the finest level: what is said of each, with the unit -> its value, and this as text with
+    its place.
+    """
+    found = {}
+    for name, said, end, unit in _told(section):
+        extreme = _known(section)[-1]["extremes"][name]
+        title = f"{said} [{section[unit]}]" if section.get(unit) else said
+        found[title] = (extreme[end], f"{extreme[end]:.4g} at {_place(extreme[f'{end}_at'], section)}")
+    return found
+
+
 def growth_notices(section: dict[str, Any]) -> list[str]:
     """Return a notice where the largest stress, or gradient, grew by more than GROWTH for each time h was halved."""
     if len(known := _known(section)) < 2:
@@ -75,17 +87,20 @@ def _known(section: dict[str, Any]) -> list[Level]:
 
 def _rows(section: dict[str, Any]) -> list[list[str]]:
     """Return what is said of each extreme, its value on each level, and where it is on the finest."""
-    levels, found = _known(section), []
+    rows = []
+    for name, said, end, unit in _told(section):
+        levels = [level["extremes"].get(name) for level in _known(section)]
+        values = ["–" if level is None else f"{level[end]:.4g}" for level in levels]
+        values[-1] += _behind(section.get(unit))
+        rows.append([said, *values, f"at {_place(levels[-1][f'{end}_at'], section)}"])
+    return rows
+
+
+def _told(section: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Return the quantities of the finest level, each with what is said of it, by which end and in which unit."""
+    levels, told = _known(section), []
     for name in levels[-1]["extremes"] if levels else ():
-        said, end, unit = SAYINGS.get(name, (f"{name} at most", "largest", ""))
-        found.append(_row(section, name, said, end, unit))
+        told.append((name, *SAYINGS.get(name, (f"{name} at most", "largest", ""))))
         if name == "u":
-            found.append(_row(section, name, "u at most", "largest", unit))
-    return found
-
-
-def _row(section: dict[str, Any], name: str, said: str, end: str, unit: str) -> list[str]:
-    levels = [level["extremes"].get(name) for level in _known(section)]
-    values = ["–" if level is None else f"{level[end]:.4g}" for level in levels]
-    values[-1] += _behind(section.get(unit))
-    return [said, *values, f"at {_place(levels[-1][f'{end}_at'], section)}"]
+            told.append((name, "u at most", "largest", ""))
+    return told
