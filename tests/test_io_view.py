@@ -96,6 +96,16 @@ def test_a_solve_leaves_its_cells_and_export_knows_the_law(in_folder, capsys):
         assert says in line
 
 
+def test_where_det_j_is_zero_there_are_values_only(caplog):
+    wedge = BSplineVolume.from_function(lambda u, v, w: (u, v, u * w), 4)
+    solution = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="x*y"))
+    grid = view.grid(wedge, solution.field, solution.problem, 1)
+    assert set(grid.point_data) == {"arap", "det J", "u", "error"}
+    assert "gradient and flux left out: Singular matrix" in caplog.text
+    with pytest.raises(ValueError, match="Singular matrix"):
+        view.grid(wedge, solution.field, solution.problem, 1, ["flux"])
+
+
 @pytest.mark.parametrize("report", [None, {"schema": 1, "elasticity": {"young": "hard"}}])
 def test_a_solution_without_a_law_has_values_only(bent, report, in_folder, capsys):
     bent.geometry.save("map.npz")

@@ -8,6 +8,7 @@ components, in VTK's order. Of a left-handed volume bottom and top of each cell 
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,12 +28,14 @@ from solve.forms.frame import UnitFrame
 from solve.forms.problem import BoundaryValueProblem
 from solve.quantities import on_grid
 
-from ..errors import InputError, input_errors
+from ..errors import InputError, one_line
 from ..figures.evaluate import error_at
 from .vtk import breaks_of, exact_cells, save
 
 if TYPE_CHECKING:
     import pyvista
+
+log = logging.getLogger(__name__)
 
 Quantities = Iterable[str] | Mapping[str, Quantity]
 Rows = Sequence[Array]  # of parameters, a direction each
@@ -155,8 +158,13 @@ def _of(
     chosen = _default(placed.form.quantities) if quantities is None else quantities
     asked = chosen if isinstance(chosen, Mapping) else {name: name for name in chosen}
     field = replace(solution, geometry=volume)
-    with input_errors():
+    try:
         return fields | {name: on_grid(field, placed.form, what, u, v, w) for name, what in asked.items()}
+    except ValueError as error:
+        if quantities is not None:
+            raise InputError(one_line(error)) from None
+        log.warning("%s left out: %s", " and ".join(asked), one_line(error))  # det J is zero somewhere
+        return fields
 
 
 def _default(given: Mapping[str, Quantity]) -> tuple[str, ...]:

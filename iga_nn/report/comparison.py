@@ -118,5 +118,5 @@ def page(one: Run, other: Run) -> str:
         notices=[html.notices(run.report) for run in runs],
         tables=rows(one, other),
         figures={heading: [each.get(heading) for each in drawn] for heading in dict.fromkeys([*drawn[0], *drawn[1]])},
-        commands=[run.report["command"] for run in runs],
+        commands=[run.report.get("command", "") for run in runs],
     )

@@ -38,7 +38,7 @@ def solve_levels(
             solutions.append(solution)
             levels.append(level_of(solution))
     found = [solution.report for solution in solutions]
-    growth = growth_notices({**asdict(options), "levels": levels})
+    growth = growth_notices({**asdict(options), "levels": levels}) if equation.exact is None else []
     for notice in growth:
         log.warning("%s", notice)
     asked = {name: given for name, given in asdict(options).items() if name not in ("refine", "degree")}
