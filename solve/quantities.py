@@ -23,7 +23,7 @@ from .forms.form import Form, Quantity
 
 Place = tuple[float, float, float]
 _PER_SPAN = 3  # intervals a span and direction in which extremes are looked for
-_SAMPLES = 2**18  # of a search for all extremes, where one a span is not more
+_SAMPLES = 2**16  # of a search for all extremes, where one a span is not more
 _CANDIDATES = 8  # samples around which they are refined
 _ZOOMS = 20  # steps of this, each halving the box
 _POINTS = 2**16  # evaluated at once
