@@ -108,6 +108,17 @@ class MapOptions(SurfaceOptions):
 
 
 @dataclass(frozen=True)
+class Units:
+    """Hold the texts that stand behind the values of a solution and behind stresses, None where none is given."""
+
+    displacement: str | None = None
+    stress: str | None = None
+
+
+NO_UNITS = Units()
+
+
+@dataclass(frozen=True)
 class ProblemOptions(Checked, ABC):
     """Hold what every PDE of the command line is told: its exact solution, the meshes it is solved on, and how.
 
@@ -142,6 +153,11 @@ class ProblemOptions(Checked, ABC):
             if text is not None and not (text.strip() and text.isprintable() and len(text) <= LONGEST_UNIT):
                 flag = "--" + name.replace("_", "-")
                 raise InputError(f"{flag} {text!r:.80}: give a short text such as mm, at most {LONGEST_UNIT} letters")
+
+    @property
+    def units(self) -> Units:
+        """Return what stands beside colour bars."""
+        return NO_UNITS
 
     def solver(self) -> dict[str, Any]:
         """Return the keywords of `solve.solve_problem` that are the same on every level."""
@@ -240,6 +256,11 @@ class ElasticityOptions(ProblemOptions):
 
     section: ClassVar[str] = "elasticity"
     title: ClassVar[str] = "linear elasticity"
+
+    @property
+    def units(self) -> Units:
+        """Return what stands beside colour bars."""
+        return Units(self.unit, self.stress_unit)
 
     def problem(self) -> Elasticity:
         """Return the problem of these options. Raises InputError."""

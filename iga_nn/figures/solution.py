@@ -14,11 +14,12 @@ from solve.field import SplineField
 from solve.forms.problem import BoundaryValueProblem
 
 from ..levels import EXACT_ERRORS, TITLES
+from ..options import NO_UNITS, Units
 from .cutaway import best_cut, without_octant
 from .evaluate import SECTIONS
 from .fields import Field, error_of, points_of, sampled, solution_of
 from .render import Patch, check_drawable, draw
-from .style import PANEL, color_bar, colors, panels_of, save, show_around, show_section
+from .style import PANEL, color_bar, colors, panels_of, save, show_around, show_section, with_unit
 
 
 def draw_error(
@@ -26,11 +27,11 @@ def draw_error(
     volume: BSplineVolume,
     solution: Solution,
     problem: BoundaryValueProblem,
-    unit: str | None = None,
+    units: Units = NO_UNITS,
 ) -> Figure:
     """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms.
 
-    unit: of u, which stands beside the colour bar, as in all figures here.
+    units: texts that stand beside the colour bar, as in all figures here.
     """
     field = error_of(volume, solution, problem)
     figure, rows = panels_of(2, 3)
@@ -38,20 +39,15 @@ def draw_error(
     show_around(rows[0][:2], patches[:6])
     _write_numbers(rows[0][2], solution)
     _show_sections(rows[1], patches[6:])
-    color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", unit))
+    color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
     return save(figure, path, "Error on the boundary and on the mid-sections")
 
 
 def draw_solution(
-    path: str | Path | None, volume: BSplineVolume, solution: SplineField, unit: str | None = None
+    path: str | Path | None, volume: BSplineVolume, solution: SplineField, units: Units = NO_UNITS
 ) -> Figure:
     """Draw u_h, or the length of a vector u_h, as `draw_values` does."""
-    return draw_values(path, volume, solution, with_unit(solution_of(solution).title, unit))
-
-
-def with_unit(title: str, unit: str | None) -> str:
-    """Return the label of a colour bar; a dollar of the unit begins no formula of matplotlib."""
-    return title if unit is None else title + " [" + unit.replace("$", r"\$") + "]"
+    return draw_values(path, volume, solution, with_unit(solution_of(solution).title, units.displacement))
 
 
 def draw_values(

@@ -48,8 +48,8 @@ class Artifact:
 
 _KNOTS = ("degrees", "knots_u", "knots_v", "knots_w")
 _BOUNDARY = ("vertices", "parameters", "faces")
-_VALUES = ("volume", "solution", "unit")
-_ERROR = ("volume", "solution", "problem", "unit")
+_VALUES = ("volume", "solution", "units")
+_ERROR = ("volume", "solution", "problem", "units")
 
 
 ARTIFACTS = (  # in the order of the pages

@@ -14,7 +14,7 @@ from solve import ConvergenceError, ConvergenceRow, Solution, SolveReport, rates
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
-from ..options import Equation, ProblemOptions
+from ..options import Equation, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
 from ..report.extremes import growth_notices
@@ -50,7 +50,7 @@ def solve_levels(
         }
     )
     _write_cells(state, solutions[-1])
-    _draw(state, volume, solutions, equation, options)
+    _draw(state, volume, solutions, equation, options.units)
     if len(equation.dirichlet) < 6:  # the user names faces: show which is which
         state.draw("solution", named_volume=volume)
     return solutions[-1]
@@ -118,11 +118,7 @@ def _write_cells(state: RunFolder, solution: Solution) -> None:
 
 
 def _draw(
-    state: RunFolder,
-    volume: BSplineVolume,
-    solutions: Sequence[Solution],
-    equation: Equation,
-    options: ProblemOptions,
+    state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation, units: Units
 ) -> None:
     """Draw the solution, its error where the exact one is known, and then the convergence if there are several levels.
 
@@ -130,8 +126,7 @@ def _draw(
     """
     if not all(np.all(np.isfinite(solution.coefficients)) for solution in solutions):
         return
-    unit = options.unit if equation.form.components == 3 else None  # u is a displacement
-    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1], "unit": unit}
+    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1], "units": units}
     if equation.exact is not None:
         known["problem"] = equation
         if len(solutions) > 1:
