@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Equation: TypeAlias = "Poisson | Elasticity | Problem"
 Formula = str  # one that starts with a minus is written --option=-x
 
+LONGEST_UNIT = 20  # letters
 MAX_REFINE = 6
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
 MAX_WORKERS = 256  # on one machine
@@ -109,6 +110,17 @@ class MapOptions(SurfaceOptions):
 
 
 @dataclass(frozen=True)
+class Units:
+    """Hold the texts that stand behind the values of a solution and behind stresses, None where none is given."""
+
+    displacement: str | None = None
+    stress: str | None = None
+
+
+NO_UNITS = Units()
+
+
+@dataclass(frozen=True)
 class ProblemOptions(Checked, ABC):
     """Hold what every PDE of the command line is told: its exact solution, the meshes it is solved on, and how.
 
@@ -119,6 +131,7 @@ class ProblemOptions(Checked, ABC):
         degree: degree of the trial space; that of the map by default.
         quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
             points a span; "gauss", degree points a span.
+        unit: of lengths, such as mm: free text, which stands behind lengths and places and changes no number.
     """
 
     exact: Formula | None = None
@@ -126,6 +139,7 @@ class ProblemOptions(Checked, ABC):
     refine: tuple[int, ...] = (0, 1)
     degree: int | None = None
     quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
+    unit: str | None = None
 
     section: ClassVar[str]  # its name on the command line and in report.json
     title: ClassVar[str]
@@ -133,6 +147,19 @@ class ProblemOptions(Checked, ABC):
     @abstractmethod
     def problem(self) -> Equation:
         """Return the problem of these options. Raises InputError."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("unit", "stress_unit"):
+            text = getattr(self, name, None)
+            if text is not None and not (text.strip() and text.isprintable() and len(text) <= LONGEST_UNIT):
+                flag = "--" + name.replace("_", "-")
+                raise InputError(f"{flag} {text!r:.80}: give a short text such as mm, at most {LONGEST_UNIT} letters")
+
+    @property
+    def units(self) -> Units:
+        """Return what stands beside colour bars."""
+        return NO_UNITS
 
     def solver(self) -> dict[str, Any]:
         """Return the keywords of `solve.solve_problem` that are the same on every level."""
@@ -229,12 +256,14 @@ class ElasticityOptions(ProblemOptions):
         fix: regions of the boundary that are held, each as REGION, or "REGION=VECTOR" for a given displacement; an
             entry of the vector that is left out is free: "x < 1=0;;". A region is a condition on position and outward
             normal, "nz > 0.9 and x < 2", a face of the part, "face(x, y, z)", a group of the mesh, group:NAME, a
-            box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where regions are given, all else of the boundary is free.
+            box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where regions are given, all else of the boundary is
+            free.
         roller: regions held along their normal alone.
         symmetry: the same: where a plane of symmetry cuts the body.
         load: regions with a force per area, each as "REGION=VECTOR".
         pressure: regions with a force per area against the outward normal, each as "REGION=FORMULA".
         spring: regions on an elastic foundation, force per area and displacement, each as "REGION=FORMULA".
+        stress_unit: of stresses, such as MPa: free text, which stands behind stresses and changes no number.
 
     Examples:
         >>> import iga_nn
@@ -253,9 +282,15 @@ class ElasticityOptions(ProblemOptions):
     load: tuple[str, ...] = ()
     pressure: tuple[str, ...] = ()
     spring: tuple[str, ...] = ()
+    stress_unit: str | None = None
 
     section: ClassVar[str] = "elasticity"
     title: ClassVar[str] = "linear elasticity"
+
+    @property
+    def units(self) -> Units:
+        """Return what stands beside colour bars."""
+        return Units(self.unit, self.stress_unit)
 
     def problem(self) -> Elasticity:
         """Return the problem of these options. Raises InputError."""

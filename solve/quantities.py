@@ -8,12 +8,13 @@ slowly than the spline: a stress is less accurate than the displacement.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, in_brackets
-from parameterize.spline.bspline import divided_spans, evaluate_at, evaluate_grid, real_array
+from parameterize.spline.bspline import breakpoints, divided_spans, evaluate_at, evaluate_grid, real_array
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.estimate import FIRST
@@ -22,8 +23,9 @@ from .forms.form import Form, Quantity
 
 Place = tuple[float, float, float]
 _PER_SPAN = 3  # intervals a span and direction in which extremes are looked for
+_SAMPLES = 2**16  # of a search for all extremes, where one a span is not more
 _CANDIDATES = 8  # samples around which they are refined
-_ZOOMS = 30  # steps of this, each halving the box
+_ZOOMS = 20  # steps of this, each halving the box
 _POINTS = 2**16  # evaluated at once
 
 
@@ -56,6 +58,10 @@ class Extremes:
     largest: float
     largest_at: Place
     largest_parameters: Place
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return values and points as report.json holds them."""
+        return {name: getattr(self, name) for name in ("least", "least_at", "largest", "largest_at")}
 
     def __str__(self) -> str:
         least, largest = in_brackets(self.least_at), in_brackets(self.largest_at)
@@ -142,7 +148,11 @@ def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: 
         found = np.asarray(quantity(u, grad, x), dtype=np.float64)
     except (TypeError, LookupError, AttributeError, ArithmeticError) as error:
         raise ValueError(f"the quantity fails: {type(error).__name__}: {error}") from error
-    shape = x.shape[1:]
+    return _of_shape(found, x.shape[1:])
+
+
+def _of_shape(found: Array, shape: tuple[int, ...]) -> Array:
+    """Return values (..., shape) at points of a shape; one number stands for all. Raises ValueError for others."""
     if found.ndim == 0:
         return np.broadcast_to(found, shape)
     if found.shape[found.ndim - len(shape) :] != shape:
@@ -152,52 +162,87 @@ def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: 
 
 def extremes(field: SplineField, form: Form, what: str | Quantity) -> Extremes:
     """Return the least and the largest value of a quantity of one number a point, and where they are."""
-    quantity = quantity_of(form, what)
-    least, largest = (_extreme(field, quantity, sign) for sign in (-1.0, 1.0))
-    return Extremes(*least, *largest)
+    (found,) = _extremes_of(field, [quantity_of(form, what)], _PER_SPAN)
+    return found
 
 
-def _extreme(field: SplineField, quantity: Quantity, sign: float) -> tuple[float, Place, Place]:
-    """Return the largest value of sign times the quantity, without that sign, its point and its parameters."""
-    rows = [divided_spans(knots, _PER_SPAN) for knots in field.knots]
-    places, values = np.empty((0, 3)), np.empty(0)
+def all_extremes(field: SplineField, form: Form) -> dict[str, Extremes]:
+    """Return the extremes of the quantities that a law tells (`Form.told`), by name, from one search for all of them.
+
+    It takes fewer samples a span than `extremes`, so that it costs a small share of a solve.
+    """
+    spans = math.prod(len(breakpoints(knots)) - 1 for knots in field.knots)
+    per_span = max(1, min(_PER_SPAN, int((_SAMPLES / spans) ** (1.0 / 3.0))))
+    found = _extremes_of(field, [quantity_of(form, name) for name in form.told], per_span)
+    return dict(zip(form.told, found, strict=True))
+
+
+def _extremes_of(field: SplineField, quantities: Sequence[Quantity], per_span: int) -> list[Extremes]:
+    """Return the extremes of q quantities: those of the best samples, refined.
+
+    Rows of the arrays within are the quantities with a minus, whose largest values are the least ones, then as they
+    are.
+    """
+
+    def together(u: Array, grad: Array, x: Array) -> Array:
+        return np.stack([_one_number(quantity(u, grad, x), x.shape[1:]) for quantity in quantities])
+
+    rows = [divided_spans(knots, per_span) for knots in field.knots]
+    places, values = np.empty((2 * len(quantities), 0, 3)), np.empty((2 * len(quantities), 0))
     for u in slabs(*rows):
-        found = sign * grid_values(field, quantity, u, *rows[1:])
-        if math.prod(found.shape[:-3]) != 1:
-            raise ValueError(
-                f"extremes are of one number a point, this quantity has the shape {found.shape[:-3]}: "
-                "choose a part of it, as in lambda u, grad, x: u[0]"
-            )
-        if not np.all(np.isfinite(found)):
-            raise ValueError("extremes are of finite numbers; this quantity has others")
-        found = found.reshape(found.shape[-3:])
-        best = np.argsort(-found, axis=None, kind="stable")[:_CANDIDATES]
-        i, j, k = np.unravel_index(best, found.shape)
-        places = np.concatenate([places, np.column_stack([u[i], rows[1][j], rows[2][k]])])
-        values = np.concatenate([values, found.ravel()[best]])
-    order = np.argsort(-values, kind="stable")[:_CANDIDATES]
-    places, values = _zoomed(field, quantity, sign, places[order], values[order], [_widest(row) for row in rows])
-    best_place = places[np.argmax(values)]
-    point = volume_of(field)(best_place)[0]
-    return float(sign * values.max()), tuple(point.tolist()), tuple(best_place.tolist())
+        found = _signed(grid_values(field, together, u, *rows[1:]))
+        flat = found.reshape(len(found), -1)
+        best = np.argpartition(-flat, min(_CANDIDATES, flat.shape[1]) - 1)[:, :_CANDIDATES]
+        i, j, k = np.unravel_index(best, found.shape[1:])
+        places = np.concatenate([places, np.stack([u[i], rows[1][j], rows[2][k]], axis=-1)], axis=1)
+        values = np.concatenate([values, np.take_along_axis(flat, best, axis=1)], axis=1)
+    best = np.argsort(-values, axis=1, kind="stable")[:, :_CANDIDATES]
+    places = np.take_along_axis(places, best[..., None], axis=1)
+    places, values = _zoomed(field, together, places, [float(np.diff(row).max()) for row in rows])
+    peaks = [_peak(field, *row) for row in zip(places, values, strict=True)]
+    pairs = zip(peaks[: len(quantities)], peaks[len(quantities) :], strict=True)
+    return [Extremes(-least[0], least[1], least[2], *largest) for least, largest in pairs]
 
 
-def _zoomed(
-    field: SplineField, quantity: Quantity, sign: float, places: Array, values: Array, widths: Sequence[float]
-) -> tuple[Array, Array]:
-    """Return better places (k, 3) and their values: the best of the 27 points around each, in ever smaller boxes."""
+def _one_number(found: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return a quantity's values at points of that shape. Raises ValueError unless they are one finite number each."""
+    values = _of_shape(np.asarray(found, dtype=np.float64), shape)
+    extra = values.shape[: values.ndim - len(shape)]
+    if math.prod(extra) != 1:
+        raise ValueError(
+            f"extremes are of one number a point, this quantity has the shape {extra}: "
+            "choose a part of it, as in lambda u, grad, x: u[0]"
+        )
+    if not np.all(np.isfinite(values)):
+        raise ValueError("extremes are of finite numbers; this quantity has others")
+    return values.reshape(shape)
+
+
+def _signed(values: Array) -> Array:
+    return np.concatenate([-values, values])
+
+
+def _zoomed(field: SplineField, together: Quantity, places: Array, widths: Sequence[float]) -> tuple[Array, Array]:
+    """Return better places (r, k, 3) of each of r rows and their values: the best of the 27 points around each, in
+    ever smaller boxes.
+    """
     steps = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * widths
+    own = np.arange(len(places))
     for _ in range(_ZOOMS):
-        around = np.clip(places[:, None] + steps, 0.0, 1.0)  # (k, 27, 3)
-        found = sign * _values(field, quantity, around.reshape(-1, 3)).reshape(len(places), -1)
-        top = found.argmax(axis=1)
-        places, values = around[np.arange(len(places)), top], found[np.arange(len(places)), top]
+        around = np.clip(places[..., None, :] + steps, 0.0, 1.0)  # (r, k, 27, 3)
+        found = _signed(_values(field, together, around.reshape(-1, 3)))
+        found = found.reshape(len(places), *around.shape[:3])[own, own]  # of each row its own quantity
+        top = found.argmax(axis=2)[..., None]
+        places = np.take_along_axis(around, top[..., None], axis=2)[:, :, 0]
+        values = np.take_along_axis(found, top, axis=2)[:, :, 0]
         steps = steps / 2.0
     return places, values
 
 
-def _widest(row: Array) -> float:
-    return float(np.diff(row).max())
+def _peak(field: SplineField, places: Array, values: Array) -> tuple[float, Place, Place]:
+    """Return the largest value of one row, its point and its parameters."""
+    best = places[np.argmax(values)]
+    return float(values.max()), tuple(volume_of(field)(best)[0].tolist()), tuple(best.tolist())
 
 
 def slabs(u: Array, v: Array, w: Array) -> Iterator[Array]:

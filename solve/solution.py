@@ -1,6 +1,6 @@
 """Solution: the spline that a solve returns, and SolveReport: its numbers."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from .discretization.errors import Errors
 from .field import SplineField
 from .forms.form import Quantity
 from .forms.problem import BoundaryValueProblem
-from .quantities import Extremes, at_points, extremes, on_grid
+from .quantities import Extremes, all_extremes, at_points, extremes, on_grid
 from .reactions import Balance
 
 if TYPE_CHECKING:
@@ -168,13 +168,32 @@ class Solution(SplineField, Shown):
         """Return the least and the largest value of a quantity of one number a point, and where they are."""
         return extremes(self, self.problem.form, what)
 
-    def to_pyvista(self, samples: int | None = None) -> "pyvista.UnstructuredGrid":
+    def all_extremes(self) -> dict[str, Extremes]:
+        """Return the extremes that a report tells, by name (`problem.form.told`), from one search for all of them.
+
+        It takes fewer samples than `extremes` does on fine meshes.
+        """
+        return all_extremes(self, self.problem.form)
+
+    def to_pyvista(
+        self, samples: int | None = None, quantities: Iterable[str] | Mapping[str, Quantity] | None = None
+    ) -> "pyvista.UnstructuredGrid":
         """Return the volume as a grid of pyvista with the solution as point data `u`.
 
-        samples: None for exact Bezier cells; else the number of linear cells a span and direction, with the distortion
-        `arap`, `det J` and, where the exact solution is known, the `error`. Slice and clip these alone.
+        samples: None for exact Bezier cells; else the number of linear cells a span of the solution and direction, with
+        the distortion `arap`, `det J` and, where the exact solution is known, the `error`. Slice and clip these alone.
+        quantities: point data beside them, names that the law gives or a dictionary of functions (as in `quantity`);
+        by default stress and von_mises of elasticity, gradient and flux of other laws. () for none.
+        Raises ValueError for a name the law does not give, and for quantities without samples.
         """
-        return above("io.vtk").grid(self.geometry, self, self.problem, samples)
+        return above("io.view").grid(self.geometry, self, self.problem, samples, quantities)
+
+    def to_splinepy(self) -> Any:
+        """Return u_h as a splinepy.BSpline of one coordinate, or of three for displacements, in the parameters.
+
+        Raises InputError without splinepy.
+        """
+        return above("io.splinepy").to_splinepy(self)
 
     def plot(self, what: str = "values", file: str | Path | None = None) -> "Figure":
         """Return a figure of the solution, drawn off screen; report.html shows the same.

@@ -28,7 +28,7 @@ from solve.study import benchmark_volume
 
 FILES = (
     "volume.npz", "boundary.npz", "history.npz", "solution.npz", "report.json", "report.html", "history.png",
-    "convergence.png",
+    "convergence.png", "solution.vtu",
 )  # fmt: skip
 PICTURES = {"faces.png", "lines.png", "cut.png", "distortion.png", "solution.png", "error.png"}
 

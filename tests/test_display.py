@@ -149,6 +149,12 @@ def test_the_error_of_a_field_as_exact_solution_is_known_too(solution):
     assert np.allclose(grid["error"], np.abs(solution.to_pyvista(samples=2)["u"] - grid["u"]), atol=1e-14)
 
 
+def test_a_solution_goes_to_splinepy(solution):
+    pytest.importorskip("splinepy")
+    points = np.random.default_rng(2).random((20, 3))
+    assert np.allclose(solution.to_splinepy().evaluate(points)[:, 0], solution(points), atol=1e-14)
+
+
 def test_a_volume_goes_to_splinepy_and_back():
     splinepy = pytest.importorskip("splinepy")
     volume = benchmark_volume(3, degree=2)

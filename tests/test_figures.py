@@ -19,6 +19,7 @@ from iga_nn.figures import evaluate as sampling
 from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
 from iga_nn.figures import solution as solution_figures
+from iga_nn.options import Units
 from iga_nn.workflow.output_folder import RunFolder
 from solve.study import benchmark_volume
 
@@ -112,6 +113,8 @@ def test_fields_in_figures_have_the_colours_of_the_bar(tmp_path, drawing, small_
     off = np.array([np.abs(table - pixel).max(axis=1).min() for pixel in colored[::23]])
     assert len(off) > 1000 and np.mean(off < 0.03) > 0.75  # the others lie on lines and at the rim
     assert bar_of(figure).get_ylabel() == "u"
+    figure = solution_figures.draw_solution(None, volume, solution, Units("$"))
+    assert bar_of(figure).get_ylabel() == r"u [\$]"
 
 
 def test_map_figures_show_the_map(tmp_path, drawing, small_views):

@@ -226,7 +226,7 @@ def test_view_holds_the_spline_and_its_fields_at_its_nodes(volume):
     Path("report.json").write_text(json.dumps({"schema": 1, "poisson": {"exact": "x*y+z*z"}}))
     grid = read_vtu(export("volume.npz", "view", solution="solution.npz"))
     axes = []
-    for knots in volume.knots:
+    for knots in solution.knots:
         breaks = np.unique(knots)
         axes.append(np.unique(np.concatenate([np.linspace(a, b, 4) for a, b in pairwise(breaks)])))
     where = np.stack([values.ravel(order="F") for values in np.meshgrid(*axes, indexing="ij")], axis=1)

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import iga_nn
+from iga_nn.report.extremes import growth_notices
+from iga_nn.workflow.solving import level_of
 from parameterize.spline.volume import BSplineVolume
 from solve import benchmark_volume, integrate, resultant
-from solve.forms.elasticity import principal, von_mises
+from solve.forms.elasticity import outer_principal, principal, von_mises
 
 YOUNG, NU = 210.0, 0.3
 TENSION = ("x", f"-{NU}*y", f"-{NU}*z")  # a bar in tension of stress YOUNG along x
@@ -186,3 +188,36 @@ def test_the_force_on_a_bar(bar):
 def test_bad_questions_are_refused(heat, call, message):
     with pytest.raises(ValueError, match=message):
         call(heat)
+
+
+def test_all_extremes_are_those_found_alone(bar, heat):
+    found = heat.all_extremes()
+    assert list(found) == ["u", "gradient_magnitude", "flux_magnitude"]
+    for name, extremes in found.items():
+        alone = heat.extremes(name)
+        assert extremes.largest == pytest.approx(alone.largest, rel=1e-6)
+        np.testing.assert_allclose(extremes.largest_at, alone.largest_at, atol=1e-3)
+    assert list(bar.all_extremes()) == ["magnitude", "von_mises", "first_principal", "third_principal"]
+    assert bar.all_extremes()["magnitude"].largest_at[0] == pytest.approx(2.0)
+    assert list(iga_nn.solve(heat.geometry, iga_nn.Poisson()).all_extremes()) == ["u", "gradient_magnitude"]
+
+
+def test_outer_principal_stresses_are_those_of_the_eigenvalues():
+    tensors = np.random.default_rng(5).standard_normal((3, 3, 200))
+    tensors += np.swapaxes(tensors, 0, 1)
+    tensors[..., 0], tensors[..., 1] = 0.0, 3.0 * np.eye(3)
+    tensors[..., 2], tensors[..., 3] = np.diag([1.0, 1.0, 4.0]), np.diag([4.0, 4.0, -1.0])
+    largest, _, smallest = principal(tensors)
+    np.testing.assert_allclose(outer_principal(tensors), [largest, smallest], atol=1e-7)
+
+
+def test_the_stress_at_a_clamped_rim_grows_and_a_smooth_one_does_not():
+    zero, free = ("0", "0", "0"), ("v0", "v1", "w0", "w1")
+    beam = BSplineVolume.from_function(lambda u, v, w: (4.0 * u, v, w), 5)
+    bent = iga_nn.Elasticity(displacement=zero, traction={**dict.fromkeys(free, zero), "u1": ("0", "0", "-1")})
+    smooth = iga_nn.Elasticity(exact=("sin(x)*y", "cos(y)*z", "x*z"), traction=dict.fromkeys(free))
+    for problem, grows in ((bent, True), (smooth, False)):
+        levels = [level_of(iga_nn.solve(beam, problem, refine=refine)) for refine in (0, 1)]
+        notices = growth_notices({"levels": levels})
+        assert bool(notices) == grows
+    assert levels[1]["seconds"]["extremes"] < sum(levels[1]["seconds"].values())

@@ -35,6 +35,27 @@ def drawn(image: np.ndarray) -> np.ndarray:
     return pixels[(pixels[:, 1] > 0.35) & (pixels[:, 2] > 0.2)]
 
 
+def test_extremes_stand_beside_each_other_with_their_place(result):
+    text = (result / "report.html").read_text()
+    assert "<tr><td>u at most</td><td>1</td><td>1</td><td>at (1, 1, 1)</td></tr>" in text.replace("\n", "")
+    found = json.loads((result / "report.json").read_text())["poisson"]["levels"][1]["extremes"]
+    assert found["u"]["largest"] == pytest.approx(1.0) and found["u"]["largest_at"] == pytest.approx([1.0] * 3)
+
+
+def test_units_stand_behind_lengths_and_stresses(in_folder, capsys):
+    benchmark_volume(2).save("map.npz")
+    load = ["--traction", "u1=0;0;-1", "v0=0", "v1=0", "w0=0", "w1=0", "--refine", "0", "1", "--quiet"]
+    for units in ([], ["--unit", "mm", "--stress-unit", "N/mm<2>"]):
+        assert main(["solve", "elasticity", "map.npz", *load, *units, "--out", "out", "--force"]) == 0
+        told, text = capsys.readouterr(), (in_folder / "out" / "report.html").read_text()
+        section = json.loads((in_folder / "out" / "report.json").read_text())["elasticity"]
+        shown = "N/mm&lt;2&gt;" in text and '<th scope="col">h [mm]</th>' in text
+        assert shown == bool(units) == (section.get("unit") == "mm") == (" N/mm<2> at (" in told.out)
+        assert (" mm at (" in told.out) == bool(units) and told.err.count("N/mm<2>") == bool(units)
+    command = json.loads((in_folder / "out" / "report.json").read_text())["command"]
+    assert "--unit mm" in command and "--stress-unit 'N/mm<2>'" in command
+
+
 @pytest.mark.parametrize("width", [1280, 400])
 def test_browser_draws_the_scene_and_fetches_nothing(chromium, result, tmp_path, width):
     image, console, asked = browse(chromium, tmp_path, f"{(result / 'report.html').as_uri()}", width)

@@ -315,7 +315,15 @@ def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) 
 
 @app.command(name="export")
 def export_volume(
-    volume: Volume, /, *, to: str, out: Path | None = None, solution: Path | None = None, force: bool = False
+    volume: Volume,
+    /,
+    *,
+    to: str,
+    out: Path | None = None,
+    solution: Path | None = None,
+    samples: int | None = None,
+    quantity: tuple[str, ...] = (),
+    force: bool = False,
 ) -> None:
     """Write a volume in a format that other programs read.
 
@@ -325,11 +333,34 @@ def export_volume(
         out: file to write; the volume's stem with the format's ending in the current folder by default.
         solution: solution.npz to export, too: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
             NAME_u.json).
+        samples: of a view, cells a span of the solution and direction; by default 3, fewer where they were more than a
+            million.
+        quantity: of a view with a solution, what it shows beside u: names such as stress, von_mises, principal, strain,
+            gradient, flux.
         force: replace that file where it exists.
     """
     from ..io.formats import export
 
-    _print(str(export(volume, to, out, solution=solution, force=force)))
+    _print(str(export(volume, to, out, solution=solution, samples=samples, quantity=quantity, force=force)))
+
+
+@app.command(name="compare")
+def compare_runs(one: Path, other: Path, /, *, out: Path = Path("compare.html"), force: bool = False) -> None:
+    """Put two finished runs side by side: verdicts, errors, largest values and figures, in one page.
+
+    Args:
+        one: output folder of a run.
+        other: that of another; ratios are those of its numbers to the numbers of the first.
+        out: page to write.
+        force: replace that file where it exists.
+    """
+    from ..new_file import check_new, save_new
+    from ..report import comparison
+
+    runs = comparison.Run.of(one), comparison.Run.of(other)
+    target = check_new(out, ".html")
+    save_new(target, comparison.page(*runs).encode(), force)
+    _print(f"{comparison.as_text(*runs)}\nopen {target}")
 
 
 @app.command(name="app")

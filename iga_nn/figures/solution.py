@@ -14,30 +14,40 @@ from solve.field import SplineField
 from solve.forms.problem import BoundaryValueProblem
 
 from ..levels import EXACT_ERRORS, TITLES
+from ..options import NO_UNITS, Units
 from .cutaway import best_cut, without_octant
 from .evaluate import SECTIONS
 from .fields import Field, error_of, points_of, sampled, solution_of
 from .render import Patch, check_drawable, draw
-from .style import PANEL, color_bar, colors, panels_of, save, show_around, show_section
+from .style import PANEL, color_bar, colors, panels_of, save, show_around, show_section, with_unit
 
 
 def draw_error(
-    path: str | Path | None, volume: BSplineVolume, solution: Solution, problem: BoundaryValueProblem
+    path: str | Path | None,
+    volume: BSplineVolume,
+    solution: Solution,
+    problem: BoundaryValueProblem,
+    units: Units = NO_UNITS,
 ) -> Figure:
-    """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms."""
+    """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms.
+
+    units: texts that stand beside the colour bar, as in all figures here.
+    """
     field = error_of(volume, solution, problem)
     figure, rows = panels_of(2, 3)
     patches = _colored(points_of(volume).patches, field)
     show_around(rows[0][:2], patches[:6])
     _write_numbers(rows[0][2], solution)
     _show_sections(rows[1], patches[6:])
-    color_bar(figure, rows, field.limits, r"$|u - u_h|$")
+    color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
     return save(figure, path, "Error on the boundary and on the mid-sections")
 
 
-def draw_solution(path: str | Path | None, volume: BSplineVolume, solution: SplineField) -> Figure:
+def draw_solution(
+    path: str | Path | None, volume: BSplineVolume, solution: SplineField, units: Units = NO_UNITS
+) -> Figure:
     """Draw u_h, or the length of a vector u_h, as `draw_values` does."""
-    return draw_values(path, volume, solution, solution_of(solution).title)
+    return draw_values(path, volume, solution, with_unit(solution_of(solution).title, units.displacement))
 
 
 def draw_values(

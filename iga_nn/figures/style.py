@@ -140,6 +140,11 @@ def colors(values: Array, limits: ColorRange) -> Array:
     return np.asarray(colormaps[MAP](limits.shares(values)))[..., :3]
 
 
+def with_unit(title: str, unit: str | None) -> str:
+    """Return the title of a colour bar with its unit; a dollar in it begins no formula of matplotlib."""
+    return title if unit is None else title + " [" + unit.replace("$", r"\$") + "]"
+
+
 def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:
     """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value."""
     shades = ListedColormap([colormaps[MAP](0.5)]) if limits.remark else MAP

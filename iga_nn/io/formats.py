@@ -4,11 +4,12 @@ docs/output.md explains our own files, NumPy archives without pickles.
 
 A solution, scalar or a displacement, is exported with its volume into every format: `vtk` and `view` hold it as the
 point data `u`, the others as a second file beside the volume's. `io.splinepy` explains G+Smo XML, MFEM meshes and
-splinepy's JSON, which are also read; `io.vtk` those for ParaView. IGES and STEP have no trivariate splines.
+splinepy's JSON, which are also read; `io.vtk` and `io.view` those for ParaView. IGES and STEP have no trivariate
+splines.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from ..kinds import check_kind
 from ..new_file import check_new
 from ..options import PROBLEMS, Equation
 from ..report import document as reports
-from . import splinepy, vtk
+from . import splinepy, view, vtk
 from .splinepy_gate import CHECKS, kind_of
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
@@ -36,8 +37,8 @@ class Format:
     """Hold a format of another program.
 
     ending: of its files, after the volume's stem. write: puts the volume into a file; it is also given the solution and
-    its problem, None where there are none. beside: ending and writer of a second file, where the solution needs one; it
-    is given the volume, too.
+    its problem, None where there are none, and the samples and quantities of a view. beside: ending and writer of a
+    second file, where the solution needs one; it is given the volume, too.
     """
 
     ending: str
@@ -49,7 +50,7 @@ FORMATS = {
     "gismo": Format(".xml", splinepy.write_gismo, ("_u.xml", splinepy.write_gismo)),
     "mfem": Format(".mesh", splinepy.write_mfem, (".gf", splinepy.write_mfem_field)),
     "vtk": Format("_bezier.vtu", vtk.write_bezier),
-    "view": Format("_view.vtu", vtk.write_view),
+    "view": Format("_view.vtu", view.write_view),
     "json": Format(".json", splinepy.write_json, ("_u.json", splinepy.write_json)),
 }
 
@@ -115,6 +116,8 @@ def export(
     out: str | Path | None = None,
     *,
     solution: str | Path | None = None,
+    samples: int | None = None,
+    quantity: Iterable[str] = (),
     force: bool = False,
 ) -> Path:
     """Write the volume of a file in another format and return the path written; atomic.
@@ -128,8 +131,13 @@ def export(
     out : str or Path, optional
         By default the volume's stem with the format's ending, in the current folder.
     solution : str or Path, optional
-        solution.npz of a solve on this volume. The view shows its error where the report.json beside it knows the exact
-        solution; with G+Smo, MFEM and splinepy's JSON it is a file of its own, NAME_u.xml, NAME.gf, NAME_u.json.
+        solution.npz of a solve on this volume. By the report.json beside it, the view knows its law, and shows the
+        error, where there is an exact solution, and stress and von_mises of elasticity, gradient and flux of Poisson's
+        equation. With G+Smo, MFEM and splinepy's JSON it is a file of its own, NAME_u.xml, NAME.gf, NAME_u.json.
+    samples : int, optional
+        Of a view: cells a span of the solution and direction; by default 3, fewer where they were more than a million.
+    quantity : names, optional
+        Of a view: what it shows in place of those quantities; names that the law gives, as "principal".
     force : bool
         Replace a file that exists.
 
@@ -148,6 +156,10 @@ def export(
     """
     for name, value, kind in (("volume", volume, str | Path), ("to", to, str), ("out", out, str | Path | None)):
         check_kind(name, value, kind)
+    if to != "view" and (samples is not None or quantity):
+        raise InputError(f"format {to!r}: samples and quantities are for --to view")
+    if samples is not None and samples < 1:
+        raise InputError(f"samples {samples}: must be 1 or larger")
     if to not in FORMATS:
         known = f"choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines"
         raise InputError(f"format {to!r}: {known}{did_you_mean(to, FORMATS)}")
@@ -164,7 +176,7 @@ def export(
     field, problem = (None, None) if solution is None else _load_solution(Path(solution), loaded)
     try:
         with replacing(target) as temporary:
-            chosen.write(temporary, loaded, field, problem)
+            chosen.write(temporary, loaded, field, problem, samples, tuple(quantity) or None)
             if field is not None and write_field is not None:
                 with replacing(beside) as temporary_beside:
                     write_field(temporary_beside, field, loaded)
@@ -174,7 +186,7 @@ def export(
 
 
 def _load_solution(path: Path, volume: BSplineVolume) -> "tuple[SplineField, Equation | None]":
-    """Return a solution and the problem that the report beside it names, None where its exact solution is not known.
+    """Return a solution and the problem that the report beside it states, None where that is not known.
 
     Raises InputError where the solution does not belong to the volume: by its knots, or by the h of its report.
     """
@@ -193,8 +205,20 @@ def _load_solution(path: Path, volume: BSplineVolume) -> "tuple[SplineField, Equ
             raise InputError(
                 f"{path}: belongs to another volume: the longest edge of its elements is {there:.6g}, here {here:.6g}"
             )
-    exact = section.get("exact")
-    return field, PROBLEMS[name](exact=exact).problem() if isinstance(exact, str) else None
+    return field, _stated(name, section) if name else None
+
+
+def _stated(name: str, section: dict[str, Any]) -> "Equation | None":
+    """Return the problem of a report's section, None where its options are damaged, or of another version."""
+    kind = PROBLEMS[name]
+    known = {field.name for field in fields(kind)} & section.keys()
+    given: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in section.items()
+    }
+    try:
+        return kind(**{name: given[name] for name in known}).problem()
+    except InputError:
+        return None
 
 
 def _mesh_size(section: dict[str, Any], field: SplineField) -> float | None:

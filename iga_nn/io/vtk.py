@@ -1,4 +1,4 @@
-"""Writes a volume for ParaView and VTK, as exact Bezier cells or as samples on linear cells.
+"""Writes a volume for ParaView and VTK as exact Bezier cells.
 
 Exact (`_bezier.vtu`): every knot span is a VTK_BEZIER_HEXAHEDRON (cell type 79) that holds the Bernstein coefficients
 of F; neighbours share the points between them. A cell's points are in the order of `vtkHigherOrderHexahedron`: corners,
@@ -8,10 +8,7 @@ Bernstein coefficients, too. Where a solution has a higher degree or more knots 
 higher degree on all spans, exactly. VTK's cells are right-handed: of a left-handed volume each has w reversed.
 
 VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
-tessellations are right. For slicing and clipping there are the samples (`_view.vtu`): linear hexahedra whose nodes lie
-on the spline, SAMPLES a span and direction, with the values there of `arap` (distortion at volume 1), `det J`, and,
-with a solution, `u` and (the exact solution being known) `error` = |u - u_h|. Displacements are vectors `u`, and their
-`error` is a length.
+tessellations are right. For slicing and clipping there are the samples of `io.view`.
 """
 
 from __future__ import annotations
@@ -25,56 +22,29 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
-from parameterize.quality.quality import arap_on
 from parameterize.spline.bernstein import elevation, extraction
-from parameterize.spline.bspline import apply_along, divided_spans, insert_knots, sparse_rows
+from parameterize.spline.bspline import apply_along, insert_knots, sparse_rows
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
-from solve.field import Points, SplineField
-from solve.forms.frame import UnitFrame
-
-from ..figures.evaluate import error_at
-from ..options import Equation
+from solve.field import SplineField
 
 if TYPE_CHECKING:
     import pyvista
 
-SAMPLES = 3  # intervals of the view per span and direction
 BEZIER_HEXAHEDRON = 79
 
 
 def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None = None, *_: object) -> None:
     """Write the exact cells; a solution becomes the point data `u`."""
-    _write(path, _exact(volume, solution))
+    save(path, exact_cells(volume, solution))
 
 
-def write_view(
-    path: Path, volume: BSplineVolume, solution: SplineField | None = None, problem: Equation | None = None
-) -> None:
-    """Write samples of the map, the solution and, where its problem has an exact solution, the error."""
-    _write(path, _sampled(volume, solution, problem, SAMPLES))
-
-
-def grid(
-    volume: BSplineVolume,
-    solution: SplineField | None = None,
-    problem: Equation | None = None,
-    samples: int | None = None,
-) -> pyvista.UnstructuredGrid:
-    """Return a volume, and a solution on it, as a grid of pyvista: exact cells, or `samples` linear ones a span."""
-    if samples is None:
-        return _exact(volume, solution)
-    if samples < 1:
-        raise ValueError(f"samples {samples}: must be 1 or larger, or None for exact Bezier cells")
-    return _sampled(volume, solution, problem, samples)
-
-
-def _exact(volume: BSplineVolume, solution: SplineField | None) -> pyvista.UnstructuredGrid:
+def exact_cells(volume: BSplineVolume, solution: SplineField | None) -> pyvista.UnstructuredGrid:
+    """Return the cells of a volume with the coefficients of a solution on it."""
     import pyvista
 
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
-    breaks = [np.unique(np.concatenate([s.knots[a] for s in shown])) for a in range(3)]
-    degrees = [max(s.degrees[a] for s in shown) for a in range(3)]
+    breaks, degrees = breaks_of(volume, solution), [max(s.degrees[a] for s in shown) for a in range(3)]
     points = _bernstein(volume.degrees, volume.knots, volume.control_points, breaks, degrees).reshape(-1, 3)
     cells = _cells([len(b) - 1 for b in breaks], degrees, orientation(volume) < 0)  # (s, nodes of a cell)
     counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
@@ -89,25 +59,10 @@ def _exact(volume: BSplineVolume, solution: SplineField | None) -> pyvista.Unstr
     return grid
 
 
-def _sampled(
-    volume: BSplineVolume, solution: SplineField | None, problem: Equation | None, samples: int
-) -> pyvista.UnstructuredGrid:
-    import pyvista
-
-    u, v, w = (divided_spans(knots, samples) for knots in volume.knots)
-    points = Points.on(volume, u, v, w)  # (3, m_u, m_v, m_w)
-    distortion = arap_on(volume, u, v, w, 1.0 / UnitFrame.of(volume).length)
-    fields = {"arap": distortion, "det J": np.linalg.det(volume.grid_jacobian(u, v, w))}
-    if solution is not None:
-        fields["u"] = solution.grid(u, v, w)
-        if problem is not None and problem.exact is not None:
-            fields["error"] = error_at(fields["u"], problem.on(volume), points)
-    grid = pyvista.StructuredGrid(*np.asarray(points)).cast_to_unstructured_grid()
-    if orientation(volume) < 0:  # bottom and top of each cell change places
-        grid.cells = grid.cells.reshape(-1, 9)[:, [0, 5, 6, 7, 8, 1, 2, 3, 4]].ravel()
-    for name, values in fields.items():
-        grid.point_data[name] = values.reshape((-1, *values.shape[3:]), order="F")  # VTK counts the first index fastest
-    return grid
+def breaks_of(volume: BSplineVolume, solution: SplineField | None) -> list[Array]:
+    """Return the ends of the spans of the solution and its volume, in each direction."""
+    shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
+    return [np.unique(np.concatenate([spline.knots[a] for spline in shown])) for a in range(3)]
 
 
 def _bernstein(
@@ -150,7 +105,7 @@ def _cells(spans: Sequence[int], degrees: Sequence[int], left_handed: bool) -> N
     return lattice[tuple(np.moveaxis(nodes, -1, 0))]
 
 
-def _write(path: Path, grid: Any) -> None:
+def save(path: Path, grid: Any) -> None:
     """Write the grid through a string: on a full disk VTK's own writing fails with a long log and no reason."""
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 

@@ -48,13 +48,16 @@ class Artifact:
 
 _KNOTS = ("degrees", "knots_u", "knots_v", "knots_w")
 _BOUNDARY = ("vertices", "parameters", "faces")
-_SOLVED = ("volume", "solution")
-_ERROR = (*_SOLVED, "problem")
+_VALUES = ("volume", "solution", "units")
+_ERROR = ("volume", "solution", "problem", "units")
 
 
 ARTIFACTS = (  # in the order of the pages
     Artifact("volume.npz", "map", "the spline volume", arrays=(*_KNOTS, "control_points")),
     Artifact("solution.npz", "solution", "the solution on the finest mesh", arrays=(*_KNOTS, "coefficients")),
+    Artifact(
+        "solution.vtu", "solution", "the solution with stress, or gradient and flux, on linear cells for ParaView"
+    ),
     Artifact("boundary.npz", "map", "the map from the surface to the cube's faces", arrays=_BOUNDARY),
     Artifact(PAGE, "report", "the report to read: verdict, figures, tables and an interactive view, in one file"),
     Artifact(REPORT, "report", "the report for programs: input, configuration, versions, certificate, errors, seconds"),
@@ -69,7 +72,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("history.png", "map", "loss over the training steps", "curves.draw_history", ("history",)),
     Artifact("named_faces.png", "solution", "the volume's faces by name", "map.draw_faces", ("named_volume",)),
     Artifact("convergence.png", "solution", "errors over the mesh size", "curves.draw_study", ("levels",)),
-    Artifact("solution.png", "solution", "the solution on the boundary and inside", "solution.draw_solution", _SOLVED),
+    Artifact("solution.png", "solution", "the solution on the boundary and inside", "solution.draw_solution", _VALUES),
     Artifact("error.png", "solution", "error on the boundary and on three sections", "solution.draw_error", _ERROR),
     Artifact(
         "study.png", "study", "errors of the convergence study over the mesh size", "curves.draw_study", ("study",)

@@ -17,6 +17,7 @@ from ..errors import one_line
 from ..levels import TITLES, as_rows, capitalized
 from ..rounding import rounded
 from . import document as reports
+from . import extremes
 from .advice import in_words
 from .artifacts import PAGE, SOLVED, figures_of
 from .document import Report
@@ -71,14 +72,15 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         "report/page.html",
         title=f"{Path(report['input']['file']).name}: {what}",
         report=report,
-        verdicts=_verdicts(report),
+        verdicts=verdicts(report),
         facts=_facts(report),
         scene=scene,
         advice=in_words(report),
         exact=section.get("exact"),
         levels=_levels(section),
-        notices=_notices(report),
-        figures=_figures(report, folder),
+        extremes=extremes.table(section),
+        notices=notices(report),
+        figures=figures(report, folder),
         details=_details(report),
     )
 
@@ -91,7 +93,7 @@ def filled(template: str, **content: Any) -> str:
     return environment.get_template(template).render(content)
 
 
-def _verdicts(report: Report) -> list[tuple[str, str, str]]:
+def verdicts(report: Report) -> list[tuple[str, str, str]]:
     """Return what decides whether the result is used: the colour, the heading and the meaning of each verdict."""
     quality, answer = report["parameterization"], reports.one_to_one(report)
     claim = reports.claim(report)
@@ -153,10 +155,13 @@ def _levels(section: Report) -> list[list[str]]:
     """Return the table of levels: the titles of the numbers that are known, then a row a level."""
     levels = section.get("levels", [])
     rates = {f"rate_{norm}": [None, *values] for norm, values in section.get("rates", {}).items()}
-    return as_rows([level | {name: values[i] for name, values in rates.items()} for i, level in enumerate(levels)])
+    rows = as_rows([level | {name: values[i] for name, values in rates.items()} for i, level in enumerate(levels)])
+    if rows and (unit := section.get("unit")):
+        rows[0] = [f"h [{unit}]" if title == TITLES["h"] else title for title in rows[0]]
+    return rows
 
 
-def _notices(report: Report) -> list[str]:
+def notices(report: Report) -> list[str]:
     """Return the notices of the surface and of the solves, and which figures are missing for which reason."""
     missing: dict[str, list[str]] = {}
     for name, reason in report.get("not_drawn", {}).items():
@@ -165,7 +170,7 @@ def _notices(report: Report) -> list[str]:
     return [*report["input"].get("notices", []), *reports.solved(report).get("notices", []), *undrawn]
 
 
-def _figures(report: Report, folder: Path) -> list[tuple[str, str]]:
+def figures(report: Report, folder: Path) -> list[tuple[str, str]]:
     """Return heading and picture, in Base64, of the figures that belong to this report and are there."""
     there = [figure for figure in figures_of(report) if (folder / figure.file).is_file()]
     return [

@@ -1,6 +1,7 @@
 """Solves a problem on the volume of an output folder, level after level, and writes what is found."""
 
 import logging
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -13,9 +14,10 @@ from solve import ConvergenceError, ConvergenceRow, Solution, SolveReport, rates
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
-from ..options import Equation, ProblemOptions
+from ..options import Equation, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
+from ..report.extremes import growth_notices
 from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
@@ -29,23 +31,41 @@ def solve_levels(
     solution.npz holds the finest so far. solver: keywords of `solve.solve_problem`.
     """
     solutions: list[Solution] = []
+    levels: list[dict[str, Any]] = []
     with reported(state, volume), state.timed("solve"):
         for solution in each_level(volume, equation, options, certified=verdict_of(state), **solver):
             solution.save(state.folder / "solution.npz")
             solutions.append(solution)
+            levels.append(level_of(solution))
     found = [solution.report for solution in solutions]
+    growth = growth_notices({**asdict(options), "levels": levels}) if equation.exact is None else []
+    for notice in growth:
+        log.warning("%s", notice)
     asked = {name: given for name, given in asdict(options).items() if name not in ("refine", "degree")}
     known = asked | described(equation, volume)
     state.write(
         **{
             options.section: {name: value for name, value in known.items() if value is not None and value != ()}
-            | {"levels": [item.as_dict() for item in found], "rates": rates(found), "notices": notices_of(found)}
+            | {"levels": levels, "rates": rates(found), "notices": [*notices_of(found), *growth]}
         }
     )
-    _draw(state, volume, solutions, equation)
+    _write_cells(state, solutions[-1])
+    _draw(state, volume, solutions, equation, options.units)
     if len(equation.dirichlet) < 6:  # the user names faces: show which is which
         state.draw("solution", named_volume=volume)
     return solutions[-1]
+
+
+def level_of(solution: Solution) -> dict[str, Any]:
+    """Return a level of report.json: the report of its solve and the extremes, where the solution has finite ones."""
+    level, extremes = solution.report.as_dict(), {}
+    started = time.process_time()
+    try:
+        extremes = {name: found.as_dict() for name, found in solution.all_extremes().items()}
+    except ValueError as error:  # not finite: the solver broke down, or det J is zero somewhere
+        log.info("no extremes are told: %s", one_line(error))
+    seconds = level["seconds"] | {"extremes": time.process_time() - started}
+    return level | {"extremes": extremes, "seconds": seconds}
 
 
 def each_level(volume: BSplineVolume, equation: Equation, options: ProblemOptions, **solver: Any) -> Iterator[Solution]:
@@ -84,14 +104,29 @@ def verdict_of(state: RunFolder) -> str:
     return str(state.report["parameterization"]["bijective"])
 
 
-def _draw(state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation) -> None:
+def _write_cells(state: RunFolder, solution: Solution) -> None:
+    """Write solution.vtu, where the solution is finite; a failure ends no run."""
+    if not np.all(np.isfinite(solution.coefficients)):
+        return
+    with state.timed("report"), state.drawing("solution.vtu"):
+        from ..io import view
+
+        spans = view.write_solution(state.folder / "solution.vtu", solution)
+        if spans > 1:
+            every = "`iga-nn export --to view --samples 1` writes one for each"
+            log.info("solution.vtu: a cell stands for %d x %d x %d elements; %s", spans, spans, spans, every)
+
+
+def _draw(
+    state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation, units: Units
+) -> None:
     """Draw the solution, its error where the exact one is known, and then the convergence if there are several levels.
 
     Coefficients that are not finite, for the solver broke down, are not drawn.
     """
     if not all(np.all(np.isfinite(solution.coefficients)) for solution in solutions):
         return
-    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1]}
+    known: dict[str, Any] = {"volume": volume, "solution": solutions[-1], "units": units}
     if equation.exact is not None:
         known["problem"] = equation
         if len(solutions) > 1:

@@ -173,7 +173,7 @@ class BSplineVolume(Brief, Shown):
         samples: None for the exact cells, one a knot span; else the number of linear cells a span and direction, with
         the distortion `arap` and `det J` as point data. VTK's slices, clips and contours are right on these alone.
         """
-        return above("io.vtk").grid(self, samples=samples)
+        return above("io.view").grid(self, samples=samples)
 
     def plot(self, what: str = "faces", file: str | Path | None = None) -> "Figure":
         """Return a figure of the volume, drawn off screen; report.html shows the same.

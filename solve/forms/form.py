@@ -71,8 +71,23 @@ class Form:
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """What can be asked of a solution of this law, by name; a law of one's own may add to it."""
-        return {"u": lambda u, grad, x: u, "gradient": lambda u, grad, x: grad, "flux": self.flux}
+        """What can be asked of a solution of this law, by name; a law of one's own may add to it.
+
+        `magnitude` is the length of u, `gradient_magnitude` and `flux_magnitude` those of the others.
+        """
+        return {
+            "u": lambda u, grad, x: u,
+            "gradient": lambda u, grad, x: grad,
+            "flux": self.flux,
+            "magnitude": lambda u, grad, x: np.sqrt((u * u).sum(axis=0)),
+            "gradient_magnitude": lambda u, grad, x: _length(grad),
+            "flux_magnitude": lambda u, grad, x: _length(self.flux(u, grad, x)),
+        }
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """The quantities of one number a point whose extremes a report tells."""
+        return ("u" if self.components == 1 else "magnitude", "gradient_magnitude", "flux_magnitude")
 
     @property
     def has_reaction(self) -> bool:
@@ -175,6 +190,11 @@ def _results(form: Form, u: Array, grad: Array, x: Array) -> tuple[Array, Array]
             raise ValueError(f"{name}.{part} must return finite real numbers")
         results.append(np.broadcast_to(found, shape))
     return results[0], results[1]
+
+
+def _length(values: Array) -> Array:
+    """Return the length (...) of gradients or fluxes (c, 3, ...)."""
+    return np.asarray(np.sqrt((values * values).sum(axis=(0, 1))))
 
 
 def check_shapes(form: Form) -> None:

@@ -106,6 +106,11 @@ class Poisson(LawWithData):
         rows = [sum(kappa[SYMMETRIC[i][j]] * grad[:, j] for j in range(3)) for i in range(3)]
         return np.stack(rows, axis=1)
 
+    @property
+    def told(self) -> tuple[str, ...]:
+        """The value, and the lengths of gradient and flux, which are one without kappa."""
+        return super().told if "kappa" in self.data else ("u", "gradient_magnitude")
+
     def react(self, u: Any, grad: Any, x: Any) -> Any:
         """Return c u."""
         return _coefficient(self.data["reaction"], x)[0] * u if self.has_reaction else 0.0

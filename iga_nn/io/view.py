@@ -1,0 +1,184 @@
+"""Samples a volume, and what is solved on it, on linear cells, which ParaView slices, clips and contours rightly.
+
+The nodes of the hexahedra lie on the spline, some a span of the solution and direction, with the values there of `arap`
+(distortion at volume 1), `det J`, and, with a solution, `u`, (the exact solution being known) `error` = |u - u_h|, and
+quantities of its law. Displacements are vectors `u`, and their `error` is a length. Symmetric tensors have six
+components, in VTK's order. Of a left-handed volume bottom and top of each cell change places.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from parameterize.arrays import Array
+from parameterize.quality.quality import arap_on
+from parameterize.spline.bspline import divided_spans
+from parameterize.spline.orientation import orientation
+from parameterize.spline.volume import BSplineVolume
+from solve import Solution
+from solve.field import Points, SplineField
+from solve.forms.form import Quantity
+from solve.forms.frame import UnitFrame
+from solve.forms.problem import BoundaryValueProblem
+from solve.quantities import on_grid
+
+from ..errors import InputError, one_line
+from ..figures.evaluate import error_at
+from .vtk import breaks_of, exact_cells, save
+
+if TYPE_CHECKING:
+    import pyvista
+
+log = logging.getLogger(__name__)
+
+Quantities = Iterable[str] | Mapping[str, Quantity]
+Rows = Sequence[Array]  # of parameters, a direction each
+
+SAMPLES = 3  # cells a span and direction, where they are not too many
+MOST_VIEWED = 2**20  # points of a view
+MOST_KEPT = 220_000  # points of solution.vtu, each some 70 bytes with a displacement and its stress
+TENSOR = {"XX": (0, 0), "YY": (1, 1), "ZZ": (2, 2), "XY": (0, 1), "YZ": (1, 2), "XZ": (0, 2)}  # in the order of VTK
+
+
+def write_view(
+    path: Path,
+    volume: BSplineVolume,
+    solution: SplineField | None = None,
+    problem: BoundaryValueProblem | None = None,
+    samples: int | None = None,
+    quantities: Quantities | None = None,
+) -> None:
+    """Write samples of the map, the solution and, where its problem is known, the error and quantities of its law.
+
+    samples: cells a span and direction, chosen by default. Raises InputError for quantities that are not known.
+    """
+    shown = breaks_of(volume, solution)
+    rows = _fitting(shown, MOST_VIEWED)[0] if samples is None else [divided_spans(row, samples) for row in shown]
+    save(path, _sampled(volume, rows, _of_map(volume, rows) | _of(volume, solution, problem, rows, quantities)))
+
+
+def write_solution(path: Path, solution: Solution) -> int:
+    """Write a solution and the quantities of its law in single precision, and return how many spans a cell takes a
+    direction: more than one where the file would be large.
+    """
+    rows, spans = _fitting(breaks_of(solution.geometry, solution), MOST_KEPT)
+    fields = _of(solution.geometry, solution, solution.problem, rows, None)
+    grid = _sampled(solution.geometry, rows, {name: values.astype(np.float32) for name, values in fields.items()})
+    grid.points = grid.points.astype(np.float32)
+    save(path, grid)
+    return spans
+
+
+def grid(
+    volume: BSplineVolume,
+    solution: SplineField | None = None,
+    problem: BoundaryValueProblem | None = None,
+    samples: int | None = None,
+    quantities: Quantities | None = None,
+) -> pyvista.UnstructuredGrid:
+    """Return a volume, and a solution on it, as a grid of pyvista: exact cells, or `samples` linear ones a span.
+
+    quantities: names that the law gives, or functions by name; those of `_default` by default.
+    """
+    if samples is None:
+        if quantities:
+            raise ValueError("quantities need linear cells: give samples, such as 2")
+        return exact_cells(volume, solution)
+    if samples < 1:
+        raise ValueError(f"samples {samples}: must be 1 or larger, or None for exact Bezier cells")
+    rows = [divided_spans(row, samples) for row in breaks_of(volume, solution)]
+    return _sampled(volume, rows, _of_map(volume, rows) | _of(volume, solution, problem, rows, quantities))
+
+
+def _fitting(breaks: Rows, most: int) -> tuple[Rows, int]:
+    """Return the ends of cells that have not more than `most` points, and how many spans each takes a direction.
+
+    A span has up to SAMPLES cells; only where one is too many does a cell take several spans.
+    """
+    for samples in range(SAMPLES, 0, -1):
+        if np.prod([samples * (len(row) - 1) + 1.0 for row in breaks]) <= most:
+            return [divided_spans(row, samples) for row in breaks], 1
+    spans, rows = 1, breaks
+    while np.prod([float(len(row)) for row in rows]) > most:
+        spans += 1
+        rows = [np.append(row[:-1:spans], row[-1]) for row in breaks]
+    return rows, spans
+
+
+def _sampled(volume: BSplineVolume, rows: Rows, fields: Mapping[str, Array]) -> pyvista.UnstructuredGrid:
+    """Return the linear cells between parameters, with fields (n_u, n_v, n_w, ...) as their point data."""
+    import pyvista
+
+    u, v, w = rows
+    grid = pyvista.StructuredGrid(*np.moveaxis(volume.grid(u, v, w), -1, 0)).cast_to_unstructured_grid()
+    if orientation(volume) < 0:  # bottom and top of each cell change places
+        grid.cells = grid.cells.reshape(-1, 9)[:, [0, 5, 6, 7, 8, 1, 2, 3, 4]].ravel()
+    for name, values in fields.items():
+        columns, components = _as_columns(values)
+        grid.point_data[name] = columns
+        for number, component in enumerate(components):
+            grid.GetPointData().GetArray(name).SetComponentName(number, component)
+    return grid
+
+
+def _of_map(volume: BSplineVolume, rows: Rows) -> dict[str, Array]:
+    u, v, w = rows
+    distortion = arap_on(volume, u, v, w, 1.0 / UnitFrame.of(volume).length)
+    return {"arap": distortion, "det J": np.linalg.det(volume.grid_jacobian(u, v, w))}
+
+
+def _of(
+    volume: BSplineVolume,
+    solution: SplineField | None,
+    problem: BoundaryValueProblem | None,
+    rows: Rows,
+    quantities: Quantities | None,
+) -> dict[str, Array]:
+    """Return a solution on a grid, with its error where that is known, and quantities of its law.
+
+    Raises InputError for quantities without a law, and for names that it does not give.
+    """
+    if (solution is None or problem is None) and quantities:
+        raise InputError("quantities need a solution whose law is known, by the report.json beside it")
+    if solution is None:
+        return {}
+    u, v, w = rows
+    fields = {"u": solution.grid(u, v, w)}
+    if problem is None:
+        return fields
+    placed = problem.on(volume)
+    if placed.exact is not None:
+        fields["error"] = error_at(fields["u"], placed, Points.on(volume, u, v, w))
+    chosen = _default(placed.form.quantities) if quantities is None else quantities
+    asked = chosen if isinstance(chosen, Mapping) else {name: name for name in chosen}
+    field = replace(solution, geometry=volume)
+    try:
+        return fields | {name: on_grid(field, placed.form, what, u, v, w) for name, what in asked.items()}
+    except ValueError as error:
+        if quantities is not None:
+            raise InputError(one_line(error)) from None
+        log.warning("%s left out: %s", " and ".join(asked), one_line(error))  # det J is zero somewhere
+        return fields
+
+
+def _default(given: Mapping[str, Quantity]) -> tuple[str, ...]:
+    """Return the quantities that a file holds of a law that gives these."""
+    return ("stress", "von_mises") if "stress" in given else ("gradient", "flux")
+
+
+def _as_columns(values: Array) -> tuple[Array, Sequence[str]]:
+    """Return values (n_u, n_v, n_w, ...) as numbers (points,), vectors or tensors (points, k), and names of the latter.
+
+    A symmetric tensor has the six components of TENSOR, another one its nine, row by row.
+    """
+    flat = values.reshape((-1, *values.shape[3:]), order="F")  # VTK counts the first index fastest
+    if flat.shape[1:] == (3, 3) and np.allclose(flat, np.swapaxes(flat, 1, 2), rtol=0.0, atol=1e-12 * np.ptp(flat)):
+        return np.stack([flat[:, i, j] for i, j in TENSOR.values()], axis=1), tuple(TENSOR)
+    columns = flat.reshape(len(flat), -1)
+    return columns[:, 0] if columns.shape[1] == 1 else columns, ()

@@ -1,0 +1,106 @@
+"""Tells the extremes of a solve's levels, beside each other, and whether the largest stress grows under refinement.
+
+Levels and sections are those of report.json, of which older ones have no extremes. A section's `unit` and `stress_unit`
+are free text; they stand behind the numbers and change none.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+Level = dict[str, Any]
+
+SAYINGS = {  # quantity -> what is said of it, which of its extremes that is, and the section's unit of its values
+    "u": ("u at least", "least", ""),
+    "magnitude": ("largest displacement", "largest", "unit"),
+    "von_mises": ("von Mises at most", "largest", "stress_unit"),
+    "first_principal": ("largest principal stress", "largest", "stress_unit"),
+    "third_principal": ("smallest principal stress", "least", "stress_unit"),
+    "gradient_magnitude": ("|gradient| at most", "largest", ""),
+    "flux_magnitude": ("|flux| at most", "largest", ""),
+}
+DERIVATIVES = {"von_mises": "von Mises stress", "flux_magnitude": "|flux|", "gradient_magnitude": "|gradient|"}
+GROWTH = 1.1  # of the largest stress while h is halved; smooth ones, resolved, grow less, at clamped rims 1.2 and more
+TINY = 1e-6  # of the largest coordinate: what is smaller is shown as 0
+
+
+def lines(section: dict[str, Any]) -> list[str]:
+    """Return a line an extreme: its values on all levels and its place on the finest."""
+    return [f"{said} {' → '.join(values)} {at}" for said, *values, at in _rows(section)]
+
+
+def table(section: dict[str, Any]) -> list[list[str]]:
+    """Return the head of a table and a row an extreme: its values on all levels, and its place on the finest.
+
+    Empty where no extremes are known.
+    """
+    rows = _rows(section)
+    return [["", *(f"{level['dofs']:,} unknowns" for level in _known(section)), "where"], *rows] if rows else []
+
+
+def finest(section: dict[str, Any]) -> dict[str, tuple[float, str]]:
+    """Return the extremes of the finest level: what is said of each, with the unit -> its value, and this as text with
+    its place.
+    """
+    found = {}
+    for name, said, end, unit in _told(section):
+        extreme = _known(section)[-1]["extremes"][name]
+        title = f"{said} [{section[unit]}]" if section.get(unit) else said
+        found[title] = (extreme[end], f"{extreme[end]:.4g} at {_place(extreme[f'{end}_at'], section)}")
+    return found
+
+
+def growth_notices(section: dict[str, Any]) -> list[str]:
+    """Return a notice where the largest stress, or gradient, grew by more than GROWTH for each time h was halved."""
+    if len(known := _known(section)) < 2:
+        return []
+    coarse, fine = known[-2:]
+    for name, title in DERIVATIVES.items():
+        if name not in coarse["extremes"] or name not in fine["extremes"]:
+            continue
+        before, now = (level["extremes"][name]["largest"] for level in (coarse, fine))
+        if before > 0.0 and now > before * GROWTH ** math.log2(coarse["h"] / fine["h"]):
+            grew = f"grew from {before:.4g} to {now:.4g}{_behind(section.get(SAYINGS[name][2]))}"
+            where = _place(fine["extremes"][name]["largest_at"], section)
+            return [
+                f"the largest {title} {grew} under the last refinement, at {where}: where it keeps growing, as at a "
+                "clamped rim or a re-entrant edge, it is infinite there and the number is no result; one more --refine "
+                "tells"
+            ]
+    return []
+
+
+def _place(point: Sequence[float], section: dict[str, Any]) -> str:
+    """Return a point for a reader: "(12.5, 0, 3.1) mm"."""
+    least = TINY * max(map(abs, point))
+    coordinates = ", ".join(f"{x if abs(x) > least else 0.0:.4g}" for x in point)
+    return f"({coordinates}){_behind(section.get('unit'))}"
+
+
+def _behind(unit: str | None) -> str:
+    return f" {unit}" if unit else ""
+
+
+def _known(section: dict[str, Any]) -> list[Level]:
+    return [level for level in section.get("levels", []) if level.get("extremes")]
+
+
+def _rows(section: dict[str, Any]) -> list[list[str]]:
+    """Return what is said of each extreme, its value on each level, and where it is on the finest."""
+    rows = []
+    for name, said, end, unit in _told(section):
+        levels = [level["extremes"].get(name) for level in _known(section)]
+        values = ["–" if level is None else f"{level[end]:.4g}" for level in levels]
+        values[-1] += _behind(section.get(unit))
+        rows.append([said, *values, f"at {_place(levels[-1][f'{end}_at'], section)}"])
+    return rows
+
+
+def _told(section: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Return the quantities of the finest level, each with what is said of it, by which end and in which unit."""
+    levels, told = _known(section), []
+    for name in levels[-1]["extremes"] if levels else ():
+        told.append((name, *SAYINGS.get(name, (f"{name} at most", "largest", ""))))
+        if name == "u":
+            told.append((name, "u at most", "largest", ""))
+    return told
