@@ -26,7 +26,6 @@ from .style import ColorRange, error_range, even_range
 SAMPLES = 121  # per direction of a face or mid-section
 LATTICE = 41  # per direction of the cube
 KEPT = 2  # results of one function
-VON_MISES = "von Mises"  # name in the controls of the view
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,13 +142,10 @@ def fields_of(solution: SplineField) -> list[Field]:
     fields = [solution_of(solution)]
     if solution.coefficients.shape[3:] == (3,):
         fields += components_of(solution)
-    quantities = quantities_of(solution) or {}
-    stress = (
-        quantity_of(solution, quantities["von_mises"], VON_MISES, "von Mises stress")
-        if "von_mises" in quantities
-        else None
-    )
-    return fields if stress is None else [stress, *fields]
+    if law := (quantities_of(solution) or {}).get("von_mises"):
+        stress = quantity_of(solution, law, "von Mises", "von Mises stress")
+        return fields if stress is None else [stress, *fields]
+    return fields
 
 
 @remembered
@@ -158,7 +154,7 @@ def error_of(volume: BSplineVolume, solution: SplineField, problem: BoundaryValu
     problem = problem.on(volume)
     found = sampled(lambda grid: error_at(solution.grid(*grid), problem, Points.on(volume, *grid)))
     limits = error_range([found.everywhere])
-    return Field(found.patches, found.lattice, "error", "|u − uₕ|, logarithmic", limits)
+    return Field(found.patches, found.lattice, "error", "|u − uₕ|", limits)
 
 
 def quantities_of(solution: SplineField) -> Mapping[str, Quantity] | None:

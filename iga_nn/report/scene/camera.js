@@ -78,9 +78,15 @@ class Camera {
   }
 }
 
-function fromMiddle(canvas, x, y) {
+// The middle of the picture, in pixels of the window, and a place of the window measured from it.
+function middleOf(canvas) {
   const box = canvas.getBoundingClientRect();
-  return [x - box.left - box.width / 2, y - box.top - box.height / 2];
+  return [box.left + box.width / 2, box.top + box.height / 2];
+}
+
+function fromMiddle(canvas, x, y) {
+  const middle = middleOf(canvas);
+  return [x - middle[0], y - middle[1]];
 }
 
 // One finger, or the mouse, turns; with Shift or the right button it moves; two fingers move and enlarge.
@@ -133,7 +139,8 @@ function watchWheel(canvas, camera, hint) {
   }, {passive: false});
 }
 
-function watchKeys(canvas, camera) {
+// Keys do what the pointer does; Enter clicks the middle of the picture.
+function watchKeys(canvas, camera, clicked) {
   const way = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
   canvas.addEventListener("keydown", (event) => {
     const by = way[event.key];
@@ -141,6 +148,7 @@ function watchKeys(canvas, camera) {
     else if (event.key === "+") camera.enlarge(1.2);
     else if (event.key === "-") camera.enlarge(1 / 1.2);
     else if (event.key === "0") camera.reset();
+    else if (event.key === "Enter") clicked(...middleOf(canvas));
     else if (event.key === "Escape") canvas.blur();  // the wheel scrolls the page again
     else return;
     event.preventDefault();

@@ -3,7 +3,7 @@
 const DECADES = 1e-4;  // of the largest value: where a logarithmic range of values that reach zero begins
 
 // The values between which a field is coloured, evenly or by their logarithms.
-class Range {
+class ColorRange {
   constructor({low, high, logarithmic, remark}) {
     Object.assign(this, {least: low, largest: high, first: logarithmic, remark});
     this.reset();

@@ -9,7 +9,7 @@ class View {
     this.scene = scene;
     this.canvas = element("view");
     this.graphics = new Graphics(scene, this.canvas);
-    this.ranges = Object.fromEntries(scene.fields.map((field) => [field.name, new Range(field)]));
+    this.ranges = Object.fromEntries(scene.fields.map((field) => [field.name, new ColorRange(field)]));
     this.player = new Player(scene, () => this.load());
     this.probed = null;  // as `hit` returns it
     this.camera = new Camera(scene.view, (view) => this.measured(view), () => this.draw());
@@ -55,19 +55,31 @@ class View {
     this.load();
   }
 
-  draw() {
+  draw(ink = getComputedStyle(this.canvas).color) {
     if (!this.shown) return;  // while it starts
     this.graphics.draw(this.camera, element("lined").checked);
     const patch = this.probed && this.shown.patches[this.probed.patch];
     const mark = patch && AXES.map((axis) => mixed(patch.places, 3, this.probed.corners, this.probed.weights, axis));
-    drawOverlay(element("overlay"), this.scene, this.camera, mark);
+    drawOverlay(element("overlay"), this.scene, this.camera, mark, ink);
   }
 
   probe(x, y) {
     this.probed = hit(this.shown.patches, this.scene.octant, this.camera, this.canvas, x, y);
-    const face = this.probed ? this.shown.patches[this.probed.patch].face : -1;
-    if (face >= 0 && window.parent !== window) window.parent.postMessage({face: this.scene.labels[face].slice(0, 2)}, "*");
     this.say(chosen("part"), Number(element("at").value));
+    this.draw();
+    if (window.parent === window) return;  // else the page that shows this one in a frame hears of it
+    const face = this.probed ? this.shown.patches[this.probed.patch].face : -1;
+    if (face >= 0) window.parent.postMessage({face: this.scene.labels[face].slice(0, 2)}, "*");
+    window.dispatchEvent(new Event("resize"));  // there are more lines now
+  }
+
+  // Hands the reader a picture on white paper.
+  save() {
+    const link = document.createElement("a");
+    this.draw("#111");
+    link.href = pictureOf([this.canvas, element("overlay")], this.scene, this.field, this.range, this.warpInWords);
+    link.download = "view.png";
+    link.click();
     this.draw();
   }
 
@@ -88,9 +100,9 @@ class View {
     const patch = this.probed && this.shown.patches[this.probed.patch];
     if (!patch) return element("picked").replaceChildren("Click the body to read the values there.");
     element("picked").replaceChildren();
-    if (patch.face >= 0) put(element("picked"), "reading", `face ${scene.labels[patch.face]}`);
+    if (patch.face >= 0) put(element("picked"), "reading", `Face ${scene.labels[patch.face]}`);
     for (const [name, text] of readings(scene, player.frame, patch, this.probed))
-      put(put(element("picked"), "reading", `${name} `), "number", text);
+      put(put(element("picked"), "reading", `${name} = `), "number", text);
   }
 }
 
@@ -112,29 +124,29 @@ function start(scene) {
   press("smaller", () => camera.enlarge(1 / 1.3));
   press("reset", () => camera.reset());
   press("full", () => document.fullscreenElement ? document.exitFullscreen() : element("scene").requestFullscreen());
-  press("save", () => {
-    const link = document.createElement("a");
-    link.href = pictureOf([canvas, element("overlay")], scene, view.field, view.range, view.warpInWords);
-    link.download = "view.png";
-    link.click();
-  });
+  press("save", () => view.save());
   watchRange(() => view.range, showRange);
-  watchPointers(canvas, camera, (x, y) => view.probe(x, y));
+  const probe = (x, y) => view.probe(x, y);
+  watchPointers(canvas, camera, probe);
   watchWheel(canvas, camera, element("hint"));
-  watchKeys(canvas, camera);
+  watchKeys(canvas, camera, probe);
   element("scene").classList.remove("absent");
   showRange();
   new ResizeObserver(() => view.draw()).observe(canvas);
+  const recolored = () => requestAnimationFrame(() => view.draw());
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolored);
+  window.addEventListener("message", recolored);
 }
 
 // Sets the controls to what the view opens on: what the address names, else what the scene says.
 function setControls(scene) {
   const check = (name, value) => {
-    const input = [...document.querySelectorAll(`input[name=${name}]`)].find((one) => one.value === value);
+    const all = [...document.querySelectorAll(`input[name=${name}]`)];
+    const input = all.find((one) => [one.value, encodeURIComponent(one.value)].includes(value));
     if (input) input.checked = true;
     return Boolean(input);
   };
-  const named = decodeURIComponent(location.hash.slice(1));
+  const named = location.hash.slice(1);
   if (!check("field", named)) check("field", scene.opening.field);
   check("part", named === "faces" ? "surface" : scene.opening.part);
   element("at").step = 1 / (scene.samples.lattice - 1);

@@ -4,14 +4,14 @@ const AXIS_COLORS = ["#cc3311", "#228833", "#3377cc"];
 const ARM = 30, EDGE = 16;  // pixels: of an axis; from the canvas's edge
 const SCALE = 0.25;  // of the width: the scale bar is no longer
 
-function drawOverlay(canvas, scene, camera, mark) {
+function drawOverlay(canvas, scene, camera, mark, ink) {
   const ratio = sharpened(canvas), pen = canvas.getContext("2d");
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   pen.scale(ratio, ratio);
   pen.font = "13px system-ui, sans-serif";
   pen.lineWidth = 2;
   drawAxes(pen, camera.view, [EDGE + ARM + 6, height - EDGE - ARM - 6]);
-  drawScale(pen, scene, camera.fit(canvas), width, height, getComputedStyle(canvas).color);
+  drawScale(pen, scene, camera.fit(canvas), width, height, ink);
   if (mark) drawMark(pen, camera, camera.fit(canvas), mark, width, height);
 }
 

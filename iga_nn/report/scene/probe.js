@@ -1,5 +1,7 @@
 // Finds what is drawn at a place of the picture, and the values there.
 
+const PLACES = 2e-5;  // of the box's diagonal: places are known no better
+
 // The patch at a place of the window, its triangle and the weights of the corners; null where there is none.
 function hit(patches, octant, camera, canvas, x, y) {
   const [right, down] = fromMiddle(canvas, x, y), fit = camera.fit(canvas);
@@ -49,9 +51,9 @@ function isCutAway(patch, corners, weights, octant) {
 // What is said of a place: pairs of a name and a text.
 function readings(scene, frame, patch, {corners, weights}) {
   const at = (data, entry) => mixed(data, 3, corners, weights, entry);
-  const rest = patch.take(scene.places, 3);
+  const rest = patch.take(scene.places, 3), step = scene.size * PLACES;
   const found = [
-    ["x, y, z", AXES.map((axis) => written(scene.middle[axis] + scene.size * at(rest, axis))).join(", ")],
+    ["x, y, z", AXES.map((axis) => written(step * Math.round((scene.middle[axis] + scene.size * at(rest, axis)) / step))).join(", ")],
     ["u, v, w", AXES.map((axis) => at(patch.parameters, axis).toFixed(3)).join(", ")],
   ];
   for (const field of scene.fields)
@@ -67,6 +69,6 @@ function reading(field, value) {
 // A number of four significant digits, without needless zeros.
 function written(value) {
   const size = Math.abs(value);
-  if (size && (size < 1e-3 || size >= 1e6)) return value.toExponential(3).replace(/\.?0+e/, "e").replace("-", "−");
-  return String(Number(value.toPrecision(4))).replace("-", "−");
+  if (size && (size < 1e-3 || size >= 1e6)) return value.toExponential(3).replace(/\.?0+e/, "e");
+  return String(Number(value.toPrecision(4)));
 }
