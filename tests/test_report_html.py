@@ -130,6 +130,14 @@ def test_scene_of_a_body_has_stress_and_displacements():
     assert found == pytest.approx(solution([[0.5, 0.25, 0.75]])[0], abs=2e-5 * drawing["bound"])
 
 
+def test_the_view_opens_where_the_solution_is_seen():
+    volume = benchmark_volume(2)
+    cooled = solve.Poisson(source="1", boundary="0", neumann={"u1": "1"})  # zero on five faces
+    parts = [scene.scene_of(volume, solve.solve_problem(volume, one))["opening"] for one in (cooled, solve.Poisson())]
+    assert parts == [{"field": "solution", "part": "cut"}, {"field": "solution", "part": "surface"}]
+    assert scene.scene_of(volume)["opening"] == {"field": "faces", "part": "surface"}
+
+
 def test_a_solution_of_a_law_of_ones_own_displaces_nothing():
     class Flow(solve.Form):
         components = 3

@@ -43,7 +43,7 @@ Scene = dict[str, Any]
 
 LENGTH = 3  # in place of a component: the length of the vector
 COMPONENTS = {"|u|": LENGTH, "u_x": 0, "u_y": 1, "u_z": 2}  # fields that the page finds from the vectors
-EVEN = 0.01  # of a field's range: where it varies less on the boundary, the view opens on the inside
+EVEN = 0.01  # of a field's range: where half of the boundary varies less, the view opens on the inside
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,12 +177,13 @@ def _bound(frames: Sequence[Frame]) -> float:
 
 
 def _opening(frame: Frame) -> dict[str, str]:
-    """Return what is seen first: the first field, on the boundary, unless it hardly varies there."""
+    """Return what is seen first: the first field, on the boundary, unless half of that has nearly one value."""
     if not frame.fields:
         return {"field": "faces", "part": "surface"}
-    field, places = frame.fields[0], [frame.fields[0].limits.shares(patch) for patch in frame.fields[0].patches[:6]]
-    varies = max(map(np.max, places)) - min(map(np.min, places)) > EVEN
-    return {"field": field.name, "part": "surface" if varies or field.limits.remark else "cut"}
+    field = frame.fields[0]
+    quarters = np.percentile([field.limits.shares(patch) for patch in field.patches[:6]], [25.0, 75.0])
+    is_even = quarters[1] - quarters[0] < EVEN and not field.limits.remark
+    return {"field": field.name, "part": "cut" if is_even else "surface"}
 
 
 def _described(field: Field, frame: Frame) -> dict[str, Any]:
