@@ -58,7 +58,7 @@ def test_units_stand_behind_lengths_and_stresses(in_folder, capsys):
 
 @pytest.mark.parametrize("width", [1280, 400])
 def test_browser_draws_the_scene_and_fetches_nothing(chromium, result, tmp_path, width):
-    image, console, asked = browse(chromium, tmp_path, f"{(result / 'report.html').as_uri()}", width)
+    image, console, asked = browse(chromium, tmp_path, (result / "report.html").as_uri() + "#faces", width)
     assert console == "" and asked == []
     hues = drawn(image)[:, 0]
     wanted = rgb_to_hsv(np.array([to_rgb(color) for color in FACE_COLORS]))[:, 0]
@@ -67,7 +67,7 @@ def test_browser_draws_the_scene_and_fetches_nothing(chromium, result, tmp_path,
 
 
 def test_address_chooses_what_is_coloured(chromium, result, tmp_path):
-    faces, *_ = browse(chromium, tmp_path, (result / "report.html").as_uri(), 700)
+    faces, *_ = browse(chromium, tmp_path, (result / "report.html").as_uri() + "#faces", 700)
     error, console, _ = browse(chromium, tmp_path, (result / "report.html").as_uri() + "#error", 700)
     assert console == "" and len(drawn(error)) > 5000
     assert np.mean(np.abs(faces - error).max(axis=-1) > 0.1) > 0.05
@@ -130,15 +130,51 @@ def test_scene_holds_places_and_values(result):
     places = {(1, 0, 1): faces[1, 0, last], (0.5, 1, 0): faces[4, middle, last], (0, 0.5, 0.25): inside[0, 20, 10]}
     for at, place in places.items():
         assert np.abs(low + place * (high - low) - volume([at])).max() < 1e-4
-    assert [field["name"] for field in drawing["fields"]] == ["distortion", "solution", "error"]
-    values = np.frombuffer(base64.b64decode(drawing["fields"][1]["values"]["faces"]), "<u2").reshape(6, n, n)
+    assert [field["name"] for field in drawing["fields"]] == ["solution", "error", "distortion"]
+    values = drawing["frames"][0]["values"]["solution"]["faces"]
+    values = np.frombuffer(base64.b64decode(values), "<u2").reshape(6, n, n)
     x, y, _ = volume([(1, 0, 1)])[0]
-    low_u, high_u = float(drawing["fields"][1]["low"]), float(drawing["fields"][1]["high"])
-    assert values[1, 0, last] / 65535 == pytest.approx((x + 2 * y - low_u) / (high_u - low_u), abs=0.01)
+    low_u, high_u = drawing["fields"][0]["low"], drawing["fields"][0]["high"]
+    assert values[1, 0, last] / 65535 == pytest.approx((x + 2 * y - low_u) / (high_u - low_u), abs=1e-4)
 
 
-def test_scene_of_a_body_has_lengths(result):
+def test_scene_of_a_body_has_stress_and_displacements():
     volume = benchmark_volume(1)
     body = solve.Elasticity(force=("0", "0", "-1"))
-    drawing = scene.scene_of(volume, solve.solve_problem(volume, body), body)
-    assert [field["title"] for field in drawing["fields"]] == ["tanh(√ARAP / 2), at volume 1", "|u|"]
+    solution = solve.solve_problem(volume, body)
+    drawing = scene.scene_of(volume, solution, body)
+    titles = ["von Mises stress", "|u|", "u_x", "u_y", "u_z", "tanh(√ARAP / 2), at volume 1"]
+    assert [field["title"] for field in drawing["fields"]] == titles
+    n, vectors = drawing["samples"]["lattice"], drawing["frames"][0]["vectors"]
+    packed = np.frombuffer(base64.b64decode(vectors["lattice"]), "<u2").reshape(n, n, n, 3)
+    found = (packed[20, 10, 30] / 65535 * 2 - 1) * drawing["bound"]
+    assert found == pytest.approx(solution([[0.5, 0.25, 0.75]])[0], abs=2e-5 * drawing["bound"])
+
+
+def test_the_view_opens_where_the_solution_is_seen():
+    volume = benchmark_volume(2)
+    cooled = solve.Poisson(source="1", boundary="0", neumann={"u1": "1"})  # zero on five faces
+    parts = [scene.scene_of(volume, solve.solve_problem(volume, one))["opening"] for one in (cooled, solve.Poisson())]
+    assert parts == [{"field": "solution", "part": "cut"}, {"field": "solution", "part": "surface"}]
+    assert scene.scene_of(volume)["opening"] == {"field": "faces", "part": "surface"}
+
+
+def test_a_solution_of_a_law_of_ones_own_displaces_nothing():
+    class Flow(solve.Form):
+        components = 3
+
+        def flux(self, u, grad, x):
+            return grad
+
+    volume = benchmark_volume(1)
+    flow = solve.solve_problem(volume, solve.Problem(Flow(), exact=("x", "y", "z")))
+    drawing = scene.scene_of(volume, flow)
+    assert drawing["warp"] == 0.0 and [field["name"] for field in drawing["fields"]][:2] == ["|u|", "u_x"]
+
+
+def test_the_solution_stands_first(result):
+    text = (result / "report.html").read_text(encoding="utf-8")
+    assert text.index(VERDICT) < text.index("<h2>The solution</h2>") < text.index("The problem")
+    if "The solution on the boundary and inside" in text:
+        assert text.index("<figure>") > text.index("<h2>The solution on the boundary and inside</h2>")
+        assert text.index("<figure>") < text.index("<h2>Errors over the mesh size</h2>")

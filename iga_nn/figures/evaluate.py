@@ -39,11 +39,6 @@ def points_on(volume: BSplineVolume, grid: Grid) -> Array:
     return flat(volume.grid(*grid))
 
 
-def lengths(values: Array) -> Array:
-    """Return scalars on a tensor grid (n_u, n_v, n_w) as they are, and the lengths of vectors (n_u, n_v, n_w, k)."""
-    return values if values.ndim == 3 else np.asarray(np.linalg.norm(values, axis=-1))
-
-
 def error_at(found: Array, problem: BoundaryValueProblem, x: Points) -> Array:
     """Return |u - u_h| at points x (3, ...). found: u_h there, (...), or vectors (..., 3)."""
     exact, _ = problem.exact_at(x)

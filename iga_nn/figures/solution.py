@@ -17,9 +17,10 @@ from ..levels import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units
 from .cutaway import best_cut, without_octant
 from .evaluate import SECTIONS
-from .fields import Field, error_of, points_of, sampled, solution_of
+from .fields import STRESS, Field, Samples, diagonal_of, error_of, fields_of, points_of, solution_of, vectors_of
 from .render import Patch, check_drawable, draw
 from .style import PANEL, color_bar, colors, panels_of, save, show_around, show_section, with_unit
+from .warp import in_words, warp_of
 
 
 def draw_error(
@@ -46,8 +47,19 @@ def draw_error(
 def draw_solution(
     path: str | Path | None, volume: BSplineVolume, solution: SplineField, units: Units = NO_UNITS
 ) -> Figure:
-    """Draw u_h, or the length of a vector u_h, as `draw_values` does."""
-    return draw_values(path, volume, solution, with_unit(solution_of(solution).title, units.displacement))
+    """Draw u_h on the boundary, in the volume cut open and on the mid-sections; of a body, von Mises' stress.
+
+    A body is drawn as its displacements deform it, enlarged by a factor that the title states.
+    """
+    field, points = fields_of(solution)[0], points_of(volume)
+    label = with_unit(field.title, units.stress if field.name == STRESS else units.displacement)
+    if not (factor := warp_of(solution, diagonal_of(points))):
+        return _draw_values(path, points.patches, field, label)
+    largest = max(float(values.max()) for values in solution_of(solution).everywhere)
+    most = with_unit(f"at most {largest:.3g}", units.displacement)
+    title = f"The deformed body: displacements, {most}, are drawn {in_words(factor)} times as large"
+    moved = moved_by(points, solution, factor)
+    return _draw_values(path, moved, field, label, title)
 
 
 def draw_values(
@@ -62,10 +74,20 @@ def draw_values(
 
     The colours range over the whole solid. exaggerate: draw the body displaced by that many times u_h, a vector.
     """
-    field, points = solution_of(solution), points_of(volume).patches
-    if exaggerate is not None:
-        moved = sampled(lambda grid: solution.grid(*grid)).patches
-        points = [where + exaggerate * by for where, by in zip(points, moved, strict=True)]
+    points = points_of(volume)
+    moved = points.patches if exaggerate is None else moved_by(points, solution, exaggerate)
+    return _draw_values(path, moved, solution_of(solution), title)
+
+
+def moved_by(points: Samples, solution: SplineField, factor: float) -> list[Array]:
+    """Return the nine patches of points, displaced by a factor times the solution."""
+    return [where + factor * by for where, by in zip(points.patches, vectors_of(solution).patches, strict=True)]
+
+
+def _draw_values(
+    path: str | Path | None, points: Sequence[Array], field: Field, label: str, heading: str = ""
+) -> Figure:
+    """Draw a field on nine patches of points (m, m, 3). label: of the colour bar. heading: of the figure."""
     patches = _colored(points, field)
     figure, rows = panels_of(2, 3)
     show_around(rows[0][:2], patches[:6])
@@ -74,8 +96,8 @@ def draw_values(
     rows[0][2].imshow(draw(without_octant(halved, octant), view, PANEL))
     rows[0][2].set_title("cut open", fontsize=13)
     _show_sections(rows[1], patches[6:])
-    color_bar(figure, rows, field.limits, title)
-    return save(figure, path)
+    color_bar(figure, rows, field.limits, label)
+    return save(figure, path, heading)
 
 
 def _colored(points: Sequence[Array], field: Field) -> list[Patch]:

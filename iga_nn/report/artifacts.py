@@ -63,6 +63,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact(REPORT, "report", "the report for programs: input, configuration, versions, certificate, errors, seconds"),
     Artifact("history.npz", "map", "the loss, its terms and the number of folded samples at every training step"),
     Artifact("study.csv", "study", "the errors and their rates in a convergence study"),
+    Artifact("solution.png", "solution", "the solution on the boundary and inside", "solution.draw_solution", _VALUES),
     Artifact("meeting.png", "map", "where the boundary meets itself", "map.draw_meeting", ("volume", "meeting")),
     Artifact("folds.png", "map", "where det J > 0 is not proved", "map.draw_folds", ("volume", "places")),
     Artifact("faces.png", "map", "images of the cube's faces", "map.draw_faces", ("volume", "marks")),
@@ -72,7 +73,6 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("history.png", "map", "loss over the training steps", "curves.draw_history", ("history",)),
     Artifact("named_faces.png", "solution", "the volume's faces by name", "map.draw_faces", ("named_volume",)),
     Artifact("convergence.png", "solution", "errors over the mesh size", "curves.draw_study", ("levels",)),
-    Artifact("solution.png", "solution", "the solution on the boundary and inside", "solution.draw_solution", _VALUES),
     Artifact("error.png", "solution", "error on the boundary and on three sections", "solution.draw_error", _ERROR),
     Artifact(
         "study.png", "study", "errors of the convergence study over the mesh size", "curves.draw_study", ("study",)

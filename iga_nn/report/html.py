@@ -21,6 +21,7 @@ from . import extremes
 from .advice import in_words
 from .artifacts import PAGE, SOLVED, figures_of
 from .document import Report
+from .statement import regions_of, statement_of
 
 log = logging.getLogger(__name__)
 
@@ -76,7 +77,8 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         facts=_facts(report),
         scene=scene,
         advice=in_words(report),
-        exact=section.get("exact"),
+        statement=statement_of(report),
+        regions=regions_of(report),
         levels=_levels(section),
         extremes=extremes.table(section),
         notices=notices(report),

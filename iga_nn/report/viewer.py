@@ -1,12 +1,17 @@
 """Makes the interactive scene of report.html: a volume and the fields on it as compact arrays for the page's script.
 
-The six faces are sampled on lattices of points, the inside on one lattice through the cube, whose planes are the
-sections that the page shows. Places are 16-bit numbers between two corners of the scene, values 16-bit numbers between
-the ends of their colour bar, all in Base64: some 1.8 MB for a volume with all its fields.
+The six faces are sampled on lattices of points, the inside on one lattice through the cube, from which the page takes
+its sections. Places are 16-bit numbers between two corners of the scene, values 16-bit numbers between the ends of
+their range, all in Base64: some 0.7 MB for the places and for displacements, 0.25 MB for every other field.
+
+A scene has one frame, or several: modes, or steps in time. A frame holds the values of its fields by their names; what
+it does not hold is that of the first one.
 """
 
 import base64
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from matplotlib import colormaps
@@ -15,13 +20,65 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.spline.volume import AXES, BSplineVolume
 from solve import SplineField
+from solve.forms.form import Quantity
 
 from ..figures import evaluate
 from ..figures.cutaway import best_cut, patches_of
-from ..figures.fields import Field, Samples, distortion_of, error_of, points_of, solution_of
+from ..figures.fields import (
+    Field,
+    Samples,
+    diagonal_of,
+    distortion_of,
+    error_of,
+    fields_of,
+    points_of,
+    quantity_of,
+    vectors_of,
+)
+from ..figures.style import even_range
+from ..figures.warp import factor_for, is_displacement, warp_of
 from ..options import Equation
 
 Scene = dict[str, Any]
+
+LENGTH = 3  # in place of a component: the length of the vector
+COMPONENTS = {"|u|": LENGTH, "u_x": 0, "u_y": 1, "u_z": 2}  # fields that the page finds from the vectors
+EVEN = 0.01  # of a field's range: where half of the boundary varies less, the view opens on the inside
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Hold one mode, or one step in time: what is shown of it, and its name beside the slider.
+
+    label: such as "mode 1: 12.5 Hz" or "t = 0.1 s". fields: the first is shown first. vectors: (..., 3), or None.
+    displaces: whether the vectors displace the body.
+    """
+
+    label: str
+    fields: Sequence[Field]
+    vectors: Samples | None = None
+    displaces: bool = False
+
+    @classmethod
+    def of(cls, label: str, solution: SplineField, quantities: Mapping[str, Quantity] | None = None) -> Self:
+        """Return the frame of a solution on its volume.
+
+        quantities: further fields by their names, functions of u (c, ...), grad (c, 3, ...) and x (3, ...) that return
+        (...); they stand first. Those that are not finite are left out.
+
+        Examples
+        --------
+        >>> import iga_nn
+        >>> from solve import benchmark_volume
+        >>> heat = iga_nn.solve(benchmark_volume(1), iga_nn.Poisson(exact="x"))
+        >>> frame = Frame.of("t = 0.1 s", heat, {"du/dx": lambda u, grad, x: grad[0, 0]})
+        >>> [field.name for field in frame.fields]
+        ['du/dx', 'solution']
+        """
+        named = [quantity_of(solution, quantity, name, name) for name, quantity in (quantities or {}).items()]
+        fields = [field for field in named if field is not None] + fields_of(solution)
+        vectors = vectors_of(solution) if solution.coefficients.shape[3:] == (3,) else None
+        return cls(label, fields, vectors, is_displacement(solution))
 
 
 def scene_of(
@@ -35,40 +92,128 @@ def scene_of(
 
     coarser: 2 leaves out every second point.
     """
-    points, fields = points_of(volume), [distortion_of(volume)]
-    if solution is not None and np.all(np.isfinite(solution.coefficients)):
-        fields.append(solution_of(solution))
-        if problem is not None and problem.exact is not None:
-            fields.append(error_of(volume, solution, problem))
+    if solution is None or not np.all(np.isfinite(solution.coefficients)):
+        return _scene(volume, [Frame("", [])], coarser)
+    frame = Frame.of("", solution)
+    if problem is not None and problem.exact is not None:
+        frame = replace(frame, fields=[*frame.fields, error_of(volume, solution, problem)])
+    return _scene(volume, [frame], coarser) | {"warp": warp_of(solution, diagonal_of(points_of(volume)))}
+
+
+def scene_of_frames(
+    volume: BSplineVolume,
+    frames: Sequence[Frame],
+    *,
+    oscillates: bool = False,
+    coarser: int = 2,
+) -> Scene:
+    """Return the scene of several frames, which the page plays one after another; a field has one range in all of them.
+
+    Vectors of three components displace the body, by a factor that shows the largest well. oscillates: for modes, a
+    frame swings between its displacements and their opposite. coarser: as in `scene_of`; with 2 a frame takes some
+    40 kB a field, and 120 kB its displacements.
+    Raises ValueError for no frames, and for frames of different fields.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> volume = benchmark_volume(1)
+    >>> warm, hot = (iga_nn.solve(volume, iga_nn.Poisson(exact=exact)) for exact in ("x", "2*x"))
+    >>> scene = scene_of_frames(volume, [Frame.of("t = 1 s", warm), Frame.of("t = 2 s", hot)])
+    >>> [frame["label"] for frame in scene["frames"]], round(scene["fields"][0]["high"], 2)
+    (['t = 1 s', 't = 2 s'], 2.15)
+    """
+    names = [[field.name for field in frame.fields] for frame in frames]
+    if not names or any(other != names[0] for other in names):
+        raise ValueError(f"frames must have the same fields, and there must be one at least, got {names}")
+    limits = [
+        even_range([values for field in fields for values in field.everywhere])
+        for fields in zip(*(frame.fields for frame in frames), strict=True)
+    ]
+    alike = [
+        replace(frame, fields=[replace(field, limits=ends) for field, ends in zip(frame.fields, limits, strict=True)])
+        for frame in frames
+    ]
+    moved = [frame.vectors for frame in alike if frame.displaces and frame.vectors is not None]
+    lengths = [np.linalg.norm(values, axis=-1).max() for vectors in moved for values in vectors.everywhere]
+    factor = factor_for(diagonal_of(points_of(volume)), float(max(lengths, default=0.0)))
+    return _scene(volume, alike, coarser) | {"warp": factor, "oscillates": oscillates}
+
+
+def _scene(volume: BSplineVolume, frames: Sequence[Frame], coarser: int) -> Scene:
+    """Return a scene of frames with the same fields; the distortion of the volume joins those of the first."""
+    points = points_of(volume)
     cloud = np.concatenate([where.reshape(-1, 3) for where in points.everywhere])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
     octant, view = best_cut(patches_of(points.patches)[:6])
-    frame = np.stack([view.right, view.up, view.towards])
-    half = np.abs((cloud - (low + high) / 2.0) @ frame[:2].T).max(axis=0)  # width and height as first seen
-    places = Samples([_shares(where, low, high) for where in points.patches], _shares(points.lattice, low, high))
-    faces, lattice = _thinned(places, coarser)
+    count, many = (part.shape[1] for part in _thinned(points, coarser))
+    whole = [replace(frames[0], fields=[*frames[0].fields, distortion_of(volume)]), *frames[1:]]
+    bound = _bound(frames)
     return {
-        "samples": {"faces": faces.shape[1], "lattice": len(lattice)},  # per direction
+        "samples": {"faces": count, "lattice": many},  # per direction
         "low": low.tolist(),
         "high": high.tolist(),
-        "view": frame.tolist(),
-        "half": half.tolist(),
+        "view": np.stack([view.right, view.up, view.towards]).tolist(),
         "octant": list(octant),  # what the cut leaves out
-        "places": {"faces": _packed(faces), "lattice": _packed(lattice)},
+        "places": _both(points, coarser, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
         "axes": list(AXES),
         "colors": list(evaluate.FACE_COLORS),
         "labels": evaluate.face_labels(),
         "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
-        "fields": [_described(field, coarser) for field in fields],
+        "fields": [_described(field, frames[0]) for field in whole[0].fields],
+        "frames": [_values(frame, bound, coarser) for frame in whole],
+        "bound": bound,  # of the entries of all vectors
+        "warp": 0.0,
+        "oscillates": False,
+        "opening": _opening(frames[0]),
     }
 
 
-def _described(field: Field, coarser: int) -> dict[str, Any]:
-    """Return a field with its values as places between the ends of its range."""
-    low, high = field.limits.labels
-    faces, lattice = _thinned(field, coarser)
-    values = {name: _packed(field.limits.shares(part)) for name, part in (("faces", faces), ("lattice", lattice))}
-    return {"name": field.name, "title": field.title, "low": low, "high": high, "values": values}
+def _bound(frames: Sequence[Frame]) -> float:
+    """Return the largest entry of all vectors, 1 where there is none."""
+    parts = [values for frame in frames if frame.vectors is not None for values in frame.vectors.everywhere]
+    return max((float(np.abs(values).max()) for values in parts), default=0.0) or 1.0
+
+
+def _opening(frame: Frame) -> dict[str, str]:
+    """Return what is seen first: the first field, on the boundary, unless half of that has nearly one value."""
+    if not frame.fields:
+        return {"field": "faces", "part": "surface"}
+    field = frame.fields[0]
+    quarters = np.percentile([field.limits.shares(patch) for patch in field.patches[:6]], [25.0, 75.0])
+    is_even = quarters[1] - quarters[0] < EVEN and not field.limits.remark
+    return {"field": field.name, "part": "cut" if is_even else "surface"}
+
+
+def _described(field: Field, frame: Frame) -> dict[str, Any]:
+    """Return what the controls and the bar say of a field; the page finds its values from vectors where it can."""
+    limits = field.limits
+    described = {"name": field.name, "title": field.title, "low": limits.low, "high": limits.high}
+    described |= {"logarithmic": limits.logarithmic, "remark": limits.remark}
+    return described | ({"component": COMPONENTS[field.name]} if _is_derived(field, frame) else {})
+
+
+def _is_derived(field: Field, frame: Frame) -> bool:
+    return frame.vectors is not None and field.name in COMPONENTS
+
+
+def _values(frame: Frame, bound: float, coarser: int) -> dict[str, Any]:
+    """Return the values of a frame, as places between the ends of their ranges."""
+    values = {
+        field.name: _both(field, coarser, field.limits.shares)
+        for field in frame.fields
+        if not _is_derived(field, frame)
+    }
+    vectors = frame.vectors and _both(frame.vectors, coarser, lambda found: 0.5 + 0.5 * found / bound)
+    return {"label": frame.label, "values": values, "vectors": vectors}
+
+
+def _both(samples: Samples, coarser: int, shares: Callable[[Array], Array]) -> dict[str, str]:
+    """Return the packed shares of samples, on the faces and in the lattice."""
+    return {
+        name: _packed(shares(part)) for name, part in zip(("faces", "lattice"), _thinned(samples, coarser), strict=True)
+    }
 
 
 def _thinned(samples: Samples, coarser: int) -> tuple[Array, Array]:
@@ -76,10 +221,6 @@ def _thinned(samples: Samples, coarser: int) -> tuple[Array, Array]:
     step = slice(None, None, coarser)
     faces = np.stack([patch[:: 2 * coarser, :: 2 * coarser] for patch in samples.patches[:6]])
     return faces, samples.lattice[step, step, step]
-
-
-def _shares(points: Array, low: Array, high: Array) -> Array:
-    return np.asarray((points - low) / np.where(high > low, high - low, 1.0))
 
 
 def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint16) -> str:

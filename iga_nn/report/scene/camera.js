@@ -19,17 +19,44 @@ function turned(view, across, along) {
   return [right, up, [0, 1, 2].map((k) => right[(k + 1) % 3] * up[(k + 2) % 3] - right[(k + 2) % 3] * up[(k + 1) % 3])];
 }
 
+// The view rows to the right, up and towards the viewer, of one who looks from a direction.
+function viewFrom(towards) {
+  const up = Math.abs(towards[2]) > 0.9 ? [0, 1, 0] : [0, 0, 1];
+  const cross = (a, b) => [0, 1, 2].map((k) => a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
+  const unit = (a) => a.map((value) => value / Math.hypot(...a));
+  const right = unit(cross(up, towards));
+  return [right, cross(unit(towards), right), unit(towards)];
+}
+
+const VIEWS = {
+  "iso": viewFrom([1, -1, 1]),
+  "+x": viewFrom([1, 0, 0]), "−x": viewFrom([-1, 0, 0]),
+  "+y": viewFrom([0, 1, 0]), "−y": viewFrom([0, -1, 0]),
+  "+z": viewFrom([0, 0, 1]), "−z": viewFrom([0, 0, -1]),
+};
+
 // What is seen: the turned view, the enlargement, and how far the picture is moved, in pixels of the page.
+// `measured` gives half the width and height of what is drawn, as a view shows it.
 class Camera {
-  constructor(view, changed) {
-    this.first = view;
+  constructor(view, measured, changed) {
+    this.measured = measured;
     this.changed = changed;
+    this.look(view);
+  }
+
+  look(view) {
+    this.first = view;
     this.reset();
   }
 
   reset() {
-    [this.view, this.zoom, this.shift] = [this.first, 1, [0, 0]];
+    [this.view, this.zoom, this.shift, this.half] = [this.first, 1, [0, 0], this.measured(this.first)];
     this.changed(this);
+  }
+
+  // Pixels of the page for a unit of the scene.
+  fit(canvas) {
+    return 0.48 * this.zoom * Math.min(canvas.clientWidth / this.half[0], canvas.clientHeight / this.half[1]);
   }
 
   turn(across, along) {
@@ -51,9 +78,15 @@ class Camera {
   }
 }
 
-function fromMiddle(canvas, x, y) {
+// The middle of the picture, in pixels of the window, and a place of the window measured from it.
+function middleOf(canvas) {
   const box = canvas.getBoundingClientRect();
-  return [x - box.left - box.width / 2, y - box.top - box.height / 2];
+  return [box.left + box.width / 2, box.top + box.height / 2];
+}
+
+function fromMiddle(canvas, x, y) {
+  const middle = middleOf(canvas);
+  return [x - middle[0], y - middle[1]];
 }
 
 // One finger, or the mouse, turns; with Shift or the right button it moves; two fingers move and enlarge.
@@ -106,7 +139,8 @@ function watchWheel(canvas, camera, hint) {
   }, {passive: false});
 }
 
-function watchKeys(canvas, camera) {
+// Keys do what the pointer does; Enter clicks the middle of the picture.
+function watchKeys(canvas, camera, clicked) {
   const way = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
   canvas.addEventListener("keydown", (event) => {
     const by = way[event.key];
@@ -114,6 +148,7 @@ function watchKeys(canvas, camera) {
     else if (event.key === "+") camera.enlarge(1.2);
     else if (event.key === "-") camera.enlarge(1 / 1.2);
     else if (event.key === "0") camera.reset();
+    else if (event.key === "Enter") clicked(...middleOf(canvas));
     else if (event.key === "Escape") canvas.blur();  // the wheel scrolls the page again
     else return;
     event.preventDefault();

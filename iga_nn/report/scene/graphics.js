@@ -1,49 +1,51 @@
 // Draws patches with WebGL 2, in parallel projection. Fields have the colours of their bar, without any shading.
 
-const INSIDE = "#b8bdc7";  // of sections where no field is shown
 const OUTLINE = "#7f8b97";
 const NEARER = 0.002;  // of the depth: keeps outlines before the patches they surround
+const LIT = 0, FLAT = 1, FAINT = 2;  // how a plain colour looks
 
 const VERTEX_SHADER = `#version 300 es
-in vec3 place, normal;
+in vec3 place, normal, parameter;
 in float value;
-uniform vec3 extent;
 uniform mat3 turn;
 uniform vec2 scale, shift;
 uniform float nearer;
-uniform int samples;
-out vec3 facing;
-out vec2 parameters;
+out vec3 facing, parameters;
 out float share;
 void main() {
-  vec3 seen = turn * ((place - 0.5) * extent);
-  gl_Position = vec4(seen.xy * scale + shift, -0.5 * seen.z / length(extent) - nearer, 1.0);
-  parameters = vec2(gl_VertexID / samples, gl_VertexID % samples) / float(samples - 1);
+  vec3 seen = turn * place;
+  gl_Position = vec4(seen.xy * scale + shift, -0.5 * seen.z - nearer, 1.0);
+  parameters = parameter;
   facing = turn * normal;
   share = value;
 }`;
 
 const FRAGMENT_SHADER = `#version 300 es
 precision highp float;
-in vec3 facing;
-in vec2 parameters;
+in vec3 facing, parameters;
 in float share;
 uniform sampler2D map;
-uniform vec3 plain;
-uniform vec2 quarter;
-uniform int clip;  // 0: nothing, 1: leave the quarter out, 2: keep it alone
-uniform bool mapped, lined, flat_color;
+uniform vec3 plain, octant;
+uniform int clip, look;
+uniform bool mapped, lined;
 out vec4 color;
 void main() {
-  vec2 side = (parameters - 0.5) * (2.0 * quarter - 1.0);
-  if (clip > 0 && (min(side.x, side.y) > 0.0) == (clip == 1)) discard;
+  vec3 side = (parameters - 0.5) * (2.0 * octant - 1.0);
+  float inside = min(side.x, min(side.y, side.z));
+  if (clip == ${WITHOUT} && inside > 0.0 || clip == ${ALONE} && inside < -1e-6) discard;
+  float towards = abs(normalize(facing).z);
+  if (look == ${FAINT}) {
+    float dense = 0.06 + 0.3 * pow(1.0 - towards, 2.0);
+    color = vec4(plain * dense, dense);
+    return;
+  }
   vec3 base = plain;
   if (mapped) base = texture(map, vec2(share, 0.5)).rgb;
-  else if (!flat_color) base *= 0.5 + 0.5 * abs(normalize(facing).z);
-  if (lined && !flat_color) {
-    vec2 cell = parameters * 10.0, width = fwidth(cell);
-    vec2 near = abs(cell - round(cell)) / max(width, 1e-6);
-    base *= 1.0 - 0.45 * (1.0 - smoothstep(0.4, 1.3, min(near.x, near.y)));
+  else if (look == ${LIT}) base *= 0.5 + 0.5 * towards;
+  if (lined && look != ${FLAT}) {
+    vec3 cell = parameters * 10.0, width = fwidth(cell);
+    vec3 near = mix(vec3(9.0), abs(cell - round(cell)) / max(width, 1e-6), greaterThan(width, vec3(1e-6)));
+    base *= 1.0 - 0.45 * (1.0 - smoothstep(0.4, 1.3, min(near.x, min(near.y, near.z))));
   }
   color = vec4(base, 1.0);
 }`;
@@ -62,41 +64,18 @@ function compiled(gl) {
   return program;
 }
 
-// The corners of the triangles of a patch of n x n points.
-function triangles(n) {
-  const found = new Uint32Array(6 * (n - 1) ** 2);
-  let at = 0;
-  for (let i = 0; i + 1 < n; i++)
-    for (let j = 0; j + 1 < n; j++) {
-      const a = i * n + j, b = a + n;
-      found.set([a, b, b + 1, a, b + 1, a + 1], at);
-      at += 6;
-    }
-  return found;
-}
-
-// The points along the border of a patch of n x n points, or of its quarter [side, side], once around.
-function border(n, quarter) {
-  const middle = (n - 1) / 2, ends = (side) => side === undefined ? [0, n - 1] : side ? [middle, n - 1] : [0, middle];
-  const [[top, bottom], [left, right]] = [ends(quarter?.[0]), ends(quarter?.[1])], found = [];
-  for (let j = left; j < right; j++) found.push(top * n + j);
-  for (let i = top; i < bottom; i++) found.push(i * n + right);
-  for (let j = right; j > left; j--) found.push(bottom * n + j);
-  for (let i = bottom; i > top; i--) found.push(i * n + left);
-  return new Uint32Array(found);
-}
-
 // Sums of the triangles' normals at their corners; the shader makes them unit vectors.
-function normals(places, extent, corners) {
+function normals(places, corners) {
   const sums = new Float32Array(places.length);
-  const edge = (from, to, axis) => (places[3 * to + axis] - places[3 * from + axis]) / 65535 * extent[axis];
   for (let t = 0; t < corners.length; t += 3) {
-    const [a, b, c] = corners.subarray(t, t + 3);
-    const [p, q] = [[0, 1, 2].map((k) => edge(a, b, k)), [0, 1, 2].map((k) => edge(a, c, k))];
+    const a = 3 * corners[t], b = 3 * corners[t + 1], c = 3 * corners[t + 2];
     for (let k = 0; k < 3; k++) {
-      const [i, j] = [(k + 1) % 3, (k + 2) % 3];
-      const part = p[i] * q[j] - p[j] * q[i];
-      for (const corner of [a, b, c]) sums[3 * corner + k] += part;
+      const i = (k + 1) % 3, j = (k + 2) % 3;
+      const part = (places[b + i] - places[a + i]) * (places[c + j] - places[a + j])
+        - (places[b + j] - places[a + j]) * (places[c + i] - places[a + i]);
+      sums[a + k] += part;
+      sums[b + k] += part;
+      sums[c + k] += part;
     }
   }
   return sums;
@@ -115,107 +94,88 @@ class Graphics {
     if (!this.gl) throw new Error("no WebGL 2");
     const gl = this.gl;
     this.program = compiled(gl);
-    this.extent = scene.high.map((value, axis) => value - scene.low[axis] || 1e-9);
-    this.indices = {};  // by the number of points of a patch
     this.loaded = [];
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, 256, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, scene.map);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
     for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
-    gl.uniform3fv(this.uniform("extent"), this.extent);
+    gl.uniform3fv(this.uniform("octant"), scene.octant);
     gl.enable(gl.DEPTH_TEST);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
   uniform(name) {
     return this.gl.getUniformLocation(this.program, name);
   }
 
-  // Takes the place of what was loaded; `outline` has patches of which the border alone is drawn.
-  load(patches, outline) {
+  // Takes the place of what was loaded. `range` says where a value lies on the colour bar. Ghosts are drawn first, so
+  // that they dim no colour of the patches.
+  load({patches, ghosts, outlines}, range) {
     for (const {array, buffers} of this.loaded) {
       this.gl.deleteVertexArray(array);
       for (const buffer of buffers) this.gl.deleteBuffer(buffer);
     }
-    this.loaded = [...patches.map((patch) => this.#sent(patch, false)), ...outline.map((patch) => this.#sent(patch, true))];
+    this.loaded = [
+      ...ghosts.map((patch) => this.#sent(patch, FAINT)),
+      ...patches.map((patch) => this.#sent(patch, LIT, range)),
+      ...outlines.map((patch) => this.#sent({...patch, plain: OUTLINE, octant: WHOLE}, FLAT)),
+    ];
   }
 
-  #sent(patch, outlined) {
-    const gl = this.gl, array = gl.createVertexArray(), buffers = [];
-    const attribute = (name, data, size, kind, normalized) => {
-      const at = gl.getAttribLocation(this.program, name);
+  #sent(patch, look, range = null) {
+    const gl = this.gl, array = gl.createVertexArray(), buffers = [], mapped = Boolean(range && patch.values);
+    const buffer = (kind, data) => {
       buffers.push(gl.createBuffer());
-      gl.bindBuffer(gl.ARRAY_BUFFER, buffers.at(-1));
-      gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
+      gl.bindBuffer(kind, buffers.at(-1));
+      gl.bufferData(kind, data, gl.STATIC_DRAW);
+    };
+    const attribute = (name, data, size) => {
+      const at = gl.getAttribLocation(this.program, name);
+      buffer(gl.ARRAY_BUFFER, data);
       gl.enableVertexAttribArray(at);
-      gl.vertexAttribPointer(at, size, kind, normalized, 0, 0);
+      gl.vertexAttribPointer(at, size, gl.FLOAT, false, 0, 0);
     };
-    // Numbers of 16 bits are padded to multiples of four bytes, which the graphics library wants.
-    const padded = (data, size, stride) => {
-      const found = new Uint16Array(data.length / size * stride);
-      for (let i = 0; i < data.length / size; i++) found.set(data.subarray(size * i, size * (i + 1)), stride * i);
-      return found;
-    };
-    const corners = this.#index(patch, outlined);
+    const corners = look === FLAT ? patch.border : patch.corners;
     gl.bindVertexArray(array);
-    attribute("place", padded(patch.places, 3, 4), 4, gl.UNSIGNED_SHORT, true);
-    attribute("value", padded(patch.values || new Uint16Array(patch.n ** 2), 1, 2), 2, gl.UNSIGNED_SHORT, true);
-    if (!outlined) attribute("normal", normals(patch.places, this.extent, corners.data), 3, gl.FLOAT, false);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, corners.buffer);
+    attribute("place", patch.places, 3);
+    attribute("parameter", patch.parameters, 3);
+    if (mapped) attribute("value", Float32Array.from(patch.values, (value) => range.share(value)), 1);
+    if (look !== FLAT) attribute("normal", normals(patch.places, patch.corners), 3);
+    buffer(gl.ELEMENT_ARRAY_BUFFER, corners);
     gl.bindVertexArray(null);
-    return {patch, array, buffers, outlined, count: corners.data.length};
+    return {patch, array, buffers, look, mapped, count: corners.length};
   }
 
-  #index({n, quarter}, outlined) {
-    const gl = this.gl, name = outlined ? `border ${n} ${quarter}` : `triangles ${n}`;
-    if (!this.indices[name]) {
-      const data = outlined ? border(n, quarter) : triangles(n);
-      this.indices[name] = {data, buffer: gl.createBuffer()};
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices[name].buffer);
-      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, data, gl.STATIC_DRAW);
-    }
-    return this.indices[name];
-  }
-
-  // `numbered`: one colour a face, to find out which one is at a pixel.
-  draw(camera, lined, numbered = false) {
-    const gl = this.gl, canvas = this.canvas, ratio = window.devicePixelRatio || 1;
-    canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
-    canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+  draw(camera, lined) {
+    const gl = this.gl, canvas = this.canvas;
+    sharpened(canvas);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 0);  // the page's own background
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const fit = camera.zoom * fitted(this.scene, canvas);
-    gl.uniform2f(this.uniform("scale"), 2 * fit / canvas.width, 2 * fit / canvas.height);
+    const fit = 2 * camera.fit(canvas);
+    gl.uniform2f(this.uniform("scale"), fit / canvas.clientWidth, fit / canvas.clientHeight);
     gl.uniform2f(this.uniform("shift"), 2 * camera.shift[0] / canvas.clientWidth, -2 * camera.shift[1] / canvas.clientHeight);
     gl.uniformMatrix3fv(this.uniform("turn"), true, camera.view.flat());
-    for (const {patch, array, outlined, count} of this.loaded) {
-      if (numbered && outlined) continue;
-      const plain = numbered ? [(patch.face + 2) / 10, 0, 0] : rgb(outlined ? OUTLINE : patch.plain);
-      gl.uniform3fv(this.uniform("plain"), plain);
-      gl.uniform1f(this.uniform("nearer"), outlined ? NEARER : 0);
-      gl.uniform1i(this.uniform("samples"), patch.n);
-      gl.uniform1i(this.uniform("mapped"), !numbered && !outlined && Boolean(patch.values));
-      gl.uniform1i(this.uniform("flat_color"), numbered || outlined);
-      gl.uniform1i(this.uniform("lined"), lined);
-      gl.uniform1i(this.uniform("clip"), outlined || !patch.quarter ? 0 : patch.kept ? 2 : 1);
-      gl.uniform2fv(this.uniform("quarter"), patch.quarter || [0, 0]);
+    gl.uniform1i(this.uniform("lined"), lined);
+    for (const {patch, array, look, mapped, count} of this.loaded) {
+      gl.uniform3fv(this.uniform("plain"), rgb(patch.plain));
+      gl.uniform1f(this.uniform("nearer"), look === FLAT ? NEARER : 0);
+      gl.uniform1i(this.uniform("mapped"), mapped);
+      gl.uniform1i(this.uniform("look"), look);
+      gl.uniform1i(this.uniform("clip"), patch.octant);
+      (look === FAINT ? gl.enable : gl.disable).call(gl, gl.BLEND);
+      gl.depthMask(look !== FAINT);
       gl.bindVertexArray(array);
-      gl.drawElements(outlined ? gl.LINE_LOOP : gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+      gl.drawElements(look === FLAT ? gl.LINE_LOOP : gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
     }
-  }
-
-  // The number of the face that is drawn at a place of the window, -1 for none.
-  faceAt(x, y, camera, lined) {
-    const gl = this.gl, canvas = this.canvas, box = canvas.getBoundingClientRect(), pixel = new Uint8Array(4);
-    const place = [(x - box.left) / box.width * canvas.width, (box.bottom - y) / box.height * canvas.height];
-    this.draw(camera, lined, true);
-    gl.readPixels(...place.map(Math.floor), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-    this.draw(camera, lined);
-    return Math.max(-1, Math.round(pixel[0] / 25.5) - 2);
+    gl.depthMask(true);
   }
 }
 
-// Pixels of the canvas for a unit of length, at which the scene as first seen fits.
-function fitted(scene, canvas) {
-  return 0.48 * Math.min(canvas.width / scene.half[0], canvas.height / scene.half[1]);
+// Gives a canvas the pixels of the screen; returns how many there are for one of the page.
+function sharpened(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
+  canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+  return ratio;
 }

@@ -1,0 +1,70 @@
+"""States the problem of a report: its equation, its material and its data, for the page."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from . import document as reports
+from .document import Report
+
+Row = tuple[str, str]  # what it is, and the formula or number
+
+FROM_EXACT = "from the exact solution"
+
+
+def statement_of(report: Report) -> list[Row]:
+    """Return the equation that was solved and its data; of a study its exact solution, of a map alone nothing."""
+    section = reports.solved(report)
+    rows = _poisson(section) if "poisson" in report else _elasticity(section) if "elasticity" in report else []
+    return rows + ([("exact solution", _text(section["exact"]))] if section.get("exact") else [])
+
+
+def regions_of(report: Report) -> list[tuple[str, ...]]:
+    """Return the kind, the region and the data of every condition that is given on a part of the boundary."""
+    section = reports.solved(report)
+    regions = section.get("regions") or report.get("regions") or []
+    return [tuple(_text(region.get(key)) for key in ("kind", "region", "data")) for region in regions]
+
+
+def _poisson(section: Report) -> list[Row]:
+    has_reaction, given = section.get("reaction") is not None, _derived(section)
+    faces, exchanges = _faces(section.get("neumann", ())), _faces(section.get("robin", ()))
+    rows = [("equation", f"−∇·(κ ∇u){' + c u' if has_reaction else ''} = f"), ("κ", _text(section.get("kappa", "1")))]
+    rows += [("c", _text(section["reaction"]))] if has_reaction else []
+    rows += [("f", _text(section.get("source", given)))]
+    rows += [(_rest("u", [*faces, *exchanges]), _text(section.get("boundary", given)))]
+    rows += [(f"flux κ ∂u/∂n on {face}", data or FROM_EXACT) for face, data in faces]
+    for face, data in exchanges:
+        alpha, _, value = data.partition(":")
+        rows.append((f"exchange on {face}", f"κ ∂u/∂n + α u = g, α = {alpha}, g = {value or FROM_EXACT}"))
+    return rows
+
+
+def _elasticity(section: Report) -> list[Row]:
+    young, ratio = section.get("young", 1.0), section.get("poisson_ratio", 0.3)
+    first, shear = young * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)), young / (2.0 * (1.0 + ratio))
+    faces, given = _faces(section.get("traction", ())), _derived(section)
+    return [
+        ("equation", "−∇·σ = f,  σ = λ (∇·u) I + μ (∇u + ∇uᵀ)"),
+        ("material", f"Young's modulus E = {young:g}, Poisson's ratio ν = {ratio:g}; λ = {first:.6g}, μ = {shear:.6g}"),
+        ("force f per volume", _text(section.get("body_force", given))),
+        (_rest("displacement u", faces), _text(section.get("displacement", given))),
+        *((f"traction σ n on {face}", data or FROM_EXACT) for face, data in faces),
+    ]
+
+
+def _derived(section: Report) -> str:
+    """Return what data are that are not given."""
+    return FROM_EXACT if section.get("exact") else "0"
+
+
+def _rest(what: str, faces: Sequence[Row]) -> str:
+    return f"{what} elsewhere on the boundary" if faces else f"{what} on the boundary"
+
+
+def _faces(entries: Sequence[str]) -> list[Row]:
+    """Return the face and the data, "" for none, of entries such as "u1=0;0;-1" and "v0"."""
+    return [(face, data) for face, _, data in (entry.partition("=") for entry in entries)]
+
+
+def _text(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list | tuple) else "" if value is None else str(value)

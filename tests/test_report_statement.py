@@ -1,0 +1,45 @@
+"""What the page says of the problem: equation, material, data, regions."""
+
+from __future__ import annotations
+
+from iga_nn.report.statement import regions_of, statement_of
+
+
+def test_poisson_with_coefficients_and_data_on_faces():
+    section = {"kappa": "1+x", "reaction": "2", "source": "1", "neumann": ["u1=x*y"], "robin": ["w0=3:x", "v0=1"]}
+    assert statement_of({"poisson": section}) == [
+        ("equation", "−∇·(κ ∇u) + c u = f"),
+        ("κ", "1+x"),
+        ("c", "2"),
+        ("f", "1"),
+        ("u elsewhere on the boundary", "0"),
+        ("flux κ ∂u/∂n on u1", "x*y"),
+        ("exchange on w0", "κ ∂u/∂n + α u = g, α = 3, g = x"),
+        ("exchange on v0", "κ ∂u/∂n + α u = g, α = 1, g = from the exact solution"),
+    ]
+
+
+def test_poisson_of_an_exact_solution():
+    rows = dict(statement_of({"poisson": {"exact": "x*y"}}))
+    assert rows["equation"] == "−∇·(κ ∇u) = f" and rows["κ"] == "1" and rows["exact solution"] == "x*y"
+    assert rows["f"] == rows["u on the boundary"] == "from the exact solution"
+
+
+def test_elasticity_has_its_material():
+    section = {"young": 210.0, "poisson_ratio": 0.25, "traction": ["u1=0;0;-1", "v0=0"]}
+    rows = dict(statement_of({"elasticity": section}))
+    assert rows["material"] == "Young's modulus E = 210, Poisson's ratio ν = 0.25; λ = 84, μ = 84"
+    assert rows["traction σ n on u1"] == "0;0;-1" and rows["force f per volume"] == "0"
+    assert rows["displacement u elsewhere on the boundary"] == "0"
+
+
+def test_a_study_has_its_exact_solution_and_a_map_no_problem():
+    assert statement_of({"study": {"exact": "x"}}) == [("exact solution", "x")]
+    assert statement_of({"parameterization": {}}) == []
+
+
+def test_regions_are_listed_where_there_are_some():
+    region = {"kind": "traction", "region": "nx > 0.9", "data": ["0", "0", "-2"]}
+    assert regions_of({"elasticity": {"regions": [region]}}) == [("traction", "nx > 0.9", "0, 0, -2")]
+    assert regions_of({"elasticity": {}, "regions": [region]}) == [("traction", "nx > 0.9", "0, 0, -2")]
+    assert regions_of({"elasticity": {}}) == regions_of({}) == []
