@@ -8,6 +8,7 @@ from parameterize.surface.surface import Surface as Surface
 from parameterize.surface.surface import load_surface as load_surface
 from solve import Elasticity as Elasticity
 from solve import Form as Form
+from solve import Modes as Modes
 from solve import Poisson as Poisson
 from solve import Problem as Problem
 from solve import SplineField as SplineField
@@ -15,6 +16,7 @@ from solve import System as System
 from solve import convergence as convergence
 from solve import discretize as discretize
 from solve import integrate as integrate
+from solve import modes as modes
 from solve import resultant as resultant
 from solve import solve_problem
 

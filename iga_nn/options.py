@@ -237,7 +237,7 @@ class ElasticityOptions(ProblemOptions):
             raise InputError("no load is given: --traction 'u1=0;0;-1', --body-force '0;0;-1' or --displacement")
         traction = _faces("traction", self.traction)
         with input_errors():
-            return Elasticity(
+            body = Elasticity(
                 exact=_vector("--exact", self.exact),
                 force=_vector("--body-force", self.body_force),
                 displacement=_vector("--displacement", self.displacement),
@@ -245,6 +245,8 @@ class ElasticityOptions(ProblemOptions):
                 young=self.young,
                 poisson_ratio=self.poisson_ratio,
             )
+            body.demand_held()
+            return body
 
 
 PROBLEMS: dict[str, type[ProblemOptions]] = {kind.section: kind for kind in (PoissonOptions, ElasticityOptions)}

@@ -27,6 +27,8 @@ from .forms.poisson import Poisson as Poisson
 from .forms.problem import Problem as Problem
 from .integrals import integrate as integrate
 from .integrals import resultant as resultant
+from .modes import Modes as Modes
+from .modes import modes as modes
 from .quantities import Extremes as Extremes
 from .solution import Solution as Solution
 from .solution import SolveReport as SolveReport

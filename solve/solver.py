@@ -125,18 +125,35 @@ def discretize(
     >>> system.operator.shape, system.load.shape
     ((125, 125), (125,))
     """
+    return discretized(volume, problem, refine=refine, degree=degree, threads=threads, quadrature=quadrature, comm=comm)
+
+
+def discretized(
+    volume: BSplineVolume,
+    problem: Poisson | Elasticity | Problem,
+    shift: float = 0.0,
+    *,
+    refine: int = 0,
+    degree: int | None = None,
+    threads: int | None = None,
+    quadrature: str = "spline",
+    comm: Any = None,
+) -> System:
+    """Return what `discretize` does, with `shift` times the mass added to the matrix: then nothing need hold a body."""
     demand_volume(volume)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, got {threads}; leave it out for {default_threads()}")
+    if shift == 0.0:
+        problem.demand_held()
     placed, space = problem.on(volume), trial_space(volume, refine, degree, problem.dirichlet)
     if any(part.stop <= part.start for part in space.free):
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up(volume.degrees, degree, placed.form.components == 1 and placed.form.symmetric)
     if comm is not None:
         space = space.slab(comm)
-    return build(volume, placed, space, threads or (default_threads() if comm is None else 1), quadrature)
+    return build(volume, placed, space, threads or (default_threads() if comm is None else 1), quadrature, shift)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
@@ -145,6 +162,7 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     comm: a communicator of mpi4py whose processes share the work.
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
+    problem.demand_held()
     problem, space = problem.on(volume), trial_space(volume, dirichlet=problem.dirichlet)
     if comm is not None:
         space = space.slab(comm)

@@ -19,11 +19,12 @@ from .diagnostics import ConvergenceError, failure, judge, map_notices
 from .discretization.boundary import boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_norms, missing_mean
 from .discretization.estimate import error_estimate
-from .discretization.operator import FormOperator, Operator, assemble
+from .discretization.operator import FormOperator, Operator, assemble, with_mass
 from .discretization.quadrature import rule_of
 from .discretization.space import TrialSpace, agreed, embedded, longest_edge
 from .field import Points, SplineField
-from .forms.form import Form, check_law
+from .forms.form import check_law
+from .forms.mass import Mass
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
@@ -81,16 +82,6 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
         check_available(device)
 
 
-class _Mass(Form):
-    """The law of the mass matrix: int u . v."""
-
-    def tensor(self, x: Array, component: int = 0) -> Array:
-        return np.zeros((6, *x.shape[1:]))
-
-    def react(self, u: Any, grad: Any, x: Any) -> Any:
-        return u
-
-
 @dataclass(frozen=True, eq=False)
 class System:
     """A problem on a volume as a linear system A x = b of its N free unknowns, in double precision, without matrices.
@@ -127,7 +118,7 @@ class System:
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
-        single, _ = assemble(self.volume, self.space, _Mass(), threads=self.matrix.threads)
+        single, _ = assemble(self.volume, self.space, Mass(), threads=self.matrix.threads)
         return self._linear(single.apply_free)
 
     @property
@@ -283,11 +274,17 @@ def build(
     space: TrialSpace,
     threads: int = 1,
     quadrature: str = "spline",
+    shift: float = 0.0,
 ) -> System:
-    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space."""
+    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
+
+    shift: A is the law's matrix plus so many times the mass.
+    """
     start = time.process_time()
     with one_blas_thread():
         operator, load, known = assemble_data(volume, problem, space, threads, quadrature)
+        if shift > 0.0:
+            operator = with_mass(volume, operator, problem.form, shift)
         blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
         inverses = tuple(map(fast_diagonalization, blocks))
         if isinstance(operator, FormOperator) and inverses[0].singular:
