@@ -43,6 +43,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "load_surface": "parameterize.surface.surface",
     "load_volume": "iga_nn.io.formats",
     "modes": "solve",
+    "newton": "solve",
     "parameterize": "parameterize.run",
     "preset": "parameterize.config",
     "resultant": "solve",

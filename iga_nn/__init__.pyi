@@ -17,6 +17,7 @@ from solve import convergence as convergence
 from solve import discretize as discretize
 from solve import integrate as integrate
 from solve import modes as modes
+from solve import newton as newton
 from solve import resultant as resultant
 from solve import solve_problem
 

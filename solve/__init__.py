@@ -29,6 +29,7 @@ from .integrals import integrate as integrate
 from .integrals import resultant as resultant
 from .modes import Modes as Modes
 from .modes import modes as modes
+from .newton import newton as newton
 from .quantities import Extremes as Extremes
 from .solution import Solution as Solution
 from .solution import SolveReport as SolveReport

@@ -37,9 +37,9 @@ class Modes(Brief):
     frequencies : (n,) array
         omega / (2 pi), of K phi = omega^2 M phi: in Hz where the units are consistent and time is in seconds.
     shapes : tuple of n SplineField
-        phi, of unit mass: the integral of density |phi|^2 is 1. The largest coefficient is positive.
+        phi, of unit mass: the integral of density phi . phi is 1. The largest coefficient is positive.
     residuals : (n,) array
-        |K phi - omega^2 M phi| over |K phi|, of the free coefficients.
+        `|K phi - omega^2 M phi| / |K phi|`, of the free coefficients.
     iterations : int
         Of LOBPCG.
     rigid : int
@@ -97,7 +97,7 @@ def modes(
     refine, degree, threads, quadrature
         As in `iga_nn.solve`.
     tolerance : float
-        Of the residuals |K phi - omega^2 M phi| / |K phi|; the relative error of a frequency is about its square.
+        Of the residuals `|K phi - omega^2 M phi| / |K phi|`; the relative error of a frequency is about its square.
     max_iterations : int
         Of LOBPCG.
 
@@ -122,6 +122,8 @@ def modes(
     (6, 4)
     """
     check_modes(density, n, tolerance, max_iterations)
+    if not law.form.linear:
+        raise ValueError(f"{type(law.form).__name__} is not linear: it has modes about a state only, and no others")
     if not law.form.symmetric:
         raise ValueError(f"{type(law.form).__name__} is not symmetric: its modes need not be real, and are not sought")
     shift = _stiffness(volume, law) if is_free(law) else 0.0

@@ -13,7 +13,7 @@ from parameterize.spline.volume import BSplineVolume, demand_volume
 from parameterize.threads import default_threads
 
 from .discretization.quadrature import gauss_rule, map_planes
-from .discretization.space import agreed, trial_space
+from .discretization.space import TrialSpace, agreed, trial_space
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
@@ -140,20 +140,33 @@ def discretized(
     comm: Any = None,
 ) -> System:
     """Return what `discretize` does, with `shift` times the mass added to the matrix: then nothing need hold a body."""
+    placed, space, threads = prepared(volume, problem, refine, degree, threads, comm)
+    if shift == 0.0:
+        problem.demand_held()
+    return build(volume, placed, space, threads, quadrature, shift)
+
+
+def prepared(
+    volume: BSplineVolume,
+    problem: BoundaryValueProblem,
+    refine: int = 0,
+    degree: int | None = None,
+    threads: int | None = None,
+    comm: Any = None,
+) -> tuple[BoundaryValueProblem, TrialSpace, int]:
+    """Check what is discretized; return the problem placed in the volume, the trial space, and how many threads."""
     demand_volume(volume)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be at least 1, got {threads}; leave it out for {default_threads()}")
-    if shift == 0.0:
-        problem.demand_held()
     placed, space = problem.on(volume), trial_space(volume, refine, degree, problem.dirichlet)
     if any(part.stop <= part.start for part in space.free):
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up(volume.degrees, degree, placed.form.components == 1 and placed.form.symmetric)
     if comm is not None:
         space = space.slab(comm)
-    return build(volume, placed, space, threads or (default_threads() if comm is None else 1), quadrature, shift)
+    return placed, space, threads or (default_threads() if comm is None else 1)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
