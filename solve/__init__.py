@@ -27,6 +27,8 @@ from .forms.poisson import Poisson as Poisson
 from .forms.problem import Problem as Problem
 from .integrals import integrate as integrate
 from .integrals import resultant as resultant
+from .march import March as March
+from .march import march as march
 from .modes import Modes as Modes
 from .modes import modes as modes
 from .newton import newton as newton

@@ -17,6 +17,7 @@ with a solution, `u` and (the exact solution being known) `error` = |u - u_h|. D
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
+from parameterize.files import replacing, save_text
 from parameterize.quality.quality import arap_on
 from parameterize.spline.bernstein import elevation, extraction
 from parameterize.spline.bspline import apply_along, divided_spans, insert_knots, sparse_rows
@@ -53,6 +55,25 @@ def write_view(
 ) -> None:
     """Write samples of the map, the solution and, where its problem has an exact solution, the error."""
     _write(path, _sampled(volume, solution, problem, SAMPLES))
+
+
+def write_series(path: Path, times: Sequence[float], fields: Sequence[SplineField], samples: int | None = None) -> None:
+    """Write a field at some times: a .pvd file that names the times, and a .vtu file for each beside it; atomic.
+
+    samples: as in `grid`. Raises ValueError for another ending, and for a field without a volume.
+    """
+    if path.suffix != ".pvd":
+        raise ValueError(f"{path}: a series of ParaView is a file that ends in .pvd")
+    entries = []
+    for number, (time, field) in enumerate(zip(times, fields, strict=True)):
+        if field.geometry is None:
+            raise ValueError("a series needs the fields' volume: dataclasses.replace(field, geometry=volume)")
+        target = path.with_name(f"{path.stem}_{number:04d}.vtu")
+        with replacing(target) as temporary:
+            _write(temporary, grid(field.geometry, field, samples=samples))
+        entries.append(f'<DataSet timestep="{float(time)!r}" part="0" file="{escape(target.name)}"/>')
+    inside = "\n".join(entries)
+    save_text(path, f'<VTKFile type="Collection" version="0.1"><Collection>\n{inside}\n</Collection></VTKFile>\n')
 
 
 def grid(
