@@ -4,12 +4,15 @@ import math
 import warnings
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, lobpcg
 
 from parameterize.arrays import Array
 from parameterize.display import Brief
+from parameterize.files import save_arrays
 from parameterize.spline.volume import BSplineVolume
 
 from .diagnostics import ConvergenceError
@@ -60,6 +63,23 @@ class Modes(Brief):
     residuals: Array
     iterations: int
     rigid: int = 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the numbers as report.json holds them."""
+        return {
+            "frequencies": self.frequencies,
+            "residuals": self.residuals,
+            "iterations": self.iterations,
+            "rigid": self.rigid,
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write degrees, knots_u, knots_v, knots_w, coefficients (n, m_u, m_v, m_w, ..) and frequencies; atomic."""
+        first = self.shapes[0]
+        rows = dict(zip(("knots_u", "knots_v", "knots_w"), first.knots, strict=True))
+        coefficients = np.stack([shape.coefficients for shape in self.shapes])
+        degrees = np.array(first.degrees)
+        save_arrays(path, degrees=degrees, **rows, coefficients=coefficients, frequencies=self.frequencies)
 
     def __str__(self) -> str:
         rows = [f"{i:4d} {frequency:10.4g}" for i, frequency in enumerate(self.frequencies, start=1)]
@@ -149,7 +169,7 @@ def check_modes(density: float, n: int, tolerance: float = 0.5, max_iterations: 
     """Raise ValueError for arguments of `modes` that are out of range."""
     if not (isinstance(density, Real) and 0.0 < density < math.inf):
         raise ValueError(f"density must be a positive number, got {density!r:.80}")
-    for name, count in (("n", n), ("max_iterations", max_iterations)):
+    for name, count in (("number of modes n", n), ("max_iterations", max_iterations)):
         if not (isinstance(count, Integral) and count >= 1):
             raise ValueError(f"{name} must be a whole number, at least 1, got {count!r:.80}")
     if not (isinstance(tolerance, Real) and 0.0 < tolerance < 1.0):

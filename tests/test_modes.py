@@ -112,7 +112,11 @@ def test_a_law_that_is_not_symmetric_and_numbers_out_of_range_are_refused():
     volume = box(1.0, 1.0, 1.0, 4)
     with pytest.raises(ValueError, match="Wind is not symmetric"):
         iga_nn.modes(volume, iga_nn.Problem(Wind(), source="0"))
-    for wrong, says in (({"density": 0.0}, "density must be"), ({"n": 0}, "n must be"), ({"n": 99}, "fewer modes")):
+    for wrong, says in (
+        ({"density": 0.0}, "density must be"),
+        ({"n": 0}, "number of modes n must be"),
+        ({"n": 99}, "fewer modes"),
+    ):
         with pytest.raises(ValueError, match=says):
             iga_nn.modes(volume, iga_nn.Poisson(source="0"), **wrong)
     with pytest.raises(ConvergenceError, match="residual .* after 1 iterations"):
