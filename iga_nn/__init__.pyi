@@ -8,6 +8,8 @@ from parameterize.surface.surface import Surface as Surface
 from parameterize.surface.surface import load_surface as load_surface
 from solve import Elasticity as Elasticity
 from solve import Form as Form
+from solve import March as March
+from solve import Modes as Modes
 from solve import Poisson as Poisson
 from solve import Problem as Problem
 from solve import Region as Region
@@ -16,6 +18,9 @@ from solve import System as System
 from solve import convergence as convergence
 from solve import discretize as discretize
 from solve import integrate as integrate
+from solve import march as march
+from solve import modes as modes
+from solve import newton as newton
 from solve import resultant as resultant
 from solve import solve_problem
 

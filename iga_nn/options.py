@@ -304,7 +304,7 @@ class ElasticityOptions(ProblemOptions):
             )
         traction = _faces("traction", self.traction)
         with input_errors():
-            return Elasticity(
+            body = Elasticity(
                 exact=_vector("--exact", self.exact),
                 force=_vector("--body-force", self.body_force),
                 displacement=_vector("--displacement", self.displacement),
@@ -318,6 +318,8 @@ class ElasticityOptions(ProblemOptions):
                 pressure=_on_regions("pressure", self.pressure, str),
                 spring=_on_regions("spring", self.spring, str),
             )
+            body.demand_held()
+            return body
 
 
 PROBLEMS: dict[str, type[ProblemOptions]] = {kind.section: kind for kind in (PoissonOptions, ElasticityOptions)}
@@ -381,6 +383,45 @@ class ElasticityStudyOptions(StudyOptions):
             raise InputError("no solution to compare with: give the displacement as --exact 'x*y;sin(z);x'")
         own = ElasticityOptions(self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio)
         return own.problem()
+
+
+@dataclass(frozen=True)
+class ModesOptions(Checked):
+    """State which vibrations of an elastic body are sought, what it is made of and where it is held.
+
+    Attributes:
+        young: Young's modulus E.
+        poisson_ratio: Poisson's ratio nu.
+        density: mass per volume, in units that agree with those of E and of the volume.
+        number: how many modes, from the lowest frequency on.
+        fix_faces: faces that are held, of u0, u1, v0, v1, w0, w1; without any the body is free, and its rigid motions
+            are left out.
+        refine: how often every knot span of the map is halved.
+        degree: degree of the trial space; that of the map by default.
+    """
+
+    young: float = 1.0
+    poisson_ratio: float = 0.3
+    density: float = 1.0
+    number: int = 6
+    fix_faces: tuple[str, ...] = ()
+    refine: int = 0
+    degree: int | None = None
+
+    def problem(self) -> Elasticity:
+        """Return the body, without loads. Raises InputError."""
+        from parameterize.spline.volume import FACE_NAMES
+        from solve import Elasticity
+        from solve.modes import check_modes
+
+        check_space([self.refine], self.degree)
+        if wrong := [face for face in self.fix_faces if face not in FACE_NAMES]:
+            raise InputError(f"fix faces: {wrong[0]!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
+        nothing = ["0"] * 3
+        free = {face: nothing for face in FACE_NAMES if face not in self.fix_faces}
+        with input_errors():
+            check_modes(self.density, self.number)
+            return Elasticity(force=nothing, traction=free, young=self.young, poisson_ratio=self.poisson_ratio)
 
 
 @dataclass(frozen=True, kw_only=True)

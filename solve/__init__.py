@@ -28,6 +28,11 @@ from .forms.problem import Problem as Problem
 from .forms.region import Region as Region
 from .integrals import integrate as integrate
 from .integrals import resultant as resultant
+from .march import March as March
+from .march import march as march
+from .modes import Modes as Modes
+from .modes import modes as modes
+from .newton import newton as newton
 from .quantities import Extremes as Extremes
 from .reactions import Balance as Balance
 from .solution import Solution as Solution

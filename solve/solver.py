@@ -13,7 +13,7 @@ from parameterize.spline.volume import BSplineVolume, demand_volume
 from parameterize.threads import default_threads
 
 from .discretization.quadrature import gauss_rule, map_planes
-from .discretization.space import agreed, trial_space
+from .discretization.space import TrialSpace, agreed, trial_space
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
@@ -125,6 +125,36 @@ def discretize(
     >>> system.operator.shape, system.load.shape
     ((125, 125), (125,))
     """
+    return discretized(volume, problem, refine=refine, degree=degree, threads=threads, quadrature=quadrature, comm=comm)
+
+
+def discretized(
+    volume: BSplineVolume,
+    problem: Poisson | Elasticity | Problem,
+    shift: float = 0.0,
+    *,
+    refine: int = 0,
+    degree: int | None = None,
+    threads: int | None = None,
+    quadrature: str = "spline",
+    comm: Any = None,
+) -> System:
+    """Return what `discretize` does, with `shift` times the mass added to the matrix: then nothing need hold a body."""
+    placed, space, threads = prepared(volume, problem, refine, degree, threads, comm)
+    if shift == 0.0:
+        problem.demand_held()
+    return build(volume, placed, space, threads, quadrature, shift)
+
+
+def prepared(
+    volume: BSplineVolume,
+    problem: BoundaryValueProblem,
+    refine: int = 0,
+    degree: int | None = None,
+    threads: int | None = None,
+    comm: Any = None,
+) -> tuple[BoundaryValueProblem, TrialSpace, int]:
+    """Check what is discretized; return the problem placed in the volume, the trial space, and how many threads."""
     demand_volume(volume)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
@@ -136,7 +166,7 @@ def discretize(
     _warm_up(volume.degrees, degree, placed.form.components == 1 and placed.form.symmetric)
     if comm is not None:
         space = space.slab(comm)
-    return build(volume, placed, space, threads or (default_threads() if comm is None else 1), quadrature)
+    return placed, space, threads or (default_threads() if comm is None else 1)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
@@ -145,6 +175,7 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     comm: a communicator of mpi4py whose processes share the work.
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
+    problem.demand_held()
     problem, space = problem.on(volume), trial_space(volume, dirichlet=problem.dirichlet)
     if comm is not None:
         space = space.slab(comm)

@@ -19,13 +19,14 @@ from .diagnostics import ConvergenceError, failure, judge, map_notices
 from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_norms, missing_mean
 from .discretization.estimate import error_estimate
-from .discretization.on_regions import demand_area, demand_held, weak_faces
-from .discretization.operator import FormOperator, Operator, assemble
+from .discretization.on_regions import demand_area, demand_supports, weak_faces
+from .discretization.operator import FormOperator, Operator, assemble, with_mass
 from .discretization.quadrature import rule_of
 from .discretization.space import TrialSpace, agreed, embedded, longest_edge
 from .discretization.weak import WeakFace
 from .field import Points, SplineField
-from .forms.form import Form, check_law
+from .forms.form import check_law
+from .forms.mass import Mass
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
@@ -86,16 +87,6 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
         check_available(device)
 
 
-class _Mass(Form):
-    """The law of the mass matrix: int u . v."""
-
-    def tensor(self, x: Array, component: int = 0) -> Array:
-        return np.zeros((6, *x.shape[1:]))
-
-    def react(self, u: Any, grad: Any, x: Any) -> Any:
-        return u
-
-
 @dataclass(frozen=True, eq=False)
 class System:
     """A problem on a volume as a linear system A x = b of its N free unknowns, in double precision, without matrices.
@@ -133,7 +124,7 @@ class System:
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """The mass matrix, the integrals of u . v."""
-        single, _ = assemble(self.volume, self.space, _Mass(), threads=self.matrix.threads)
+        single, _ = assemble(self.volume, self.space, Mass(), threads=self.matrix.threads)
         return self._linear(single.apply_free)
 
     @property
@@ -290,11 +281,20 @@ def build(
     space: TrialSpace,
     threads: int = 1,
     quadrature: str = "spline",
+    shift: float = 0.0,
 ) -> System:
-    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space."""
+    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
+
+    shift: A is the law's matrix plus so many times the mass.
+    """
     start = time.process_time()
     with one_blas_thread():
         operator, load, known = assemble_data(volume, problem, space, threads, quadrature)
+        if shift == 0.0:
+            weak = [face for face in operator.faces.values() if isinstance(face, WeakFace)]
+            demand_supports(problem, space, weak, float(np.ptp(volume.control_points, axis=(0, 1, 2)).max()))
+        else:
+            operator = with_mass(volume, operator, problem.form, shift)
         blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
         inverses = tuple(map(fast_diagonalization, blocks))
         if isinstance(operator, FormOperator) and inverses[0].singular:
@@ -364,7 +364,6 @@ def _on_regions(
     """Add the data on regions of the boundary to a load, and return the faces that have terms."""
     faces = weak_faces(volume, problem, space)
     demand_area(volume, problem, space, faces)
-    demand_held(problem, space, faces, float(np.ptp(volume.control_points, axis=(0, 1, 2)).max()))
     for face in faces:
         face.add_load(load)
     return {face.name: face for face in faces}

@@ -249,6 +249,32 @@ def test_study_of_elasticity_shows_its_rates(in_folder, capsys):
     assert "exact" in capsys.readouterr().err
 
 
+def test_modes_writes_frequencies_and_shapes(in_folder, capsys):
+    """Those of `iga_nn.modes`, in order; a body that nothing holds leaves out its six rigid motions."""
+    volume = iga_nn.BSplineVolume.from_function(lambda u, v, w: (3 * u, v, w), control_points=(6, 4, 4))
+    volume.save("bar.npz")
+    steel = ["--young", "100", "--poisson-ratio", "0", "--density", "4", "--number", "3", "--quiet"]
+    assert main(["modes", "bar.npz", *steel, "--fix-faces", "u0"]) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert table[0].split() == ["mode", "frequency"] and table[-1] == "results in bar-modes"
+    section = json.loads(Path("bar-modes/report.json").read_text())["modes"]
+    assert [float(row.split()[1]) for row in table[1:4]] == pytest.approx(section["frequencies"], rel=1e-3)
+    nothing = ["0"] * 3
+    body = iga_nn.Elasticity(
+        traction=dict.fromkeys(("u1", "v0", "v1", "w0", "w1"), nothing), young=100.0, poisson_ratio=0.0
+    )
+    found = iga_nn.modes(volume, body, 4.0, 3)
+    assert section["frequencies"] == pytest.approx(found.frequencies, rel=1e-9) and section["rigid"] == 0
+    with np.load("bar-modes/modes.npz") as data:
+        assert data["coefficients"].shape == (3, 6, 4, 4, 3)
+        assert np.allclose(data["coefficients"][0], found.shapes[0].coefficients, atol=1e-6)
+    assert "Mode 3" in Path("bar-modes/report.html").read_text()
+    assert main(["modes", "bar.npz", *steel, "--out", "free", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["modes"]["rigid"] == 6
+    assert main(["modes", "bar.npz", *steel, "--fix-faces", "top", "--out", "none"]) == 2
+    assert "fix faces: 'top' is no face of the cube" in capsys.readouterr().err and not Path("none").exists()
+
+
 def test_study_writes_table_csv_and_plot(in_folder, capsys):
     benchmark_volume(2).save("map.npz")
     assert main(["study", "map.npz", "--degree", "3", "2", "--refine", "0..2"]) == 0

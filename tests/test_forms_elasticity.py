@@ -5,7 +5,15 @@ import pytest
 
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
-from solve import ConvergenceError, Elasticity, SplineField, benchmark_volume, convergence, solve_problem
+from solve import (
+    ConvergenceError,
+    Elasticity,
+    SplineField,
+    benchmark_volume,
+    check_problem,
+    convergence,
+    solve_problem,
+)
 from solve.discretization.operator import assemble
 from solve.discretization.quadrature import gauss_rule
 from solve.discretization.space import trial_space
@@ -165,12 +173,18 @@ def test_no_convergence_is_raised_on_request():
         ({"exact": ("x", "y", "q")}, "exact: expression"),
         ({"force": WAVE, "traction": {"u0": None}}, "traction u0 has no data"),
         ({"exact": WAVE, "traction": {"top": None}}, "no face of the cube"),
-        ({"exact": WAVE, "traction": dict.fromkeys(FACE_NAMES)}, "free to move"),
     ],
 )
 def test_problems_that_do_not_fit_together_are_refused(data, says):
     with pytest.raises(ValueError, match=says):
         Elasticity(**data)
+
+
+def test_a_free_body_is_refused_before_it_is_solved():
+    body = Elasticity(exact=WAVE, traction=dict.fromkeys(FACE_NAMES))
+    for refused in (solve_problem, check_problem):
+        with pytest.raises(ValueError, match="traction on all six faces leaves the body free to move"):
+            refused(benchmark_volume(2), body)
 
 
 def test_vectors_may_be_arrays():

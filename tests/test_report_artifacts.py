@@ -26,7 +26,7 @@ def test_the_table_is_written_anew_and_the_rest_stays():
 
 
 def test_every_file_stands_once_and_every_figure_can_be_drawn():
-    names = files_of("report", "map", "solution", "study")
+    names = files_of("report", "map", "solution", "study", "modes")
     assert len(names) == len(set(names))
     for artifact in ARTIFACTS:
         assert bool(artifact.draw) == bool(artifact.takes) == artifact.file.endswith(".png")

@@ -23,6 +23,7 @@ from ..options import (
     ElasticityOptions,
     ElasticityStudyOptions,
     MapOptions,
+    ModesOptions,
     PoissonOptions,
     ProblemOptions,
     StudyOptions,
@@ -106,12 +107,12 @@ class PageOptions(MapOptions):
     resume: Annotated[bool, Parameter(parse=False)] = False
 
 
-for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions):
+for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions, ModesOptions):
     Parameter(name="*")(kind)  # each field of these options, and of those derived from them, is a flag
 
 OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
 WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
-PAGE = PageOptions()
+PAGE, MODES = PageOptions(), ModesOptions()
 
 
 @run_app.command(name="poisson")
@@ -252,6 +253,24 @@ def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
     with shown_progress(output.quiet):
         outcome, table = pipeline.study_to(volume, options=study, **output.folder)
     _print(reports.as_json(outcome.report["study"]) if output.as_json else f"{table}\nresults in {outcome.folder}")
+    return exit_code(outcome.report)
+
+
+@app.command(name="modes")
+def find_modes(volume: Volume, /, *, output: OutputOptions = OUTPUT, modes: ModesOptions = MODES) -> int:
+    """Find the lowest vibrations of an elastic body, a volume.npz; write their frequencies, shapes and a figure.
+
+    Frequencies are in Hz where the units agree: m, Pa and kg/m^3, or mm, MPa and t/mm^3. Results go to STEM-modes in
+    the current folder, unless --out names another.
+    """
+    from ..report import document as reports
+    from ..workflow import pipeline
+    from .answer import exit_code
+
+    with shown_progress(output.quiet):
+        outcome, table = pipeline.modes_to(volume, options=modes, **output.folder)
+    verdict = reports.verdict(outcome.report, outcome.folder)
+    _print(reports.as_json(verdict) if output.as_json else f"{table}\nresults in {outcome.folder}")
     return exit_code(outcome.report)
 
 

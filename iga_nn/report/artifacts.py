@@ -12,11 +12,11 @@ from typing import Any, Literal
 
 from ..options import PROBLEMS
 
-Part = Literal["report", "map", "solution", "study"]
+Part = Literal["report", "map", "solution", "study", "modes"]
 
 REPORT, PAGE = "report.json", "report.html"
 SOLVED = {name: kind.title for name, kind in PROBLEMS.items()} | {"study": "convergence study"}  # section -> title
-SECTIONS: dict[str, Part] = {"config": "map", **dict.fromkeys(PROBLEMS, "solution"), "study": "study"}
+SECTIONS: dict[str, Part] = {"config": "map", **dict.fromkeys(PROBLEMS, "solution"), "study": "study", "modes": "modes"}
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact(PAGE, "report", "the report to read: verdict, figures, tables and an interactive view, in one file"),
     Artifact(REPORT, "report", "the report for programs: input, configuration, versions, certificate, errors, seconds"),
     Artifact("history.npz", "map", "the loss, its terms and the number of folded samples at every training step"),
+    Artifact("modes.npz", "modes", "the lowest vibrations", arrays=(*_KNOTS, "coefficients", "frequencies")),
     Artifact("study.csv", "study", "the errors and their rates in a convergence study"),
     Artifact("solution.png", "solution", "the solution on the boundary and inside", "solution.draw_solution", _VALUES),
     Artifact("meeting.png", "map", "where the boundary meets itself", "map.draw_meeting", ("volume", "meeting")),
@@ -74,6 +75,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("named_faces.png", "solution", "the volume's faces by name", "map.draw_faces", ("named_volume",)),
     Artifact("convergence.png", "solution", "errors over the mesh size", "curves.draw_study", ("levels",)),
     Artifact("error.png", "solution", "error on the boundary and on three sections", "solution.draw_error", _ERROR),
+    Artifact("modes.png", "modes", "the first modes, by frequency", "modes.draw_modes", ("volume", "modes")),
     Artifact(
         "study.png", "study", "errors of the convergence study over the mesh size", "curves.draw_study", ("study",)
     ),

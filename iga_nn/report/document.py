@@ -170,5 +170,7 @@ def verdict(report: Report, folder: Path) -> Report:
         keys = ("dofs", *EXACT_ERRORS, *ESTIMATES, "iterations", "converged", "meaningful", "extremes")
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]
         short["notices"] = section["notices"]
+    if vibration := report.get("modes"):
+        short["modes"] = {name: vibration[name] for name in ("frequencies", "rigid", "residuals")}
     short["seconds"] = report["seconds"]["total"]
     return short

@@ -137,6 +137,8 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
         finest = levels[-1]
         facts += [_error_fact(finest, *keys) for keys in ERRORS if finest.get(keys[0]) is not None]
         facts.append(("Unknowns", f"{finest['dofs']:,}", f"{finest['iterations']} iterations"))
+    if vibration := report.get("modes"):
+        facts += [(f"Mode {i}", f"{f:.4g}", "frequency") for i, f in enumerate(vibration["frequencies"], start=1)]
     points = " × ".join(map(str, quality["control_points"]))
     facts.append(("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"]))))
     if "origin" in quality:

@@ -7,6 +7,7 @@ import logging
 from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
+from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -16,14 +17,23 @@ import numpy as np
 from parameterize.files import save_text
 from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import BSplineVolume
-from solve import ConvergenceRow, Solution, check_device, check_problem, convergence
+from solve import ConvergenceRow, Solution, check_device, check_problem, convergence, modes
 from solve.discretization.space import agreed
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
 from ..kinds import check_kind
 from ..levels import as_csv, as_table, rows_of
-from ..options import PROBLEMS, Equation, MapOptions, PoissonOptions, ProblemOptions, StudyOptions, check_size
+from ..options import (
+    PROBLEMS,
+    Equation,
+    MapOptions,
+    ModesOptions,
+    PoissonOptions,
+    ProblemOptions,
+    StudyOptions,
+    check_size,
+)
 from ..report import document as reports
 from ..report import html
 from .cost_estimate import tell_memory
@@ -253,6 +263,33 @@ def study_to(
         state.write(study=known | {"levels": rows_of(study), "notices": notices})
         state.draw("study", study=study)
         return _finish(state, loaded), as_table(study)
+
+
+def modes_to(
+    volume: str | Path,
+    out: str | Path | None = None,
+    *,
+    options: ModesOptions | None = None,
+    force: bool = False,
+    vector: bool = False,
+) -> tuple[Outcome, str]:
+    """Find the lowest vibrations of a saved volume; return the output folder with its report, and their table.
+
+    Takes the other options of `run`, and raises as it does, and ConvergenceError.
+    """
+    check_kind("volume", volume, str | Path)
+    options, path = options or ModesOptions(), Path(volume)
+    body, loaded = options.problem(), load_volume(path)
+    check_size(loaded, options.refine, options.degree, body.components)
+    with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
+        state.begin("modes")
+        write_certificate(state, path, loaded, command_line("modes", path, options, out=out))
+        with reported(state, loaded), state.timed("solve"), input_errors():
+            found = modes(loaded, body, options.density, options.number, refine=options.refine, degree=options.degree)
+        found.save(state.folder / "modes.npz")
+        state.write(modes=asdict(options) | found.as_dict())
+        state.draw("modes", volume=loaded, modes=found)
+        return _finish(state, loaded), str(found)
 
 
 def _finished_by(command: str, finished: Outcome, vector: bool, problem: ProblemOptions | None) -> Outcome:

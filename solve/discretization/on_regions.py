@@ -59,7 +59,7 @@ def demand_area(volume: BSplineVolume, problem: BoundaryValueProblem, space: Tri
             )
 
 
-def demand_held(problem: BoundaryValueProblem, space: TrialSpace, faces: list[WeakFace], size: float) -> None:
+def demand_supports(problem: BoundaryValueProblem, space: TrialSpace, faces: list[WeakFace], size: float) -> None:
     """Raise ValueError where the supports leave a motion free that the law does not resist (`Form.free_motions`).
 
     size: of the body.
@@ -236,7 +236,7 @@ class _Builder:
             unit[d] = 1.0
             flux = np.asarray(form.flux(np.zeros_like(unit), unit[:, None] * normal, x), dtype=np.float64)
             columns.append((flux * normal).sum(axis=1))
-        matrix = np.moveaxis(np.stack(columns), (0, 1), (-2, -1))
+        matrix: Array = np.stack(columns).transpose(2, 0, 1).astype(np.float64)
         strength = np.linalg.eigvalsh(0.5 * (matrix + matrix.swapaxes(-1, -2)))[..., -1]
         breaks = breakpoints(self.space.whole.knots[axis])
         span = breaks[-1] - breaks[-2] if side else breaks[1] - breaks[0]

@@ -20,6 +20,7 @@ from parameterize.threads import in_parallel
 
 from ..forms.form import Form, reaction
 from ..forms.jets import PAIRS
+from ..forms.mass import WithMass
 from . import kernels
 from .quadrature import GaussRule, geometry_planes, operator_rule
 from .space import TrialSpace, agreed
@@ -244,6 +245,18 @@ def assemble(
     if factors is None:
         return FormOperator(*parts, volume, form, kept, folded=folded), load
     return Operator(*parts, factors, folded=folded), load
+
+
+def with_mass(
+    volume: BSplineVolume, operator: Operator | FormOperator, form: Form, factor: float
+) -> Operator | FormOperator:
+    """Return the operator of a law on a volume with `factor` times the mass matrix added, what faces add included."""
+    law = WithMass(form, factor)
+    if isinstance(operator, FormOperator):
+        return replace(operator, form=law, rows=None)
+    whole, _ = assemble(volume, operator.space, law, rule=operator.rule, threads=operator.threads)
+    assert isinstance(whole, Operator)
+    return replace(operator, factors=whole.factors)
 
 
 def add_integrals(

@@ -41,7 +41,8 @@ class Elasticity(LawWithData):
     displacement : three entries, optional
         Values of u on the faces that are not in `traction`; default: `exact`, or zero.
     traction : dict of face name to three entries or None
-        sigma n, n the outward unit normal; None: from `exact`. One face at least is left to displacement.
+        sigma n, n the outward unit normal; None: from `exact`. A solve leaves one face at least to displacement;
+        `iga_nn.modes` takes a free body, too.
     young : float
         E > 0.
     poisson_ratio : float
@@ -106,7 +107,10 @@ class Elasticity(LawWithData):
         force = NONE if self.force is None and self.exact is None and is_loaded else self.force
         given = {"exact": self.exact, "source": force, "boundary": self.displacement}
         self._set(given, self.traction, {}, on_regions)
-        if not self.dirichlet and not on_regions:
+
+    def demand_held(self) -> None:
+        """Raise ValueError where traction on all six faces leaves the body free to move."""
+        if not self.dirichlet and not self.conditions:
             raise ValueError("traction on all six faces leaves the body free to move: leave one face to displacement")
 
     @staticmethod

@@ -30,6 +30,9 @@ class Form:
         c, of u; 1 by default.
     symmetric : bool
         Whether conjugate gradients solve it; else GMRES does. True by default.
+    linear : bool
+        Whether flux and reaction are linear in u and its gradient; else `iga_nn.newton` solves it, and `symmetric`
+        speaks of the law's derivative. True by default.
     constant : bool
         Whether the flux has neither u nor x in it, and there is no reaction: products are then faster, and `flux` may
         get None for x. False by default.
@@ -50,14 +53,18 @@ class Form:
 
     components: int = 1
     symmetric: bool = True
+    linear: bool = True
     constant: bool = False
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return the flux (c, 3, ...), linear in u (c, ...) and its gradient (c, 3, ...), at points x (3, ...)."""
+        """Return the flux (c, 3, ...) of u (c, ...) and its gradient (c, 3, ...) at points x (3, ...).
+
+        It is linear in u and the gradient, unless `linear` says otherwise.
+        """
         raise NotImplementedError(f"{type(self).__name__} must define flux(self, u, grad, x)")
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return the term (c, ...) without derivatives of the test, linear in u and grad; none here."""
+        """Return the term (c, ...) without derivatives of the test, of u and grad, too; none here."""
         return 0.0
 
     @property
@@ -139,11 +146,11 @@ def strong_terms(form: Form, u: Sequence[Jet], x: Array) -> list[list[Number]]:
 
     u: their jets, with second derivatives.
     """
-    values = _objects([Jet(jet.value, jet.gradient, ()) for jet in u], (len(u),))
+    values = as_objects([Jet(jet.value, jet.gradient, ()) for jet in u], (len(u),))
     slopes = [
         Jet(jet.gradient[i], tuple(jet.hessian[place] for place in SYMMETRIC[i]), ()) for jet in u for i in range(3)
     ]
-    grad, where = _objects(slopes, (len(u), 3)), _objects(coordinates(x), (3,))
+    grad, where = as_objects(slopes, (len(u), 3)), as_objects(coordinates(x), (3,))
     with np.errstate(all="ignore"):
         flux = np.asarray(form.flux(values, grad, where), dtype=object)
         react = np.broadcast_to(np.asarray(form.react(values, grad, where), dtype=object), values.shape)
@@ -161,7 +168,8 @@ def strong_form(form: Form, u: Sequence[Jet], x: Array) -> Array:
     return stacked([sum(terms) for terms in strong_terms(form, u, x)], x.shape[1:])
 
 
-def _objects(jets: Sequence[Jet], shape: tuple[int, ...]) -> Any:
+def as_objects(jets: Sequence[Jet], shape: tuple[int, ...]) -> Any:
+    """Return jets as an array of objects of a shape."""
     array = np.empty(len(jets), dtype=object)
     array[:] = jets
     return array.reshape(shape)
@@ -215,6 +223,8 @@ def check_law(form: Form, x: Array) -> bool:
     where a wave has no positive energy (the Legendre-Hadamard condition): no solver could do anything with it.
     """
     c, m, name = form.components, x.shape[1], type(form).__name__
+    if not form.linear:
+        raise ValueError(f"{name} is not linear: iga_nn.newton solves it")
     rng = np.random.default_rng(0)
     (u, v), (p, q) = rng.standard_normal((2, c, m)), rng.standard_normal((2, c, 3, m))
 
@@ -224,7 +234,9 @@ def check_law(form: Form, x: Array) -> bool:
     one, two, both = law(u, p), law(v, q), law(2.0 * u - 3.0 * v, 2.0 * p - 3.0 * q)
     for part, a, b, mixed in zip(("flux", "react"), one, two, both, strict=True):
         if np.abs(mixed - (2.0 * a - 3.0 * b)).max() > ROUNDING * np.abs([a, b]).max():
-            raise ValueError(f"{name}.{part} must be linear in u and grad")
+            raise ValueError(
+                f"{name}.{part} must be linear in u and grad; else set `linear = False`, and iga_nn.newton solves it"
+            )
     energies = [(a[0] * grad).sum((0, 1)) + (a[1] * w).sum(0) for a, grad, w in ((one, q, v), (two, p, u))]
     if form.symmetric and np.abs(energies[0] - energies[1]).max() > ROUNDING * np.abs(energies).max():
         raise ValueError(f"{name} is not symmetric: set `symmetric = False`, and GMRES solves it")

@@ -138,6 +138,9 @@ class BoundaryValueProblem:
                 )
         return self.placed(UnitFrame.of(volume)) if self.is_scaled else self
 
+    def demand_held(self) -> None:
+        """Raise ValueError where it is plain from the data that nothing fixes the solution."""
+
     @property
     def is_scaled(self) -> bool:
         """Whether X, Y or Z occurs in a formula or in the condition of a region."""

@@ -1,0 +1,50 @@
+"""The law of the mass matrix, and laws to which a multiple of it is added."""
+
+from typing import Any
+
+import numpy as np
+
+from parameterize.arrays import Array
+
+from .form import Form, reaction
+
+
+class Mass(Form):
+    """The law of the mass matrix: int u . v."""
+
+    def tensor(self, x: Array, component: int = 0) -> Array:
+        """Return zero (6, ...): there is no flux."""
+        return np.zeros((6, *x.shape[1:]))
+
+    def react(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return u."""
+        return u
+
+
+class WithMass(Form):
+    """A law plus `factor` times the mass."""
+
+    def __init__(self, law: Form, factor: float) -> None:
+        self.law, self.factor = law, factor
+        self.components, self.symmetric = law.components, law.symmetric
+
+    @property
+    def has_reaction(self) -> bool:
+        """True: the mass is one."""
+        return True
+
+    def flux(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return the flux of the law."""
+        return self.law.flux(u, grad, x)
+
+    def react(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return the law's reaction and factor u."""
+        return reaction(self.law, u, grad, x) + self.factor * u
+
+    def tensor(self, x: Array, component: int = 0) -> Array:
+        """Return the tensor of the law."""
+        return self.law.tensor(x, component)
+
+    def mass(self, x: Array, component: int = 0) -> Array:
+        """Return the law's factor of a component, and the factor."""
+        return self.law.mass(x, component) + self.factor

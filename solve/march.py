@@ -1,0 +1,287 @@
+"""Time stepping of M u' + A u = f(t): BDF2 and the trapezoidal rule, each step from the one before."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from parameterize.arrays import Array
+from parameterize.display import Brief, above
+from parameterize.spline.volume import BSplineVolume
+
+from .diagnostics import ConvergenceError
+from .discretization.operator import Operator, assemble
+from .discretization.projection import projected
+from .discretization.quadrature import GaussRule
+from .discretization.space import TrialSpace, embedded
+from .field import SplineField
+from .forms.data import Data, parse
+from .forms.elasticity import Elasticity
+from .forms.frame import UnitFrame
+from .forms.mass import Mass
+from .forms.poisson import Poisson
+from .forms.problem import BoundaryValueProblem, Problem
+from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
+from .solver import prepared
+from .system import SolverOptions, System, assemble_data, build, one_blas_thread
+
+Equation = Poisson | Elasticity | Problem
+SCHEMES = ("bdf2", "trapezoidal")
+EULER = 1.0  # the factors of capacity / dt that a step adds to the matrix
+FACTORS = {"bdf2": 1.5, "trapezoidal": 2.0}
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class March(Brief):
+    """What a march leaves: u at some times.
+
+    Attributes
+    ----------
+    times : (k,) array
+        The first is that of the start.
+    fields : tuple of k SplineField
+    iterations : (steps,) array
+        Of the linear solver, in each step.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> cooling = iga_nn.Poisson(source="0", boundary="0")
+    >>> found = iga_nn.march(benchmark_volume(2), cooling, "1", dt=0.01, steps=4, every=2)
+    >>> found.times.round(6).tolist(), len(found.fields)
+    ([0.0, 0.02, 0.04], 3)
+    """
+
+    times: Array
+    fields: tuple[SplineField, ...]
+    iterations: Array
+
+    def save_pvd(self, path: str | Path, samples: int | None = None) -> None:
+        """Write NAME.pvd, which ParaView plays, and NAME_0000.vtu, NAME_0001.vtu, ... beside it; each file is atomic.
+
+        samples: linear cells a span and direction, which can be sliced; None for exact Bezier cells.
+        """
+        above("io.series").write_series(Path(path), self.times, self.fields, samples)
+
+
+def march(
+    volume: BSplineVolume,
+    problem: Equation | Callable[[float], Equation],
+    start: SplineField | Data,
+    *,
+    dt: float,
+    steps: int,
+    scheme: Literal["bdf2", "trapezoidal"] = "bdf2",
+    capacity: float = 1.0,
+    first: float = 0.0,
+    every: int = 1,
+    callback: Callable[[float, SplineField], object] | None = None,
+    refine: int = 0,
+    degree: int | None = None,
+    threads: int | None = None,
+    quadrature: str = "spline",
+    tolerance: float = 1e-10,
+    max_iterations: int = 1000,
+) -> March:
+    """Step through time: capacity du/dt - div flux + react = f, the law and its data those of a problem.
+
+    Both schemes are of second order in dt. BDF2 damps what is rough in the start, its first step is Euler's; the
+    trapezoidal rule keeps more energy, and oscillates where start and data on faces disagree.
+
+    Parameters
+    ----------
+    volume : BSplineVolume
+        The map.
+    problem : Poisson, Elasticity, Problem, or a function of the time that returns one
+        A function changes the data from step to step: `lambda t: iga_nn.Poisson(source=f"{t}*x", boundary="0")`. The
+        law stays that of the first time, and so do the faces where u is given.
+    start : SplineField or datum
+        u at the first time: a field of the trial space or of a coarser one, or a formula, a function, or a sequence of
+        them, as data of the problem are.
+    dt : float
+        The time step.
+    steps : int
+        How many.
+    scheme : str
+        "bdf2" or "trapezoidal".
+    capacity : float
+        The factor of du/dt.
+    first : float
+        The time of the start.
+    every : int
+        Keep each so manieth step; the last one is kept in any case.
+    callback : function, optional
+        Called with time and field after every step.
+    refine, degree, threads, quadrature, tolerance, max_iterations
+        As in `iga_nn.solve`.
+
+    Returns
+    -------
+    March
+
+    Raises
+    ------
+    ValueError
+        For arguments out of range, and faces that change.
+    ConvergenceError
+        Where the linear solver does not reach its tolerance in a step.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> warmed = lambda t: iga_nn.Poisson(source="0", boundary=f"{t}")
+    >>> found = iga_nn.march(benchmark_volume(2), warmed, "0", dt=0.1, steps=10)
+    >>> bool(0.8 < found.fields[-1]([[0.5, 0.5, 0.5]])[0] < 1.0)  # later than the walls
+    True
+    """
+    _check(dt, steps, scheme, capacity, every)
+    limits = SolverOptions(tolerance=tolerance, max_iterations=max_iterations)
+    at = problem if callable(problem) else lambda _: problem
+    placed, space, threads = prepared(volume, at(first), refine, degree, threads)
+    with one_blas_thread():
+        data = _Data(volume, at, placed, space, threads, quadrature, callable(problem))
+        path = _Path(data, scheme, capacity / dt, limits, _started(data, start, first), first)
+        times, fields, iterations = [first], [path.field], []
+        for number in range(1, steps + 1):
+            iterations.append(path.step(first + number * dt))
+            if callback is not None:
+                callback(path.time, path.field)
+            if number % every == 0 or number == steps:
+                times.append(path.time)
+                fields.append(path.field)
+    return March(np.array(times), tuple(fields), np.array(iterations))
+
+
+def _check(dt: float, steps: int, scheme: str, capacity: float, every: int) -> None:
+    """Raise ValueError for arguments of `march` that are out of range."""
+    for name, value in (("dt", dt), ("capacity", capacity)):
+        if not (isinstance(value, Real) and 0.0 < value < np.inf):
+            raise ValueError(f"{name} must be a positive number, got {value!r:.80}")
+    for name, count in (("steps", steps), ("every", every)):
+        if not (isinstance(count, Integral) and count >= 1):
+            raise ValueError(f"{name} must be a whole number, at least 1, got {count!r:.80}")
+    if scheme not in SCHEMES:
+        raise ValueError(f"scheme must be one of {', '.join(SCHEMES)}, got {scheme!r:.80}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Data:
+    """A problem at any time, on one trial space. placed: that of the first time."""
+
+    volume: BSplineVolume
+    problem_at: Callable[[float], Any]
+    placed: BoundaryValueProblem
+    space: TrialSpace
+    threads: int
+    quadrature: str
+    varies: bool
+
+    def at(self, time: float) -> tuple[Array, Array]:
+        """Return load and coefficients given on faces, (c, n_u, n_v, n_w) each. Raises ValueError for other faces."""
+        return self._found(self.problem_at(time), time) if self.varies else self._constant
+
+    @cached_property
+    def _constant(self) -> tuple[Array, Array]:
+        return self._found(self.placed, 0.0)
+
+    def _found(self, problem: BoundaryValueProblem, time: float) -> tuple[Array, Array]:
+        if (problem.dirichlet, problem.natural) != (self.placed.dirichlet, self.placed.natural):
+            raise ValueError(f"the problem of time {time:g} has data on other faces than that of the first time")
+        given = problem.on(self.volume)
+        _, load, known = assemble_data(self.volume, given, self.space, self.threads, self.quadrature)
+        return load, known
+
+    def system(self, shift: float) -> System:
+        """Return the system of the law plus `shift` times the mass."""
+        return build(self.volume, self.placed, self.space, self.threads, self.quadrature, shift)
+
+    def mass(self, rule: GaussRule) -> Operator:
+        """Return the mass matrix of all coefficients, by the rule of a system: one that differs would be a source."""
+        found, _ = assemble(self.volume, self.space, Mass(), rule=rule, threads=self.threads)
+        assert isinstance(found, Operator)
+        return found
+
+
+def _started(data: _Data, start: SplineField | Data, time: float) -> Array:
+    """Return the coefficients (c, n_u, n_v, n_w) of the start; those on faces follow from the data of its time."""
+    space, components = data.space, data.placed.form.components
+    if isinstance(start, SplineField):
+        full = embedded(start.coefficients, start.degrees, start.knots, space)
+        full = np.array(full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))
+        if len(full) != components:
+            raise ValueError(f"start has {len(full)} components, the law {components}")
+    else:
+        datum = parse("start", start, components, of_coordinates=data.placed.of_coordinates)
+        full = projected(data.volume, space, datum.placed(UnitFrame.of(data.volume)))
+    _, known = data.at(time)
+    inside = full[:, *space.window].copy()
+    full = known.copy()
+    full[:, *space.window] = inside
+    return full
+
+
+class _Path:
+    """Where a march is: time and coefficients (c, n_u, n_v, n_w), the last ones and those before."""
+
+    def __init__(self, data: _Data, scheme: str, rate: float, limits: SolverOptions, start: Array, time: float) -> None:
+        """rate: capacity over dt."""
+        self.data, self.scheme, self.rate, self.limits = data, scheme, rate, limits
+        self.time, self.last, self.load = time, start, data.at(time)[0]
+        self.before: Array | None = None
+        self.system = data.system(FACTORS[scheme] * rate)
+        self.mass = data.mass(self.system.matrix.rule)
+
+    @property
+    def field(self) -> SplineField:
+        """The spline of the last coefficients."""
+        space = self.data.space
+        coefficients = self.last[0] if len(self.last) == 1 else np.moveaxis(self.last, 0, -1)
+        return SplineField(space.degrees, space.knots, coefficients, self.data.volume)
+
+    def step(self, time: float) -> int:
+        """Go to a time, and return how many iterations it took. Raises ConvergenceError."""
+        load, known = self.data.at(time)
+        system, right = self._equation(load)
+        window = (slice(None), *self.data.space.window)
+        right = np.ascontiguousarray((right - system.matrix.apply(known))[window])
+        guess = self.last if self.before is None else 2.0 * self.last - self.before
+        found = _solved(system, right, np.ascontiguousarray(guess[window]), self.limits)
+        if not found.converged:
+            raise ConvergenceError(
+                f"march: no convergence at time {time:g}, residual {found.residuals[-1]:.1e} after {found.iterations} "
+                "iterations: raise max_iterations or the tolerance"
+            )
+        new = known.copy()
+        new[window] = found.x
+        self.time, self.before, self.last, self.load = time, self.last, new, load
+        log.info("time %g: %d iterations", time, found.iterations)
+        return found.iterations
+
+    def _equation(self, load: Array) -> tuple[System, Array]:
+        """Return the system of a step and its right-hand side, (c, n_u, n_v, n_w)."""
+        mass = self.mass.apply
+        if self.scheme == "trapezoidal":  # (A + s M) new = f_new + f + (s M - A) last, s = 2 / dt
+            shifted = self.system.matrix.apply(self.last)
+            return self.system, load + self.load + 2.0 * FACTORS[self.scheme] * self.rate * mass(self.last) - shifted
+        if self.before is None:
+            return self.data.system(EULER * self.rate), load + EULER * self.rate * mass(self.last)
+        return self.system, load + 0.5 * self.rate * mass(4.0 * self.last - self.before)
+
+
+def _solved(system: System, right: Array, guess: Array, limits: SolverOptions) -> LinearResult:
+    """Return the solution of a step's system, sought from a guess; arrays (c, m_u, m_v, m_w)."""
+
+    def precondition(residual: Array) -> Array:
+        return np.stack([block(part) for block, part in zip(system.blocks, residual, strict=True)])
+
+    solver = conjugate_gradients if system.problem.form.symmetric else generalized_residuals
+    return solver(system.matrix.apply_free, right, precondition, limits.tolerance, limits.max_iterations, guess)
