@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from parameterize.arrays import Array, in_brackets
 from parameterize.spline.volume import FACE_NAMES
 
+from .discretization.operator import MatrixFree
+from .discretization.space import TrialSpace
 from .discretization.weak import WeakFace
 from .field import Points
 from .forms.condition import WITH_FACTOR
-
-if TYPE_CHECKING:
-    from .system import System
+from .forms.problem import BoundaryValueProblem
 
 
 @dataclass(frozen=True)
@@ -67,16 +67,16 @@ def _shown(force: Sequence[float]) -> str:
     return in_brackets(force) if len(force) == 3 else ", ".join(f"{part:.6g}" for part in force)
 
 
-def balance(system: System, coefficients: Array, loads: Array) -> Balance:
-    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w).
+def balance(problem: BoundaryValueProblem, matrix: MatrixFree, coefficients: Array, loads: Array) -> Balance:
+    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w); matrix: of the problem, with what faces add.
 
     loads: those of the source and of all conditions, shaped alike, before what values fix is taken from them.
     """
-    space, faces = system.space, [face for face in system.matrix.faces.values() if isinstance(face, WeakFace)]
-    residual = system.matrix.apply(coefficients) - loads
+    space, faces = matrix.space, [face for face in matrix.faces.values() if isinstance(face, WeakFace)]
+    residual = matrix.apply(coefficients) - loads
     space.add(residual)
-    reactions = _of_faces(system, residual)
-    weak, outside = _of_regions(system, faces, coefficients)
+    reactions = _of_faces(problem, space, residual)
+    weak, outside = _of_regions(problem, faces, coefficients)
     lifted = sum(((face.weights * face.gamma * face.values).sum(axis=1) for face in faces), np.zeros(len(loads)))
     own = loads.sum(axis=(1, 2, 3)) - lifted - outside
     load = space.total(own)
@@ -84,43 +84,44 @@ def balance(system: System, coefficients: Array, loads: Array) -> Balance:
     forces = [load, *reactions.values()]
     size = float(np.abs(forces).sum())
     imbalance = None
-    if reactions and not system.problem.form.has_reaction:
+    if reactions and not problem.form.has_reaction:
         imbalance = float(np.abs(np.sum(forces, axis=0)).max()) / size if size > 0.0 else 0.0
     areas = {
         condition.role: float(space.total(sum(face.weights[face.holds(i)].sum() for face in faces)))
-        for i, condition in enumerate(system.problem.conditions)
+        for i, condition in enumerate(problem.conditions)
         if not condition.is_strong
     }
     as_tuples = {role: tuple(np.atleast_1d(force).tolist()) for role, force in reactions.items()}
     return Balance(tuple(load.tolist()), as_tuples, areas, imbalance)
 
 
-def _of_faces(system: System, residual: Array) -> dict[str, Array]:
+def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array) -> dict[str, Array]:
     """Return what holds the coefficients that the trial space fixes, by face or by the condition that names it."""
-    space, fixed = system.space, np.zeros(residual.shape[1:], dtype=bool)
+    fixed = np.zeros(residual.shape[1:], dtype=bool)
     own = slice(0, space.owned[space.comm.rank].stop - space.owned[space.comm.rank].start)
     found: dict[str, Array] = {}
     for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
         here = np.zeros_like(fixed)
-        if axis > 0 or _has_end(system, name):
+        if axis > 0 or _has_end(space, name):
             here[tuple((-1 if name[1] == "1" else 0) if a == axis else slice(None) for a in range(3))] = True
         here &= ~fixed
         fixed |= here
         force = space.total((residual * here)[:, own].sum(axis=(1, 2, 3)))
-        role = next((c.role for c in system.problem.conditions if c.is_strong and name in c.region.faces), name)
+        role = next((c.role for c in problem.conditions if c.is_strong and name in c.region.faces), name)
         found[role] = found.get(role, 0.0) + force
     return found
 
 
-def _has_end(system: System, name: str) -> bool:
+def _has_end(space: TrialSpace, name: str) -> bool:
     """Return whether the first or the last row of u is among those of this process."""
-    rows = system.space.rows
-    return rows.stop == system.space.whole.shape[0] if name == "u1" else rows.start == 0
+    rows = space.rows
+    return rows.stop == space.whole.shape[0] if name == "u1" else rows.start == 0
 
 
-def _of_regions(system: System, faces: list[WeakFace], coefficients: Array) -> tuple[dict[str, Array], Array]:
+def _of_regions(
+    problem: BoundaryValueProblem, faces: list[WeakFace], coefficients: Array
+) -> tuple[dict[str, Array], Array]:
     """Return what supports on regions do, and what an exchange would do to a body of u = 0."""
-    problem = system.problem
     found = {
         c.role: np.zeros(len(coefficients))
         for c in problem.conditions

@@ -240,7 +240,7 @@ class System:
             meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,
-            balance=balance(self, full, self.loads) if has_norm else None,
+            balance=balance(problem, self.matrix, full, self.loads) if has_norm else None,
         )
         field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)

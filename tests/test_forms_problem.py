@@ -140,13 +140,13 @@ def test_the_term_of_a_robin_face_is_symmetric_and_has_the_face_as_its_sum():
     x, y = np.random.default_rng(0).standard_normal((2, *space.shape))
     products = [np.zeros(space.shape) for _ in range(3)]
     for vector, product in zip((x, y, np.ones(space.shape)), products, strict=True):
-        rule.add_mass(vector, product)
+        rule.add_product(vector[None], product[None])
     assert np.vdot(y, products[0]) == pytest.approx(np.vdot(x, products[1]))
     assert products[2].sum() == pytest.approx(rule.measure.sum())
     diagonal, unit, column = np.zeros(space.shape), np.zeros(space.shape), np.zeros(space.shape)
-    rule.add_mass_diagonal(diagonal)
+    rule.add_diagonal(0, diagonal)
     unit[1, -1, 2] = 1.0
-    rule.add_mass(unit, column)
+    rule.add_product(unit[None], column[None])
     assert diagonal[1, -1, 2] == pytest.approx(column[1, -1, 2])
 
 

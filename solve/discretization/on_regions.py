@@ -125,7 +125,7 @@ class _Builder:
             x=x,
             normal=normal,
             weights=weights,
-            inverse=np.moveaxis(np.linalg.inv(at.jacobian), 0, -1),
+            inverse=np.linalg.inv(at.jacobian).transpose(1, 2, 0),
             codes=self.rule.codes,
             projector=projector,
             values=given,
