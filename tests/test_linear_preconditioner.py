@@ -90,7 +90,7 @@ def test_robin_faces_enter_the_preconditioner_exactly_on_the_cube():
     cube = mapped(lambda x, y, z: (x, y, z), n=4)
     operator, _ = build(cube, ("v0",))
     face = face_rule(cube, operator.space, "w1")
-    operator = replace(operator, robin={"w1": replace(face, measure=5.0 * face.measure)})
+    operator = replace(operator, faces={"w1": replace(face, measure=5.0 * face.measure)})
     x = np.random.default_rng(1).standard_normal((7, 6, 7))
     assert np.allclose(fast_diagonalization(operator)(operator.apply_free(x)), x, atol=1e-10)
 

@@ -125,7 +125,7 @@ class _Builder:
             x=x,
             normal=normal,
             weights=weights,
-            inverse=np.linalg.inv(at.jacobian).transpose(1, 2, 0),
+            inverse=np.asarray(np.linalg.inv(at.jacobian).transpose(1, 2, 0), dtype=np.float64),
             codes=self.rule.codes,
             projector=projector,
             values=given,
