@@ -325,6 +325,25 @@ def test_a_tap_reads_values_on_a_phone(chromium, tmp_path):
     assert float(read["u"]) == pytest.approx(2 + numbers(read["x, y, z"])[0], abs=1e-3) and width == 390
 
 
+def test_a_page_around_the_view_hears_which_face_is_clicked_and_where(chromium, tmp_path):
+    volume = benchmark_volume(1)
+    written(tmp_path, scene_of(volume))
+    outer = "<script>addEventListener('message', one => { if (one.data.face) window.heard = one.data; })</script>"
+    outer += '<iframe src="view.html" style="width: 900px; height: 800px; border: 0"></iframe>'
+    (tmp_path / "outer.html").write_text(outer, encoding="utf-8")
+
+    async def work(browser):
+        tab = await browser.open((tmp_path / "outer.html").as_uri())
+        await tab.until("document.readyState == 'complete' && document.querySelector('iframe') !== null")
+        for kind in ("mousePressed", "mouseReleased"):
+            await tab.call("Input.dispatchMouseEvent", type=kind, x=450, y=400, button="left", clickCount=1)
+        return await tab.until("window.heard")
+
+    heard = in_browser(chromium, tmp_path, work)
+    axis, side = "uvw".index(heard["face"][0]), float(heard["face"][1])
+    assert volume.locate([heard["point"]])[0][axis] == pytest.approx(side, abs=0.02)
+
+
 def test_a_plane_of_space_cuts_the_body_in_its_colours(chromium, tmp_path):
     """u = x has one colour on a plane across x."""
     volume = benchmark_volume(2)
