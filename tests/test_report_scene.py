@@ -360,6 +360,33 @@ def test_a_plane_of_space_cuts_the_body_in_its_colours(chromium, tmp_path):
     assert sum(count for name, count in seen.items() if near[name]) > 0.9 * sum(seen.values()) > 1000
 
 
+def test_element_lines_are_those_of_the_solutions_mesh(chromium, tmp_path):
+    """A cube of 3 x 3 x 3 elements as seen along x: two dark lines cross a row, at a third and at two thirds."""
+    volume = benchmark_volume(3, amplitude=0.0)
+    scene = scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="x")))
+    assert scene["spans"] == [pytest.approx([0, 1 / 3, 2 / 3, 1])] * 3
+    finer = scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="x"), refine=1))
+    assert [len(row) for row in finer["spans"]] == [7, 7, 7]
+    row = """(() => {
+      const gl = document.getElementById("view").getContext("webgl2"), w = gl.drawingBufferWidth;
+      const data = new Uint8Array(4 * w);
+      gl.readPixels(0, Math.round(0.42 * gl.drawingBufferHeight), w, 1, gl.RGBA, gl.UNSIGNED_BYTE, data);
+      return [...data];
+    })()"""
+
+    async def work(browser):
+        tab = await opened(browser, written(tmp_path, scene))
+        await tab.value(typed("views", "+x") + ", document.getElementById('lined').click()")
+        return await tab.value(row)
+
+    found = np.array(in_browser(chromium, tmp_path, work), dtype=float).reshape(-1, 4)
+    body = np.flatnonzero(found[:, 3] == 255)
+    light = found[body, :3].sum(axis=1)
+    dark = (np.flatnonzero(light < 0.85 * np.median(light)) + 0.5) / len(body)
+    inner = dark[(dark > 0.05) & (dark < 0.95)]
+    assert len(inner) >= 2 and np.abs(inner[:, None] - [1 / 3, 2 / 3]).min(axis=1).max() < 0.01
+
+
 def test_a_range_colours_what_lies_outside_by_its_ends(chromium, solved, tmp_path):
     """u lies between 0 and 0.06."""
     table = np.rint(255 * colormaps[evaluate.MAP](np.arange(256))[:, :3])
