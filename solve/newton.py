@@ -98,6 +98,8 @@ def newton(
     if not (isinstance(load_steps, Integral) and load_steps >= 1):
         raise ValueError(f"load_steps must be a whole number, at least 1, got {load_steps!r:.80}")
     placed, space, threads = prepared(volume, problem, refine, degree, threads)
+    if len(placed.natural) == 6 and not placed.form.has_reaction:
+        raise ValueError("newton: data of all six faces leave the solution open: give one face to boundary or robin")
     with one_blas_thread():
         balance = _Balance.of(volume, placed, space, threads, quadrature, tolerance, max_iterations, linear_iterations)
         full = np.zeros_like(balance.load)

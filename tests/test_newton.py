@@ -159,6 +159,16 @@ def test_what_cannot_be_solved_is_refused():
         iga_nn.newton(volume, iga_nn.Problem(Blind(), **data))
     with pytest.raises(ValueError, match="Wrong has a derivative that is not symmetric"):
         iga_nn.newton(volume, iga_nn.Problem(Wrong(), exact="1+x"))
+
+    class Open(Warm):
+        def flux(self, u, grad, x):
+            return grad
+
+        react = iga_nn.Form.react
+
+    every = dict.fromkeys(("u0", "u1", "v0", "v1", "w0", "w1"), "0")
+    with pytest.raises(ValueError, match="leave the solution open"):
+        iga_nn.newton(volume, iga_nn.Problem(Open(), neumann=every, **data))
     with pytest.raises(ValueError, match="load_steps must be"):
         iga_nn.newton(volume, iga_nn.Problem(Warm(), **data), load_steps=0)
     with pytest.raises(ConvergenceError, match="no convergence, residual .* after 1 iterations: raise load_steps"):
