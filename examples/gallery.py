@@ -17,7 +17,15 @@ import iga_nn
 
 HERE = Path(__file__).resolve().parent
 WIDTH, COLORS = 640, 224  # of a picture kept
-EQUATIONS = ("own_law", "heat", "vibration", "thermal_stress", "convection_diffusion", "nonlinear_conductivity")
+EQUATIONS = (
+    "own_law",
+    "heat",
+    "vibration",
+    "thermal_stress",
+    "convection_diffusion",
+    "nonlinear_conductivity",
+    "large_strain",
+)
 SHORT = {"steps_factor": 0.06, "control_points": 12}
 
 

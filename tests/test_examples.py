@@ -146,6 +146,14 @@ def test_nonlinear_conductivity_is_kirchhoffs(tmp_path, capsys):
     assert numbers(out, r"- w\|: (\S+) of")[0] < 5e-3
 
 
+def test_large_strains_shorten_the_way_of_a_beam(tmp_path, capsys):
+    assert shown(load("large_strain").main(out=tmp_path))
+    out = capsys.readouterr().out
+    small, large = numbers(out, r"sinks by ([\d.]+)")
+    assert 0.8 * small < large < 0.95 * small
+    assert numbers(out, r"back by ([\d.]+)") == [0.0, pytest.approx(3.0 / 5.0 * large**2 / 8.0, rel=0.15)]
+
+
 @pytest.mark.parametrize("name", [*load("gallery").EQUATIONS, "common"])
 def test_scripts_on_equations_are_short(name):
     assert len((EXAMPLES / f"{name}.py").read_text(encoding="utf-8").splitlines()) <= 65  # some with formulas
