@@ -96,7 +96,7 @@ def modes(
     degree: int | None = None,
     threads: int | None = None,
     quadrature: str = "spline",
-    tolerance: float = 1e-6,
+    tolerance: float = 1e-4,
     max_iterations: int = 200,
 ) -> Modes:
     """Return the lowest modes of a body: K phi = omega^2 M phi, K the stiffness of a law and M the mass.

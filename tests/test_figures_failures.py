@@ -78,7 +78,7 @@ def test_the_figures_of_a_solve_and_of_a_study_cost_themselves_alone(all_drawn, 
 def test_the_figure_of_modes_costs_itself_alone(all_drawn, in_folder, monkeypatch):
     benchmark_volume(2).save("map.npz")
     monkeypatch.setattr(DRAW["modes.png"], broken)
-    outcome, _ = pipeline.modes_to("map.npz", "modes", options=ModesOptions(number=1, fix_faces=("u0",)))
+    outcome, _ = pipeline.modes_to("map.npz", "modes", options=ModesOptions(number=1, fix=("u0",)))
     report, _ = look(outcome.folder)
     assert set(report["not_drawn"]) == {"modes.png"} and len(report["modes"]["frequencies"]) == 1
 
