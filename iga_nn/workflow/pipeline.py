@@ -289,7 +289,7 @@ def modes_to(
     check_kind("volume", volume, str | Path)
     options, path = options or ModesOptions(), Path(volume)
     body, loaded = with_part(options.problem(), path), load_volume(path)
-    check_size(loaded, options.refine, options.degree, body.components)
+    check_size(loaded, options.refine, options.degree, body.form.components)
     with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
         state.begin("modes")
         write_certificate(state, path, loaded, command_line("modes", path, options, out=out))
