@@ -216,6 +216,13 @@ def test_areas_of_regions():
         iga_nn.integrate(slab, over="x > 9")
 
 
+@pytest.mark.parametrize("radius", [0.02, 0.05, 0.3])
+def test_small_regions_have_their_area_on_coarse_meshes(radius):
+    plate = iga_nn.BSplineVolume.from_function(lambda u, v, w: (4 * u, v, w), 5)
+    disc = f"nz > 0.99 and (x-1.2345)*(x-1.2345) + (y-0.4321)*(y-0.4321) < {radius**2}"
+    assert iga_nn.integrate(plate, over=disc) == pytest.approx(np.pi * radius**2, rel=1e-4)
+
+
 def test_the_divergence_theorem_on_a_curved_body():
     def curved(u, v, w):
         return (1.0 + u) * np.cos(v) + 0.1 * w * w, (1.0 + u) * np.sin(v) - 0.2 * u * w, w + 0.2 * u * v

@@ -24,7 +24,7 @@ FEWEST = 120  # of these a direction and face: a mesh of few spans is looked at 
 PIECES = 8  # intervals of a line, in each of which a jump is looked for
 BISECTIONS = 20
 TOLERANCE = 1e-4  # share of the area of all regions that halving the cells once more may change
-HALVINGS = 4  # of the cells at a rim, at most
+HALVINGS = 8  # of the cells at a rim, at most
 TANGENTS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
