@@ -90,20 +90,23 @@ class _Cutter:
     def rule(self) -> SurfaceRule | None:
         """Return the rule."""
         cells = self._spans()
-        seen = self._seen(cells, max(SAMPLES, -(-FEWEST // int(len(cells) ** 0.5))))
+        samples = max(SAMPLES, -(-FEWEST // int(len(cells) ** 0.5)))
+        seen = self._seen(cells, samples)
         constant = (seen == seen[:, :1, :1]).all(axis=(1, 2))
         whole = [self._gauss(cells[constant], seen[constant, 0, 0])]
         cut = cells[~constant]
         lines = self._on_lines(cut)
         for _ in range(HALVINGS if len(cut) else 0):
             halves = _quartered(cut)
-            seen = self._seen(halves, SAMPLES)
+            samples = max(SAMPLES, samples // 2 + 1)  # as close together as before, so that nothing seen is lost
+            seen = self._seen(halves, samples)
             constant = (seen == seen[:, :1, :1]).all(axis=(1, 2))
             whole.append(self._gauss(halves[constant], seen[constant, 0, 0]))
             finer = self._on_lines(halves[~constant])
             changed = _area_of_codes(lines), _area_of_codes(whole[-1], finer)
             cut, lines = halves[~constant], finer
-            if _difference(*changed) <= TOLERANCE * sum(_area_of_codes(*whole, lines).values()):
+            settled = _difference(*changed) <= TOLERANCE * sum(_area_of_codes(*whole, lines).values())
+            if settled and samples == SAMPLES:
                 break
         parts = [part for part in (*whole, lines) if part is not None]
         return _joined(parts) if parts else None
@@ -121,10 +124,14 @@ class _Cutter:
         return at, self.codes(at.x, at.normal)
 
     def _seen(self, cells: Array, samples: int) -> IntArray:
-        """Return the codes (k, samples, samples) of cells on grids that contain their ends."""
-        t = np.linspace(0.0, 1.0, samples)
+        """Return the codes (k, samples + 2, samples + 2) of cells on grids that contain their ends.
+
+        A grid reaches one point beyond its cell: so it sees a rim that bulges into the cell between two points.
+        """
+        step = 1.0 / (samples - 1)
+        t = np.linspace(-step, 1.0 + step, samples + 2)
         grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
-        points = _placed(cells[:, None, None], grid)
+        points = np.clip(_placed(cells[:, None, None], grid), 0.0, 1.0)
         return self._code(points.reshape(-1, 2))[1].reshape(points.shape[:3])
 
     def _gauss(self, cells: Array, codes: IntArray) -> SurfaceRule | None:
