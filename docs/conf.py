@@ -46,7 +46,7 @@ napoleon_use_ivar = True
 napoleon_use_rtype = False
 
 EXECUTED = (  # the others train for minutes: their pages show results that are kept
-    "boundary_conditions", "compare", "convection_diffusion", "elasticity", "heat", "large_strain",
+    "boundary_conditions", "bracket", "compare", "convection_diffusion", "elasticity", "heat", "large_strain",
     "nonlinear_conductivity", "own_law", "thermal_stress", "vibration",
 )  # fmt: skip
 TOOLS = ("common", "gallery", "validation")  # no examples of their own

@@ -101,6 +101,14 @@ def numbers(text, pattern):
     return [float(found) for found in re.findall(pattern, text)]
 
 
+def test_bracket_balances_its_load_and_is_near_beam_theory(tmp_path, capsys):
+    assert shown(load("bracket").main(out=tmp_path))
+    out = capsys.readouterr().out
+    stress, theory = numbers(out, r"(-\S+) MPa")
+    assert stress == pytest.approx(theory, rel=0.05)
+    assert numbers(out, r"(\S+)\), fix") == [-1000.0] and numbers(out, r"(\S+)\) \(balanced") == [1000.0]
+
+
 def test_own_law_has_the_rates_of_its_degree_on_any_volume(tmp_path, capsys):
     benchmark_volume(2).save(tmp_path / "volume.npz")
     assert shown(load("own_law").main(tmp_path / "volume.npz", tmp_path))

@@ -79,6 +79,18 @@ def test_an_affine_deformation_is_exact(natural):
     assert found.report.l2 < 1e-10 and found.report.h1_seminorm < 1e-10
 
 
+def test_an_affine_deformation_is_exact_under_loads_on_regions():
+    """The same, held on cube faces that are named as a region; the loads are P n by hand."""
+    exact = ("0.3*x+0.1*y", "-0.2*y+0.2*z", "0.1*z+0.05*x")
+    gradient = np.array([[0.3, 0.1, 0.0], [0.0, -0.2, 0.2], [0.05, 0.0, 0.1]])
+    law, f = neo_hookean(), np.eye(3) + gradient
+    piola = law.shear * f + (law.first * np.log(np.linalg.det(f)) - law.shear) * np.linalg.inv(f).T
+    loads = {"nx > 0.99": piola[:, 0].tolist(), "ny < -0.99": (-piola[:, 1]).tolist()}
+    problem = iga_nn.Problem(law, exact=exact, source=NOTHING, value="u0 or v1 or w0 or w1", inflow=loads)
+    found = iga_nn.newton(wavy_box(), problem, degree=3, quadrature="gauss+1", tolerance=1e-13)
+    assert found.report.l2 < 1e-10 and found.report.h1_seminorm < 1e-10
+
+
 def bent(pull, length=10.0, **how):
     """The tip's displacement of a beam of section 1 x 1 and nu = 0 under a dead load across its end."""
     beam = iga_nn.BSplineVolume.from_function(lambda u, v, w: (length * u, v, w), control_points=(12, 4, 4))

@@ -28,7 +28,7 @@ PIECES = 8  # intervals of a line, in each of which a jump is looked for
 BISECTIONS = 20
 TOLERANCE = 1e-4  # share of the area of a face's regions by which it may be wrong
 SPREAD = 0.02  # of a cell in which lines differ, its usual error; these are of either sign
-HALVINGS = 7  # of such cells, at most
+HALVINGS = 8  # of such cells, at most
 MOST_CELLS = 6000  # of one size, of rims that are ragged as the triangles of a mesh are
 TANGENTS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
@@ -102,15 +102,16 @@ class _Cutter:
             parts.append(self._gauss(cells[constant], seen[constant, 0, 0]))
             covered += float(_sizes(cells[constant & (seen[:, 0, 0] != 0)]).sum())
             cells, is_bent = self._across_rims(cells[~constant])
+            is_bent |= samples > SAMPLES  # lines would lose a small part that is seen
             sizes = _sizes(cells)
             error = SPREAD * float(np.linalg.norm(sizes[is_bent]))
             covered += 0.5 * float(sizes[~is_bent].sum())
-            is_last = halvings == HALVINGS or 4 * np.count_nonzero(is_bent) > MOST_CELLS
+            is_last = halvings == HALVINGS or samples == SAMPLES and 4 * np.count_nonzero(is_bent) > MOST_CELLS
             if is_last or error <= TOLERANCE * (covered + 0.5 * float(sizes[is_bent].sum())):
                 parts.append(self._on_lines(cells))
                 break
             parts.append(self._on_lines(cells[~is_bent]))
-            cells, samples = _quartered(cells[is_bent]), SAMPLES
+            cells, samples = _quartered(cells[is_bent]), max(SAMPLES, samples // 2 + 1)  # as close together as before
         found = [part for part in parts if part is not None]
         return _joined(found) if found else None
 
@@ -152,10 +153,14 @@ class _Cutter:
         return at, self.codes(at.x, at.normal)
 
     def _seen(self, cells: Array, samples: int) -> IntArray:
-        """Return the codes (k, samples, samples) of cells on grids that contain their ends."""
-        t = np.linspace(0.0, 1.0, samples)
+        """Return the codes (k, samples + 2, samples + 2) of cells on grids that contain their ends.
+
+        A grid reaches one point beyond its cell: so it sees a rim that bulges into the cell between two points.
+        """
+        step = 1.0 / (samples - 1)
+        t = np.linspace(-step, 1.0 + step, samples + 2)
         grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
-        points = _placed(cells[:, None, None], grid)
+        points = np.clip(_placed(cells[:, None, None], grid), 0.0, 1.0)
         return self._code(points.reshape(-1, 2))[1].reshape(points.shape[:3])
 
     def _gauss(self, cells: Array, codes: IntArray) -> SurfaceRule | None:
