@@ -120,7 +120,7 @@ TYPED = """(() => {
 })()"""
 RELOADED = "window.reloaded = false; location.reload()"
 SHOWN = """[document.querySelector("h2").innerText,
-  [...document.querySelectorAll("form .field input")].map((one) => one.value),
+  [...document.querySelectorAll("form .poisson .field input")].map((one) => one.value),
   [...document.querySelectorAll("form :checked[type=checkbox]")].map((one) => one.name)]"""
 REPORT = "document.querySelector('iframe')?.contentDocument?.body?.innerText"
 
@@ -295,8 +295,7 @@ async def read_on(chromium, folder):
         assert "1,538 vertices, 3,072 faces" in text and "Start\n" not in text and "Drop a surface" not in text
 
 
-REGIONS = """window.trame.state.set("lists", [
-  {name: "value", title: "Values", empty: "REGION=FORMULA"}, {name: "fix", title: "Fixed", empty: "REGION"}])"""
+LISTS = "[...document.querySelectorAll('form .poisson textarea')].map((one) => one.value)"
 PICKED = "document.querySelector('.picked')?.innerText"
 BOX = [1.0, 2.0, 3.0]
 
@@ -306,24 +305,15 @@ def test_a_click_on_the_part_names_its_face(chromium, page, tmp_path):
 
 
 async def pick(chromium, port, folder):
-    """At a screen's and at a phone's width; the lists stand for those of a problem that takes regions."""
-    (folder / "box.obj").write_text(obj(CUBE * BOX, TRIANGLES))
+    """At a screen's and at a phone's width."""
     async with running(chromium, folder) as browser:
-        tab = await browser.open(f"http://127.0.0.1:{port}/")
-        await tab.until("document.querySelector('#file') !== null", PATIENCE)
-        await tab.choose("#file", folder / "box.obj")
-        await tab.sees("8 vertices, 12 faces", PATIENCE)
-        await tab.until("document.querySelector('.drawing canvas') !== null", PATIENCE)
-        await tab.value(REGIONS)
-        await tab.until("document.querySelectorAll('form textarea').length === 2")
+        tab = await with_box(browser, port, folder / "box.obj")
         first = await clicked_face(tab, folder, 1280, (0.06, 0.06))
-        assert await tab.value("[...document.querySelectorAll('form textarea')].map((one) => one.value)") == [
-            f"{first}=", ""
-        ]  # fmt: skip
-        await tab.value("document.querySelector('form [name=fix]').focus()")
+        assert await tab.value(LISTS) == [f"{first}=", "", ""]
+        await tab.value("document.querySelector('form [name=flux]').focus()")
         second = await clicked_face(tab, folder, 400, (-0.18, 0.04))
         assert second != first and await tab.value("document.documentElement.scrollWidth") <= 400
-        assert await tab.value("document.querySelector('form [name=fix]').value") == second
+        assert await tab.value(LISTS) == [f"{first}=", f"{second}=", ""]
         await drag(tab)
         assert (await tab.value(PICKED)).startswith(second)
         assert tab.complaints == []
@@ -331,6 +321,60 @@ async def pick(chromium, port, folder):
         await tab.click("Start")
         await tab.until("document.querySelector('form [role=alert]').innerText.includes('kappa')")
         assert "Start\n" in await tab.text()  # it has not begun
+
+
+async def with_box(browser, port, path):
+    """A tab in which a box, written to a file of a name of its own, is accepted and drawn."""
+    path.write_text(obj(CUBE * BOX, TRIANGLES))
+    tab = await browser.open(f"http://127.0.0.1:{port}/")
+    await tab.until("document.querySelector('#file') !== null", PATIENCE)
+    await tab.choose("#file", path)
+    await tab.until(f"document.querySelector('h2')?.innerText.endsWith('{path.name}')", PATIENCE)
+    await tab.sees("8 vertices, 12 faces", PATIENCE)
+    await tab.until("document.querySelector('.drawing canvas') !== null", PATIENCE)
+    return tab
+
+
+def test_an_elastic_body_is_held_and_loaded_by_clicks(chromium, page, tmp_path):
+    asyncio.run(bend(chromium, page, tmp_path))
+
+
+LEVEL = """(async () => (await (await fetch(
+  document.querySelector('a[download="report.json"]').href)).json()).elasticity.levels[0])()"""
+
+
+async def bend(chromium, port, folder):
+    """The force on the face that is loaded is answered by the one that is held, also where it is solved again."""
+    async with running(chromium, folder) as browser:
+        tab = await with_box(browser, port, folder / "body.obj")
+        await tab.value("document.querySelector('form [value=elasticity]').click()")
+        held = await clicked_face(tab, folder, 1280, (0.06, 0.06))
+        await tab.value("document.querySelector('form [name=load]').focus()")
+        pushed = await clicked_face(tab, folder, 400, (-0.18, 0.04))
+        await tab.until(f"document.querySelector('form [name=load]').value === '{pushed}=0;0;0'")
+        area = float((await tab.value(PICKED)).split("area ")[1].split(",")[0])
+        await tab.until("document.activeElement.name === 'load'")
+        await tab.call("Input.insertText", text="0;0;-2")
+        assert await tab.value("document.querySelector('form [name=load]').value") == f"{pushed}=0;0;-2"
+        assert await tab.value("document.documentElement.scrollWidth") <= 400
+        await tab.picture(folder / "body 400.png", width=400)
+        await tab.picture(folder / "body 1280.png", width=1280)
+        assert await tab.value("document.documentElement.scrollWidth") <= 1280
+        await tab.click("Start")
+        await tab.until(f"{REPORT}?.includes('iga-nn run elasticity')", PATIENCE)
+        assert "linear elasticity" in await tab.value(REPORT) and held in await tab.value(REPORT)
+        first = await tab.value(LEVEL)
+        np.testing.assert_allclose(first["load"], [0.0, 0.0, -2.0 * area], rtol=2e-2, atol=1e-3)
+        np.testing.assert_allclose(first["reactions"][f"fix '{held}'"], -np.array(first["load"]), atol=1e-6)
+        await tab.value("document.querySelector('.problem').open = true")
+        await tab.value(TYPED % ("young", "2"))
+        await tab.click("Solve")
+        await tab.until(f"{REPORT}?.includes('iga-nn solve elasticity')", PATIENCE)
+        again = await tab.value(LEVEL)
+        ratio = again["extremes"]["magnitude"]["largest"] / first["extremes"]["magnitude"]["largest"]
+        assert ratio == pytest.approx(0.5)
+        await tab.picture(folder / "bent.png", width=1280)
+        assert tab.complaints == []
 
 
 async def clicked_face(tab, folder, width, place):

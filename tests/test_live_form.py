@@ -1,12 +1,10 @@
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import pytest
 
 from iga_nn.errors import InputError
 from iga_nn.live.form import described, filled, in_words, stated
-from iga_nn.options import PoissonOptions
+from iga_nn.options import PROBLEMS, ElasticityOptions, PoissonOptions
 
 KEPT = PoissonOptions(exact="x", refine=(0,))
 
@@ -45,27 +43,63 @@ def test_data_that_cannot_be_solved_with_are_refused_by_name(form, says):
         stated(form, KEPT)
 
 
-def test_the_form_lists_the_options_of_a_problem_and_the_faces():
-    known = described(KEPT)
-    assert {field["name"] for field in known["fields"]} <= set(PoissonOptions.__dataclass_fields__)
+def test_the_form_lists_the_options_of_each_problem_and_the_faces():
+    known = described()
+    assert [problem["name"] for problem in known["problems"]] == ["poisson", "elasticity"]
+    names = []
+    for problem in known["problems"]:
+        own = [field["name"] for field in problem["fields"] + problem["lists"]]
+        assert set(own) <= set(PROBLEMS[problem["name"]].__dataclass_fields__)
+        names += own
+    assert len(set(names)) == len(names)  # the fields of both stand in one form
     assert [face["name"] for face in known["faces"]] == ["u0", "u1", "v0", "v1", "w0", "w1"]
 
 
-@dataclass(frozen=True)
-class WithRegions(PoissonOptions):
-    """A problem that takes data on regions."""
-
-    value: tuple[str, ...] = ()
-    flux: tuple[str, ...] = ()
-
-
-def test_lists_of_regions_are_asked_for_where_the_problem_has_them():
-    assert [field["name"] for field in described(WithRegions())["lists"]][:2] == ["value", "flux"]
-    problem = WithRegions(exact="x", value=("face(0,0,1)=x", "nx > 0.9=0"), refine=(0,))
-    assert filled(problem) == {"exact": "x", "value": "face(0,0,1)=x\nnx > 0.9=0"}
+def test_lists_of_regions_have_an_entry_a_line():
+    problem = PoissonOptions(exact="x", value=("face(0,0,1)=x", "nx > 0.9=0"), refine=(0,))
+    assert filled(problem) == {"problem": "poisson", "exact": "x", "value": "face(0,0,1)=x\nnx > 0.9=0"}
     form = {"exact": "x", "value": " face(0,0,1)=x \r\n\n nx > 0.9=0\n", "flux": " \n"}
-    assert stated(form, WithRegions(refine=(0,))) == problem
+    assert stated(form, PoissonOptions(refine=(0,))) == problem
     assert in_words(problem) == "u = x, value on face(0,0,1)=x, nx > 0.9=0"
+
+
+BODY = {"problem": "elasticity", "fix": "nz < -0.9", "load": "face(0,0,3)=0;0;-2\r\nu1=1;0;0", "unit": "mm"}
+
+
+def test_a_form_states_an_elastic_body_on_the_pages_own_meshes():
+    found = stated(BODY | {"young": "210e3", "stress_unit": "MPa", "kappa": "of the other problem"}, KEPT)
+    assert found == ElasticityOptions(
+        young=210e3,
+        fix=("nz < -0.9",),
+        load=("face(0,0,3)=0;0;-2", "u1=1;0;0"),
+        unit="mm",
+        stress_unit="MPa",
+        refine=(0,),
+    )
+    assert stated(filled(found), KEPT) == found
+    assert (
+        in_words(found)
+        == "an elastic body, E = 210000, ν = 0.3, fix on nz < -0.9, load on face(0,0,3)=0;0;-2, u1=1;0;0"
+    )
+    assert stated(BODY, found).young == 1.0  # an empty field, whatever was solved before
+
+
+@pytest.mark.parametrize(
+    ("form", "says"),
+    [
+        ({"young": "stiff"}, "Young's modulus E: give a number, such as 1, got 'stiff'"),
+        ({"young": "-1"}, "young"),
+        ({"poisson_ratio": "0.5"}, "poisson_ratio"),
+        ({"load": "nz > 0.9"}, "load 'nz > 0.9'"),
+        ({"fix": "", "load": ""}, "nothing acts on the body"),
+        ({"fix": "nz >"}, "nz >"),
+        ({"problem": "plasticity"}, "problem 'plasticity': choose one of poisson, elasticity"),
+    ],
+)
+def test_a_body_that_cannot_be_solved_is_refused_in_one_line(form, says):
+    with pytest.raises(InputError) as refused:
+        stated(BODY | form, KEPT)
+    assert says in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_a_form_without_faces_leaves_the_data_of_the_faces():
@@ -81,7 +115,7 @@ def test_a_form_is_filled_with_what_it_has_stated():
     )
     assert filled(problem)["data w0"] == "z" and "boundary" not in filled(problem)
     assert stated(filled(problem), KEPT) == problem
-    assert filled(PoissonOptions()) == {}
+    assert filled(PoissonOptions()) == {"problem": "poisson"}
 
 
 def test_jobs_are_told_apart_by_their_problems():

@@ -86,6 +86,7 @@ def test_a_problem_is_solved_on_a_finished_volume_and_again_on_the_same(tmp_path
     first = accepted(jobs, "my cube.obj")
     first.results.mkdir()
     first.volume.write_bytes(b"volume")
+    first.volume.with_name("boundary.npz").write_bytes(b"part")
     jobs.start(first)
     wait_for(first, "done")
     second = jobs.solve(first, PoissonOptions(exact="x"))
@@ -95,6 +96,7 @@ def test_a_problem_is_solved_on_a_finished_volume_and_again_on_the_same(tmp_path
     wait_for(third, "done")
     assert [job.name for job in jobs] == ["my cube.obj", "my cube.npz", "my cube.npz"]
     assert third.volume == third.path and third.path.read_bytes() == b"volume"
+    assert third.path.with_name("boundary.npz").read_bytes() == b"part"  # regions are found on it
     assert third.problem.exact == "y" and third.results != third.path
     jobs.close()
 

@@ -96,7 +96,7 @@ def test_a_failed_problem_has_its_form_to_correct(tmp_path):
     assert "form" not in row(job, 0, options)  # no volume
     job.path.write_bytes(b"volume")
     said = row(job, 0, options)
-    assert said["form"] == {"source": "log(x)"} and said["deletes"] and not said["starts"]
+    assert said["form"] == {"problem": "poisson", "source": "log(x)"} and said["deletes"] and not said["starts"]
     assert said["what"] == "f = log(x); on the volume of 1"
     job.state = "running"
     assert "form" not in row(job, 0, options)

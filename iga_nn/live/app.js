@@ -50,12 +50,20 @@ async function pick(number, hit) {
   const found = await fetch(`face/${number}`, sight).then((answer) => answer.ok ? answer.json() : null, () => null);
   if (!found) return;
   window.trame.state.set("picked", {...found, job: number});
-  const list = aimed?.isConnected ? aimed : document.querySelector("form [data-regions]");
+  enter(found.region);
+}
+
+// Writes a region into the list of the chosen problem that was chosen last; what is typed next are its data.
+function enter(region) {
+  const form = document.querySelector("form"), lists = form?.querySelectorAll(`.${form.elements.problem.value} textarea`) ?? [];
+  const list = [...lists].find((one) => one === aimed) ?? lists[0];
   if (!list) return;
-  const before = list.value.trimEnd();
-  list.value = `${before}${before && "\n"}${found.region}${list.placeholder.includes("=") ? "=" : ""}`;
+  const before = list.value.trimEnd(), after = list.dataset.after;
+  list.value = `${before}${before && "\n"}${region}${after}`;
   list.dispatchEvent(new Event("input", {bubbles: true}));
   list.closest("details").open = true;
+  list.focus({preventScroll: true});
+  list.setSelectionRange(list.value.length - after.length + after.startsWith("="), list.value.length);
 }
 
 // Sends the form of a problem; what the server says against it is shown in the form.
@@ -73,16 +81,18 @@ function fill(number, form, given) {
   const values = new URLSearchParams(typed ?? given);
   for (const field of form.elements)
     if (field.type === "checkbox") field.checked = values.has(field.name);
+    else if (field.type === "radio") field.checked = field.value === (values.get(field.name) ?? "poisson");
     else if (values.has(field.name)) field.value = values.get(field.name);
   if (typed !== null) form.closest("details").open = true;
 }
 
-// A face clicked in the report's picture is chosen in the form, or no longer.
+// A face clicked in the report's picture is chosen in the form, or no longer; of an elastic body it is a region.
 window.addEventListener("message", (event) => {
   const box = document.querySelector(`form input[name="face ${event.data?.face}"]`);
   if (event.origin !== location.origin || !box) return;
   box.closest("details").open = true;
-  box.click();
+  if (box.form.elements.problem.value === "poisson") box.click();
+  else enter(event.data.face);
 });
 
 document.querySelector("meta[name=viewport]").content = "width=device-width, initial-scale=1";  // zooming is allowed

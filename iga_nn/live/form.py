@@ -1,82 +1,175 @@
-"""Reads the form in which the live page asks for the data of Poisson's equation."""
+"""Reads the form in which the live page asks for a problem: Poisson's equation, or an elastic body."""
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from parameterize.spline.volume import FACE_NAMES
 
 from ..errors import InputError
 from ..figures.evaluate import FACE_COLORS, face_labels
-from ..options import PoissonOptions
+from ..options import PROBLEMS, ElasticityOptions, PoissonOptions, ProblemOptions
 
-FIELDS = (  # of PoissonOptions, what each is called on the page, and what holds where it is left empty
-    ("kappa", "Coefficient κ, one formula or six: xx,xy,xz,yy,yz,zz", "1"),
-    ("reaction", "Reaction c", "0"),
-    ("exact", "Exact solution u, from which all that is left empty follows", "none; without a source exp(X+Z)*sin(Y)"),
-    ("source", "Source f", "that of the exact solution"),
-    ("boundary", "Values of u on the faces", "those of the exact solution, or 0"),
-)
-SIGNS = {"kappa": "κ", "reaction": "c", "exact": "u", "source": "f", "boundary": "u on the faces"}
-LISTS = (  # the same of options that hold data on regions of the part, an entry a line, where the problem has them
-    ("value", "Values of u on regions", "REGION=FORMULA, one a line"),
-    ("flux", "Flux κ du/dn on regions", "REGION=FORMULA, one a line"),
-    ("exchange", "Exchange κ du/dn + α u = g on regions", "REGION=ALPHA:FORMULA, one a line"),
-)
-EXCHANGE = "exchange"  # the other kind of data of a face is "flux"
+UNIT = ("unit", "Unit of lengths, such as mm", "none")  # of every problem
 
 
-def lists_of(options: PoissonOptions) -> list[tuple[str, str, str]]:
-    """Return those of LISTS that the options have."""
-    known = {field.name for field in fields(options)}
-    return [field for field in LISTS if field[0] in known]
+@dataclass(frozen=True)
+class Sheet:
+    """Say what the page asks for of one problem.
+
+    title: what the problem is called. equation: said above the fields. fields: options, what each is called on the
+    page, and what holds where it is left empty. lists: the same of options that hold data on regions of the part, an
+    entry a line, each with what is written behind a region that was clicked. signs: how options are called in one line.
+    """
+
+    title: str
+    equation: str
+    fields: tuple[tuple[str, str, str], ...]
+    lists: tuple[tuple[str, str, str, str], ...]
+    signs: Mapping[str, str]
 
 
-def described(options: PoissonOptions) -> dict[str, Any]:
-    """Return what the page lists: the fields, the lists of regions, and the faces with their colours."""
+SHEETS = {
+    "poisson": Sheet(
+        "Poisson's equation",
+        "−div(κ grad u) + c u = f. Formulas use x, y, z, in the surface's units, or X, Y, Z, scaled to volume 1.",
+        (
+            ("kappa", "Coefficient κ, one formula or six: xx,xy,xz,yy,yz,zz", "1"),
+            ("reaction", "Reaction c", "0"),
+            (
+                "exact",
+                "Exact solution u, from which all that is left empty follows",
+                "none; without a source exp(X+Z)*sin(Y)",
+            ),
+            ("source", "Source f", "that of the exact solution"),
+            ("boundary", "Values of u on the faces", "those of the exact solution, or 0"),
+        ),
+        (
+            ("value", "Values of u on regions", "REGION=FORMULA, one a line", "="),
+            ("flux", "Flux κ du/dn on regions", "REGION=FORMULA, one a line", "="),
+            ("exchange", "Exchange κ du/dn = α (outside − u) on regions", "REGION=ALPHA:OUTSIDE, one a line", "="),
+        ),
+        {"kappa": "κ", "reaction": "c", "exact": "u", "source": "f", "boundary": "u on the faces"},
+    ),
+    "elasticity": Sheet(
+        "an elastic body",
+        "−div σ = f, small displacements. Click a face of the part for its region; all that no region names is free.",
+        (
+            ("young", "Young's modulus E", "1"),
+            ("poisson_ratio", "Poisson's ratio ν", "0.3"),
+            ("body_force", "Force per volume, three formulas", "0;0;0"),
+            ("stress_unit", "Unit of stresses, such as MPa", "none"),
+        ),
+        (
+            ("fix", "Held regions, or with a given displacement", "REGION or REGION=0;0;0.1, one a line", ""),
+            ("roller", "Regions held along their normal alone", "REGION, one a line", ""),
+            ("load", "Force per area on regions", "REGION=0;0;-1, one a line", "=0;0;0"),
+            ("pressure", "Pressure on regions, against the outward normal", "REGION=FORMULA, one a line", "="),
+            ("spring", "Elastic foundation, force per area and displacement", "REGION=FORMULA, one a line", "="),
+        ),
+        {"young": "E", "poisson_ratio": "ν", "body_force": "f"},
+    ),
+}
+LOADS = ("body_force", "fix", "load", "pressure")  # an elastic body without any of them does not move
+EXCHANGE = "exchange"  # the other kind of data of a face of the cube is "flux"
+
+
+def described() -> dict[str, Any]:
+    """Return what the page lists: the problems with their fields and lists, fields of both, and the cube's faces."""
+    sheets = [
+        {
+            "name": name,
+            "title": sheet.title,
+            "equation": sheet.equation,
+            "fields": [_named(field) for field in sheet.fields],
+            "lists": [_named(field) for field in sheet.lists],
+        }
+        for name, sheet in SHEETS.items()
+    ]
     faces = zip(FACE_NAMES, face_labels(), FACE_COLORS, strict=True)
     return {
-        "fields": [dict(zip(("name", "title", "empty"), field, strict=True)) for field in FIELDS],
-        "lists": [dict(zip(("name", "title", "empty"), field, strict=True)) for field in lists_of(options)],
+        "problems": sheets,
+        "common": [_named(UNIT)],
         "faces": [{"name": name, "label": label, "color": color} for name, label, color in faces],
     }
 
 
-def stated(form: Mapping[str, Any], options: PoissonOptions, *, has_faces: bool = True) -> PoissonOptions:
-    """Return the options with the data that a form states; its empty fields are left out.
+def _named(field: tuple[str, ...]) -> dict[str, str]:
+    return dict(zip(("name", "title", "empty", "after"), field, strict=False))
 
-    form: the fields of FIELDS and LISTS; where it has the cube's faces, for a face u0 that has data of its own
-    `face u0`, with `kind u0` ("flux" or "exchange"), `alpha u0` and `data u0`. Raises InputError for data that cannot
-    be solved with.
+
+def stated(form: Mapping[str, Any], options: ProblemOptions, *, has_faces: bool = True) -> ProblemOptions:
+    """Return the options of the problem that a form states; its empty fields are left out.
+
+    form: `problem`, a name of SHEETS, with its fields and lists; of Poisson's equation, where it has the cube's faces,
+    for a face u0 that has data of its own `face u0`, with `kind u0` ("flux" or "exchange"), `alpha u0` and `data u0`.
+    options: those of the page, from which what the form does not ask for is taken. Raises InputError for data that
+    cannot be solved with.
     """
-
-    def text(name: str) -> str:
-        return str(form.get(name, "")).strip()
-
-    neumann, robin = [], []
-    for face in FACE_NAMES:
-        if not text(f"face {face}"):
-            continue
-        data = text(f"data {face}")
-        if text(f"kind {face}") != EXCHANGE:
-            neumann.append(f"{face}={data}" if data else face)
-        elif alpha := text(f"alpha {face}"):
-            robin.append(f"{face}={alpha}:{data}" if data else f"{face}={alpha}")
-        else:
-            raise InputError(f"face {face}: give α, the coefficient of the exchange")
-    given: dict[str, Any] = {name: text(name) or None for name, _, _ in FIELDS}
-    given |= {name: tuple(filter(None, map(str.strip, text(name).splitlines()))) for name, _, _ in lists_of(options)}
-    if has_faces:
-        given |= {"neumann": tuple(neumann), "robin": tuple(robin)}
-    found = replace(options, **given)
+    name = _text(form, "problem") or "poisson"
+    if name not in SHEETS:
+        raise InputError(f"problem {name!r:.80}: choose one of {', '.join(SHEETS)}")
+    sheet = SHEETS[name]
+    given: dict[str, Any] = {field: _text(form, field) or None for field, _, _ in (*sheet.fields, UNIT)}
+    for field, *_ in sheet.lists:
+        given[field] = tuple(filter(None, map(str.strip, _text(form, field).splitlines())))
+    if name == "elasticity":
+        if not any(given[field] for field in LOADS):
+            raise InputError("nothing acts on the body: give a load, a pressure, a force or a displacement")
+        for field in ("young", "poisson_ratio"):
+            given[field] = _number(sheet, field, given[field])
+    elif has_faces:
+        given["neumann"], given["robin"] = _of_faces(form)
+    found = replace(_base(name, options), **given)
     found.problem()
     return found
 
 
-def filled(options: PoissonOptions) -> dict[str, str]:
+def _text(form: Mapping[str, Any], name: str) -> str:
+    return str(form.get(name, "")).strip()
+
+
+def _base(name: str, options: ProblemOptions) -> ProblemOptions:
+    """Return options of that problem: those given, or new ones with the same meshes, degree and quadrature."""
+    if options.section == name:
+        return options
+    shared = {field.name: getattr(options, field.name) for field in fields(ProblemOptions) if field.name != "exact"}
+    return PROBLEMS[name](**shared)
+
+
+def _number(sheet: Sheet, name: str, text: str | None) -> float:
+    """Return the number that a field has, or that holds where it is empty. Raises InputError."""
+    title, empty = next((title, empty) for field, title, empty in sheet.fields if field == name)
+    try:
+        return float(text or empty)
+    except ValueError:
+        raise InputError(f"{title}: give a number, such as {empty}, got {text!r:.80}") from None
+
+
+def _of_faces(form: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the flux and the exchange that are given on faces of the cube. Raises InputError."""
+    neumann, robin = [], []
+    for face in FACE_NAMES:
+        if not _text(form, f"face {face}"):
+            continue
+        data = _text(form, f"data {face}")
+        if _text(form, f"kind {face}") != EXCHANGE:
+            neumann.append(f"{face}={data}" if data else face)
+        elif alpha := _text(form, f"alpha {face}"):
+            robin.append(f"{face}={alpha}:{data}" if data else f"{face}={alpha}")
+        else:
+            raise InputError(f"face {face}: give α, the coefficient of the exchange")
+    return tuple(neumann), tuple(robin)
+
+
+def filled(options: ProblemOptions) -> dict[str, str]:
     """Return the form that states these options, as `stated` reads it; what is not given is left out."""
-    form = {name: value for name, _, _ in FIELDS if (value := getattr(options, name))}
-    form |= {name: "\n".join(lines) for name, _, _ in lists_of(options) if (lines := getattr(options, name))}
+    sheet, form = SHEETS[options.section], {"problem": options.section}
+    known = ((name, getattr(options, name)) for name, _, _ in (*sheet.fields, UNIT))
+    form |= {name: f"{value:.12g}" if isinstance(value, float) else value for name, value in known if value}
+    form |= {name: "\n".join(lines) for name, *_ in sheet.lists if (lines := getattr(options, name))}
+    if not isinstance(options, PoissonOptions):
+        return form
     problem = options.problem()
     for face, data in problem.neumann.items():
         form |= {f"face {face}": "on", f"kind {face}": "flux", f"data {face}": str(data or "")}
@@ -86,13 +179,14 @@ def filled(options: PoissonOptions) -> dict[str, str]:
     return form
 
 
-def in_words(options: PoissonOptions) -> str:
+def in_words(options: ProblemOptions) -> str:
     """Return the data of a problem in one line, by which jobs are told apart."""
-    form = filled(options)
-    said = [f"{sign} = {form[name]}" for name, sign in SIGNS.items() if name in form]
+    sheet, form = SHEETS[options.section], filled(options)
+    said = [sheet.title] if isinstance(options, ElasticityOptions) else []
+    said += [f"{sign} = {form[name]}" for name, sign in sheet.signs.items() if name in form]
     for face in FACE_NAMES:
         if kind := form.get(f"kind {face}"):
             data = form[f"data {face}"]
             said.append(f"{kind} on {face}" + f": {data}" * bool(data))
-    said += [f"{name} on {', '.join(getattr(options, name))}" for name, _, _ in lists_of(options) if name in form]
+    said += [f"{name} on {', '.join(getattr(options, name))}" for name, *_ in sheet.lists if name in form]
     return ", ".join(said) or "the problem of an empty form"

@@ -19,7 +19,7 @@ from parameterize.progress import Progress
 from parameterize.surface.surface import MeshError, Surface
 
 from ..errors import one_line
-from ..options import PoissonOptions
+from ..options import ProblemOptions
 from ..workflow.output_folder import default_folder, has_checkpoint
 from ..workflow.watched import Ended
 from .course import Course
@@ -28,6 +28,7 @@ from .worker import Message, Step
 log = logging.getLogger(__name__)
 
 NAME_LENGTH = 80
+PART = "boundary.npz"  # beside a volume: the surface of the part it was made of
 STARTS, DELETED = ("ready", "stopped", "failed"), ("refused", "ready", "done", "failed", "stopped")
 
 
@@ -46,8 +47,8 @@ class Job:
     name: str
     folder: Path
     state: str = "checking"
-    problem: PoissonOptions | None = None
-    wanted: PoissonOptions | None = None
+    problem: ProblemOptions | None = None
+    wanted: ProblemOptions | None = None
     parent: int = 0
     text: str = ""
     surface: Surface | None = None
@@ -142,14 +143,18 @@ class Jobs:
         """Have the job's surface checked, after those before it."""
         self._checker.submit(self._check_now, job)
 
-    def solve(self, done: Job, problem: PoissonOptions) -> Job:
+    def solve(self, done: Job, problem: ProblemOptions) -> Job:
         """Put a new job into the queue, which solves a problem on the volume of another; return it.
 
+        The part's surface goes with the volume, where it is known: regions are found on it.
         Raises OSError where the volume cannot be copied, for example because the other job was just deleted.
         """
-        job = self.add(f"{default_folder(done.name)}.npz")
+        name = f"{default_folder(done.name)}.npz"
+        job = self.add(name if name != PART else f"volume of {PART}")
         try:
             shutil.copyfile(done.volume, job.path)
+            if (part := done.volume.with_name(PART)).is_file():
+                shutil.copyfile(part, job.path.with_name(PART))
         except OSError:
             job.state = "refused"
             self.delete(job)
@@ -190,11 +195,12 @@ class Jobs:
         self._changed(job)
 
     def close(self) -> None:
-        """Stop all jobs and wait until they have ended."""
+        """Stop all jobs, wait until they have ended, and let go of them: libraries complain of what is left at exit."""
         for job in self:
             self.stop(job)
         self._checker.shutdown(cancel_futures=True)
         self._runner.shutdown(cancel_futures=True)
+        self._jobs.clear()
 
     def _check_now(self, job: Job) -> None:
         try:

@@ -73,7 +73,7 @@ class Page:
         own = {"shown": 0, "paper": None, "webgl": True, "asked": 0, "picked": None, ENDED: ""}
         server.state.update({"page": secrets.token_hex(8), **own})
         server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES)})
-        server.state.update(form.described(self._poisson))
+        server.state.update(form.described())
         server.state.client_only(*own)
         for name, act in {"stop": self.jobs.stop, "delete": self.jobs.delete}.items():
             server.trigger(name)(partial(self._act, act))

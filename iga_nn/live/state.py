@@ -14,7 +14,7 @@ from parameterize.progress import Progress
 from parameterize.surface.surface import Surface
 
 from ..figures.evaluate import FACE_COLORS
-from ..options import PoissonOptions
+from ..options import ProblemOptions
 from ..report.artifacts import ARTIFACTS
 from ..workflow.output_folder import has_checkpoint
 from . import form
@@ -40,7 +40,7 @@ PICKED = (240, 140, 20)
 EDGES_UP_TO = 3_000  # edges are drawn on surfaces of at most so many faces
 
 
-def row(job: Job, before: int, problem: PoissonOptions) -> dict[str, Any]:
+def row(job: Job, before: int, problem: ProblemOptions) -> dict[str, Any]:
     """Return what the page shows of a job, in JSON's own types.
 
     before: jobs ahead of it in the queue. problem: that of the page's options.

@@ -18,7 +18,7 @@ from threading import Event
 from parameterize.arrays import Array
 from parameterize.progress import Progress
 
-from ..options import MapOptions, PoissonOptions
+from ..options import MapOptions, ProblemOptions
 from ..workflow import pipeline
 from ..workflow.output_folder import Outcome
 from ..workflow.watched import Ended, ended, logged, told
@@ -37,7 +37,7 @@ class Step:
 Message = Step | str | Ended  # a string is a line of the log
 
 
-def run(folder: Path, name: str, mapping: MapOptions | None, poisson: PoissonOptions, stop: Event) -> Iterator[Message]:
+def run(folder: Path, name: str, mapping: MapOptions | None, problem: ProblemOptions, stop: Event) -> Iterator[Message]:
     """Run the surface `name` in `folder`, which also takes the results; yield messages as they come, an Ended last.
 
     mapping: None where the file is a volume, on which the problem is only solved.
@@ -45,7 +45,7 @@ def run(folder: Path, name: str, mapping: MapOptions | None, poisson: PoissonOpt
     spawn = multiprocessing.get_context("spawn")  # a copy of a process with threads may hang
     receiver, sender = spawn.Pipe(duplex=False)
     halt = spawn.Event()
-    process = spawn.Process(target=_work, args=(sender, halt, folder, name, mapping, poisson), daemon=True)
+    process = spawn.Process(target=_work, args=(sender, halt, folder, name, mapping, problem), daemon=True)
     process.start()
     sender.close()
     try:
@@ -82,7 +82,7 @@ def _follow(
 
 
 def _work(
-    sender: Connection, halt: SharedEvent, folder: Path, name: str, mapping: MapOptions | None, poisson: PoissonOptions
+    sender: Connection, halt: SharedEvent, folder: Path, name: str, mapping: MapOptions | None, problem: ProblemOptions
 ) -> None:
     """Run the job in the child process, in the job's folder: messages then name the file as the user does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C in the terminal
@@ -93,8 +93,8 @@ def _work(
 
     def work() -> Outcome | None:
         if mapping is None:
-            return pipeline.solve_to(name, problem=poisson, force=True)  # over what a stopped solve left
-        return pipeline.parameterize_to(name, mapping=mapping, problem=poisson, progress=told(tell, halt.is_set))
+            return pipeline.solve_to(name, problem=problem, force=True)  # over what a stopped solve left
+        return pipeline.parameterize_to(name, mapping=mapping, problem=problem, progress=told(tell, halt.is_set))
 
     with logged(_Lines(sender), logging.INFO):
         sender.send(ended(work, "lower --control-points or --refine"))
