@@ -63,10 +63,16 @@ def volume_in_words(facts: reports.Report) -> str:
 
 
 def surface_in_words(facts: dict[str, Any]) -> str:
-    """Return the facts that `check` found out about a surface, and a line for each group of its faces."""
-    others = {key: value for key, value in facts.items() if key != "groups"}
+    """Return the facts that `check` found out about a surface, and a line for each group of faces and each region."""
+    others = {key: value for key, value in facts.items() if key not in ("groups", "regions")}
     groups = [f"{'group:':16s} {g['name']}, {g['faces']} faces, area {g['area']:.6g}" for g in facts["groups"]]
-    return "\n".join([facts_in_words(others), *groups])
+    regions = [f"{'region:':16s} {_region(found)}" for found in facts.get("regions", ())]
+    return "\n".join([facts_in_words(others), *groups, *regions])
+
+
+def _region(found: dict[str, Any]) -> str:
+    count = "1 triangle" if found["triangles"] == 1 else f"{found['triangles']} triangles"
+    return f"{found['region']}, area {found['area']:.6g}, {found['share']:.2%} of the surface, {count}"
 
 
 def facts_in_words(facts: dict[str, Any]) -> str:
