@@ -46,8 +46,8 @@ napoleon_use_ivar = True
 napoleon_use_rtype = False
 
 EXECUTED = (  # the others train for minutes: their pages show results that are kept
-    "boundary_conditions", "compare", "convection_diffusion", "elasticity", "heat", "nonlinear_conductivity", "own_law",
-    "thermal_stress", "vibration",
+    "boundary_conditions", "bracket", "compare", "convection_diffusion", "elasticity", "heat", "large_strain",
+    "nonlinear_conductivity", "own_law", "thermal_stress", "vibration",
 )  # fmt: skip
 TOOLS = ("common", "gallery", "validation")  # no examples of their own
 sphinx_gallery_conf = {

@@ -17,7 +17,15 @@ import iga_nn
 
 HERE = Path(__file__).resolve().parent
 WIDTH, COLORS = 640, 224  # of a picture kept
-EQUATIONS = ("own_law", "heat", "vibration", "thermal_stress", "convection_diffusion", "nonlinear_conductivity")
+EQUATIONS = (
+    "own_law",
+    "heat",
+    "vibration",
+    "thermal_stress",
+    "convection_diffusion",
+    "nonlinear_conductivity",
+    "large_strain",
+)
 SHORT = {"steps_factor": 0.06, "control_points": 12}
 
 
@@ -37,6 +45,7 @@ def runs(full: bool) -> dict[str, Callable[[], Path]]:
         "load_volume": lambda: module("load_volume").main(),
         "export_files": lambda: module("export_files").main(),
         "elasticity": lambda: module("elasticity").main(),
+        "bracket": lambda: module("bracket").main(),
         "batch": lambda: module("batch").main(mapping=mapping),
         **equations,
     }

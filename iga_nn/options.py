@@ -394,8 +394,9 @@ class ModesOptions(Checked):
         poisson_ratio: Poisson's ratio nu.
         density: mass per volume, in units that agree with those of E and of the volume.
         number: how many modes, from the lowest frequency on.
-        fix_faces: faces that are held, of u0, u1, v0, v1, w0, w1; without any the body is free, and its rigid motions
-            are left out.
+        fix: regions of the boundary that are held, as in `run elasticity`: "nz < -0.9", "face(x, y, z)", group:NAME,
+            u0; without any the body is free, and its rigid motions are left out.
+        roller: regions held along their normal alone.
         refine: how often every knot span of the map is halved.
         degree: degree of the trial space; that of the map by default.
     """
@@ -404,7 +405,8 @@ class ModesOptions(Checked):
     poisson_ratio: float = 0.3
     density: float = 1.0
     number: int = 6
-    fix_faces: tuple[str, ...] = ()
+    fix: tuple[str, ...] = ()
+    roller: tuple[str, ...] = ()
     refine: int = 0
     degree: int | None = None
 
@@ -415,13 +417,11 @@ class ModesOptions(Checked):
         from solve.modes import check_modes
 
         check_space([self.refine], self.degree)
-        if wrong := [face for face in self.fix_faces if face not in FACE_NAMES]:
-            raise InputError(f"fix faces: {wrong[0]!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
-        nothing = ["0"] * 3
-        free = {face: nothing for face in FACE_NAMES if face not in self.fix_faces}
+        free = {} if self.fix or self.roller else dict.fromkeys(FACE_NAMES, ["0"] * 3)
+        held = {"fix": self.fix or None, "roller": self.roller or None}
         with input_errors():
             check_modes(self.density, self.number)
-            return Elasticity(force=nothing, traction=free, young=self.young, poisson_ratio=self.poisson_ratio)
+            return Elasticity(traction=free, young=self.young, poisson_ratio=self.poisson_ratio, **held)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,18 +1,23 @@
-"""Integrals over a body, or over the images of the cube's faces: volume, mass, averages, resultants."""
+"""Integrals over a body, or over regions of its boundary: volume, mass, areas, averages, resultants."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import gauss_points
+from parameterize.spline.orientation import FACES
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
+from .discretization.space import TrialSpace, same_smoothness
+from .discretization.surface_rule import SurfaceRule, surface_rule
 from .field import Points
+from .forms.condition import Regions
 from .forms.form import Quantity
-from .forms.frame import face_geometry
-from .quantities import grid_values, quantity_of, slabs
+from .forms.frame import UnitFrame
+from .forms.region import Region, regions_of
+from .quantities import at_points, grid_values, quantity_of, slabs
 from .solution import Solution
 
 Integrand = Quantity | Callable[[Points], ArrayLike]
@@ -21,9 +26,9 @@ Integrand = Quantity | Callable[[Points], ArrayLike]
 def integrate(
     body: BSplineVolume | Solution,
     what: str | Integrand | None = None,
-    over: str | Sequence[str] | None = None,
+    over: Regions | None = None,
 ) -> Array:
-    """Return an integral over a body or over faces of it, in the units of the volume: a number or an array (...).
+    """Return an integral over a body or over regions of its boundary, in the units of the volume: a number or (...).
 
     Parameters
     ----------
@@ -32,60 +37,55 @@ def integrate(
     what : str or function, optional
         Nothing for 1, so that the integral is the volume or the area. Of a solution the name of a quantity, as in
         `Solution.quantity`, or a function of u (c, ...), grad (c, 3, ...) and x (3, ...). Of a volume a function of x.
-    over : str or list of str, optional
-        Names of faces, "u0" to "w1"; the whole body by default.
+    over : Region, str or list of these, optional
+        Regions of the boundary (`Region`, or its text), as "nz > 0.9" or "u0"; where several overlap, it counts once.
+        The whole body by default. The area is right to 1e-4 where a region ends inside a face of the cube.
 
     Raises
     ------
     TypeError
         For what is no volume or solution.
     ValueError
-        For a name that the law does not give, a face that there is not, and a function that fails or has another shape.
+        For a name that the law does not give, a region that is refused or has no area, and a function that fails or has
+        another shape.
 
     Examples
     --------
     >>> import iga_nn
     >>> from solve import benchmark_volume
     >>> solution = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="x*y*z"))
-    >>> volume, area = iga_nn.integrate(solution), iga_nn.integrate(solution, over=["u0", "u1"])
+    >>> volume, area = iga_nn.integrate(solution), iga_nn.integrate(solution, over="nz > 0.9 or nz < -0.9")
     >>> mean = iga_nn.integrate(solution, "u")[0] / volume
     >>> bool(0.1 < mean < 0.2)
     True
     """
     if not isinstance(body, BSplineVolume | Solution):
         raise TypeError(f"body must be a volume or a solution, got {body!r:.80}")
-    volume = body if isinstance(body, BSplineVolume) else body.geometry
-    rules = _rules(body)
-    rows, weights = [points for points, _ in rules], [weight for _, weight in rules]
-    faces = None if over is None else _faces(over)
-    if faces is None:
-        total: Array | float = 0.0
-        start = 0
-        for u in slabs(*rows):
-            det = np.abs(np.linalg.det(volume.grid_jacobian(u, *rows[1:])))
-            measure = np.einsum("i,j,k,ijk->ijk", weights[0][start : start + len(u)], *weights[1:], det)
-            total = total + _sum(_integrand(body, what, u, *rows[1:]) * measure)
-            start += len(u)
-        return np.asarray(total)
-    return np.asarray(sum(_over_face(body, volume, what, rows, weights, *face) for face in faces))
+    if over is None:
+        return _over_body(body, what)
+    total: Array | float = 0.0
+    for rule in _surface_rules(body, over):
+        total = total + np.tensordot(rule.weights, _at_points(body, what, rule), axes=(0, 0))
+    return np.asarray(total)
 
 
-def resultant(solution: Solution, over: str | Sequence[str]) -> Array:
-    """Return the integral of a law's flux through faces, outward (c,): of elasticity the force that acts on the body.
+def resultant(solution: Solution, over: Regions) -> Array:
+    """Return the integral of a law's flux through regions, outward (c,): of elasticity the force that acts on the body.
 
-    The flux is a derivative of the solution, so its integral is less accurate than a solution's values.
+    The flux is a derivative of the solution, so its integral is less accurate than a solution's values. What supports
+    do is known better from `solution.report.balance`.
 
     Parameters
     ----------
     solution : Solution
         Of any law.
-    over : str or list of str
-        Names of faces, "u0" to "w1".
+    over : Region, str or list of these
+        Regions of the boundary, as in `integrate`.
 
     Raises
     ------
     ValueError
-        For a face that there is not.
+        For a region that is refused or has no area.
 
     Examples
     --------
@@ -98,80 +98,105 @@ def resultant(solution: Solution, over: str | Sequence[str]) -> Array:
     """
     if not isinstance(solution, Solution):
         raise TypeError(f"a resultant is that of a solution, got {solution!r:.80}")
-    rules = _rules(solution)
-    rows, weights = [points for points, _ in rules], [weight for _, weight in rules]
-    flux = quantity_of(solution.problem.form, "flux")
     total = np.zeros(solution.problem.form.components)
-    for axis, side in _faces(over):
-        single = [np.array([float(side)]) if a == axis else row for a, row in enumerate(rows)]
-        values = np.squeeze(grid_values(solution, flux, *single), 2 + axis)  # (c, 3, q_b, q_c)
-        _, area = face_geometry(solution.geometry, rows, axis, side)
-        b, c = (weights[a] for a in range(3) if a != axis)
-        total += np.einsum("cdij,dij,i,j->c", values, area, b, c)
+    for rule in _surface_rules(solution, over):
+        flux = at_points(solution, solution.problem.form, "flux", rule.at.parameters)  # (m, c, 3)
+        total += np.einsum("mcd,dm,m->c", flux, rule.at.normal, rule.weights)
     return total
 
 
-def _rules(body: BSplineVolume | Solution) -> list[tuple[Array, Array]]:
-    """Return Gauss points and weights a direction: exact for the volume, and as fine as the errors' of a solution."""
-    found = []
-    volume = body if isinstance(body, BSplineVolume) else body.geometry
-    for axis, knots in enumerate(body.knots):
-        count = max((3 * volume.degrees[axis] + 1) // 2, body.degrees[axis] + 2)
-        points, weights = gauss_points(knots, count)
-        found.append((points.ravel(), weights.ravel()))
-    return found
+def _volume_of(body: BSplineVolume | Solution) -> BSplineVolume:
+    return body if isinstance(body, BSplineVolume) else body.geometry
 
 
-def _faces(over: str | Sequence[str]) -> list[tuple[int, int]]:
-    """Return axis and side of each face. Raises ValueError for a name that there is not, and for no names."""
-    if not over or not isinstance(over, str | Sequence | set):
-        raise ValueError(f"over: give names of faces, {', '.join(FACE_NAMES)}; got {over!r:.80}")
-    names = [over] if isinstance(over, str) else list(over)
-    for name in names:
-        if name not in FACE_NAMES:
-            raise ValueError(f"over: {name!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
-    return [divmod(FACE_NAMES.index(name), 2) for name in dict.fromkeys(names)]
+def _counts(body: BSplineVolume | Solution) -> list[int]:
+    """Return how many Gauss points a span and direction: exact for the volume, as many as the errors' of a solution."""
+    degrees = zip(_volume_of(body).degrees, body.degrees, strict=True)
+    return [max((3 * of_map + 1) // 2, own + 2) for of_map, own in degrees]
 
 
-def _integrand(body: BSplineVolume | Solution, what: str | Integrand | None, u: Array, v: Array, w: Array) -> Array:
+def _over_body(body: BSplineVolume | Solution, what: str | Integrand | None) -> Array:
+    """Return the integral over the body."""
+    pairs = [gauss_points(knots, count) for knots, count in zip(body.knots, _counts(body), strict=True)]
+    rows, weights = ([part.ravel() for part in parts] for parts in zip(*pairs, strict=True))
+    total: Array | float = 0.0
+    start = 0
+    for u in slabs(*rows):
+        det = np.abs(np.linalg.det(_volume_of(body).grid_jacobian(u, *rows[1:])))
+        measure = np.einsum("i,j,k,ijk->ijk", weights[0][start : start + len(u)], *weights[1:], det)
+        total = total + (_on_grid(body, what, u, *rows[1:]) * measure).sum(axis=(-3, -2, -1))
+        start += len(u)
+    return np.asarray(total)
+
+
+def _surface_rules(body: BSplineVolume | Solution, over: Regions) -> Iterator[SurfaceRule]:
+    """Yield the quadrature rules, one a face of the cube, of the part of the boundary that is in one of the regions.
+
+    Raises ValueError where there is none.
+    """
+    volume, regions = _volume_of(body), _placed(body, over)
+    degree = max(_counts(body)) - 1  # a rule has a point more
+    rows = [same_smoothness(knots, old, degree) for knots, old in zip(body.knots, body.degrees, strict=True)]
+    space = TrialSpace((degree, degree, degree), (rows[0], rows[1], rows[2]))
+    found = False
+    for name, face in zip(FACE_NAMES, FACES, strict=True):
+
+        def codes(x: Array, normal: Array, name: str = name) -> IntArray:
+            return np.any([region.holds(x, normal, name) for region in regions], axis=0).astype(np.int64)
+
+        rule = surface_rule(volume, space, *face, codes)
+        if rule is not None:
+            found = True
+            yield rule
+    if not found:
+        raise ValueError(
+            f"over {', '.join(repr(str(region)) for region in regions)}: no part of the boundary lies there"
+        )
+
+
+def _placed(body: BSplineVolume | Solution, over: Regions) -> list[Region]:
+    """Return regions with X, Y, Z measured in the body, and on the surface that a solution's problem knows."""
+    if not over or not isinstance(over, Region | str | list | tuple):
+        raise ValueError(f"over: give regions, such as 'nz > 0.9' or 'u0', got {over!r:.80}")
+    regions = regions_of(over)
+    frame = UnitFrame.of(_volume_of(body)) if any(region.is_scaled for region in regions) else None
+    conditions = body.problem.conditions if isinstance(body, Solution) else ()
+    surface = next((c.region.surface for c in conditions if c.region.surface is not None), None)
+    return [region.placed(frame, surface) for region in regions]
+
+
+def _on_grid(body: BSplineVolume | Solution, what: str | Integrand | None, u: Array, v: Array, w: Array) -> Array:
     """Return what is integrated (..., n_u, n_v, n_w) on a grid."""
-    if what is None:
-        return np.ones((len(u), len(v), len(w)))
-    if not isinstance(body, BSplineVolume):
+    if what is not None and isinstance(body, Solution):
         return grid_values(body, quantity_of(body.problem.form, what), u, v, w)  # type: ignore[arg-type]
+    return _of_position(what, Points.on(_volume_of(body), u, v, w))
+
+
+def _at_points(body: BSplineVolume | Solution, what: str | Integrand | None, rule: SurfaceRule) -> Array:
+    """Return what is integrated (m, ...) at the points of a rule."""
+    if what is not None and isinstance(body, Solution):
+        return at_points(body, body.problem.form, what, rule.at.parameters)  # type: ignore[arg-type]
+    x = Points.at(np.ascontiguousarray(rule.at.x), rule.at.parameters)
+    return np.moveaxis(_of_position(what, x), -1, 0)
+
+
+def _of_position(what: str | Integrand | None, x: Points) -> Array:
+    """Return a function of x (..., shape) at points x (3, shape), or 1.
+
+    Raises ValueError for what is no function, and for one that fails or has another shape.
+    """
+    if what is None:
+        return np.ones(x.shape[1:])
     if isinstance(what, str):
         raise ValueError(f"a volume alone has no {what!r}: give a function of x, or a solution in its place")
     if not callable(what):
         raise ValueError(f"what must be a function or nothing, got {what!r:.80}")
-    x = Points.on(body, u, v, w)
     try:
         found = np.asarray(what(x), dtype=np.float64)  # type: ignore[call-arg]
     except Exception as error:  # whatever a user's function does
         raise ValueError(f"the function of x fails: {type(error).__name__}: {error}") from error
     if found.ndim == 0:
         return np.broadcast_to(found, x.shape[1:])
-    if found.shape[-3:] != x.shape[1:]:
+    if found.shape[found.ndim - len(x.shape[1:]) :] != x.shape[1:]:
         raise ValueError(f"the function must return an array (..., {', '.join(map(str, x.shape[1:]))})")
     return found
-
-
-def _over_face(
-    body: BSplineVolume | Solution,
-    volume: BSplineVolume,
-    what: str | Integrand | None,
-    rows: Sequence[Array],
-    weights: Sequence[Array],
-    axis: int,
-    side: int,
-) -> Array:
-    """Return the integral over a face."""
-    u, v, w = (np.array([float(side)]) if a == axis else row for a, row in enumerate(rows))
-    _, area = face_geometry(volume, rows, axis, side)
-    b, c = (weights[a] for a in range(3) if a != axis)
-    measure = np.linalg.norm(area, axis=0) * np.multiply.outer(b, c)
-    return _sum(_integrand(body, what, u, v, w) * np.expand_dims(measure, axis))
-
-
-def _sum(values: Array) -> Array:
-    """Return the sum over the three last axes."""
-    return np.asarray(values.sum(axis=(-3, -2, -1)))

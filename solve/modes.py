@@ -25,7 +25,7 @@ from .solver import discretized
 from .system import System
 
 SPARE = 4  # vectors more than are wanted, and half as many as these again: the last ones converge slowly
-ROUND = 20  # iterations before the first look at the residuals; each round is as long as all before
+ROUND = 8  # iterations before the first look at the residuals; each round is as long as all before
 AT_REST = 1e-7  # share of the shift below which an eigenvalue is that of a rigid motion
 INNER, INNER_MOST = 0.1, 500  # tolerance and iterations of the solves that precondition: K of a slender body is hard
 RIGID = {1: 1, 3: 6}  # motions of a free body that take no energy, by the law's components
@@ -96,7 +96,7 @@ def modes(
     degree: int | None = None,
     threads: int | None = None,
     quadrature: str = "spline",
-    tolerance: float = 1e-6,
+    tolerance: float = 1e-4,
     max_iterations: int = 200,
 ) -> Modes:
     """Return the lowest modes of a body: K phi = omega^2 M phi, K the stiffness of a law and M the mass.

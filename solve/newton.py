@@ -100,6 +100,8 @@ def newton(
     if weak := [c.role for c in problem.conditions if c.is_essential and not c.is_strong]:
         raise ValueError(f"{weak[0]}: newton holds all of u on whole faces of the cube only: write a region such as u0")
     placed, space, threads = prepared(volume, problem, refine, degree, threads)
+    if len(placed.natural) == 6 and not placed.form.has_reaction:
+        raise ValueError("newton: data of all six faces leave the solution open: give one face to boundary or robin")
     with one_blas_thread():
         balance = _Balance.of(volume, placed, space, threads, quadrature, tolerance, max_iterations, linear_iterations)
         full = np.zeros_like(balance.load)

@@ -128,6 +128,11 @@ class System:
         return self._linear(single.apply_free)
 
     @property
+    def weak(self) -> list[WeakFace]:
+        """The faces of the cube with terms of conditions on regions."""
+        return [face for face in self.matrix.faces.values() if isinstance(face, WeakFace)]
+
+    @property
     def load(self) -> Array:
         """The right-hand side b (N,): source and data on faces, less A times the coefficients that are fixed."""
         return self.right.ravel()
@@ -247,7 +252,8 @@ class System:
 
     def _energy(self, free: Array) -> float | None:
         """Return a(u_h, u_h) of free coefficients that solve the system, None where it is not the work of the loads."""
-        if not self.problem.form.symmetric or self.space.total(np.count_nonzero(self.known)):
+        lifted = sum(int(np.count_nonzero(face.values)) for face in self.weak)
+        if not self.problem.form.symmetric or self.space.total(np.count_nonzero(self.known) + lifted):
             return None
         return float(self.space.total((self.right * free).sum()))
 

@@ -41,6 +41,10 @@ def cases():
     )
     coarse = solve_problem(n4, Poisson(exact=WAVE), threads=1)
     body = Elasticity(exact=("exp(x)*sin(y)", "cos(x*z)", "x*y*z"), traction={"u1": None, "v0": None})
+    held = Elasticity(
+        fix={"nx < -0.5 and y < 0.2": None}, roller="nz > 0.5 and x > 0.4", load={"ny > 0.5": (1, 0, "x")}
+    )
+    cut = Poisson(exact=WAVE, value="x + z < 0.7", exchange={"ny > 0.5": ("2", None)})
     sheared = mapped(lambda u, v, w: (u + 3.0 * v, v, w + 1.5 * u))
     return {
         "poisson": (n4, Poisson(exact=WAVE), {"refine": 1}),
@@ -51,6 +55,8 @@ def cases():
         "linear": (n4, Poisson(exact=WAVE), {"degree": 1}),
         "elasticity": (n3, body, {}),
         "sheared": (sheared, Poisson(exact=WAVE), {"refine": 1}),
+        "held": (n4, held, {}),
+        "cut": (n4, cut, {"refine": 1}),
         "wind": (n3, Problem(Wind(), exact=WAVE), {}),
     }
 

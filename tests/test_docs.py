@@ -90,7 +90,7 @@ def test_formulas_and_public_names_are_shown(site):
 
 def test_a_script_that_is_run_shows_what_it_says_and_every_volume_is_shown(site):
     (heat,) = (file for file in site if file.parts[-2:] == ("gallery", "heat.html"))
-    assert "relative L2 error" in heat.read_text(encoding="utf-8")
+    assert "relative error" in heat.read_text(encoding="utf-8")
     views = {f"scenes/{file.name}" for file in site if file.parent.name == "scenes"}
     assert views == {f"scenes/{name}.html" for name in ("heat", "first_run", "given_corners", "own_mesh")}
     assert views <= {urlsplit(load).path.removeprefix("../") for page in site.values() for load in page.loads}

@@ -101,6 +101,14 @@ def numbers(text, pattern):
     return [float(found) for found in re.findall(pattern, text)]
 
 
+def test_bracket_balances_its_load_and_is_near_beam_theory(tmp_path, capsys):
+    assert shown(load("bracket").main(out=tmp_path))
+    out = capsys.readouterr().out
+    stress, theory = numbers(out, r"(-\S+) MPa")
+    assert stress == pytest.approx(theory, rel=0.05)
+    assert numbers(out, r"(\S+)\), fix") == [-1000.0] and numbers(out, r"(\S+)\) \(balanced") == [1000.0]
+
+
 def test_own_law_has_the_rates_of_its_degree_on_any_volume(tmp_path, capsys):
     benchmark_volume(2).save(tmp_path / "volume.npz")
     assert shown(load("own_law").main(tmp_path / "volume.npz", tmp_path))
@@ -144,6 +152,14 @@ def test_nonlinear_conductivity_is_kirchhoffs(tmp_path, capsys):
     residuals = numbers(out, r"residual (\S+)")
     assert len(residuals) < 10 and residuals[-1] < 1e-10 and residuals[-2] < 10.0 * residuals[-3] ** 2
     assert numbers(out, r"- w\|: (\S+) of")[0] < 5e-3
+
+
+def test_large_strains_shorten_the_way_of_a_beam(tmp_path, capsys):
+    assert shown(load("large_strain").main(out=tmp_path))
+    out = capsys.readouterr().out
+    small, large = numbers(out, r"sinks by ([\d.]+)")
+    assert 0.8 * small < large < 0.95 * small
+    assert numbers(out, r"back by ([\d.]+)") == [0.0, pytest.approx(3.0 / 5.0 * large**2 / 8.0, rel=0.15)]
 
 
 @pytest.mark.parametrize("name", [*load("gallery").EQUATIONS, "common"])

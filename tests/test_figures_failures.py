@@ -14,7 +14,7 @@ from iga_nn.figures import render as rendering
 from iga_nn.figures.curves import draw_study
 from iga_nn.figures.solution import draw_error, draw_values
 from iga_nn.figures.style import error_range, even_range
-from iga_nn.options import PoissonOptions, StudyOptions
+from iga_nn.options import ModesOptions, PoissonOptions, StudyOptions
 from iga_nn.report import html as page
 from iga_nn.report.artifacts import ARTIFACTS
 from iga_nn.workflow import pipeline
@@ -22,7 +22,7 @@ from solve.study import benchmark_volume
 
 DEFECTS = ("folds.png", "meeting.png")
 DRAW = {figure.file: f"iga_nn.figures.{figure.draw}" for figure in ARTIFACTS if figure.draw}  # file -> function
-MAP = [file for file in DRAW if file not in (*DEFECTS, "named_faces.png", "study.png")]
+MAP = [file for file in DRAW if file not in (*DEFECTS, "named_faces.png", "study.png", "modes.png")]
 
 
 @pytest.fixture
@@ -73,6 +73,14 @@ def test_the_figures_of_a_solve_and_of_a_study_cost_themselves_alone(all_drawn, 
     assert set(report["not_drawn"]) == {"convergence.png", "named_faces.png"}
     outcome, _ = pipeline.study_to("map.npz", "study", options=StudyOptions(refine=("0", "1")))
     assert set(look(outcome.folder)[0]["not_drawn"]) == {"study.png"}
+
+
+def test_the_figure_of_modes_costs_itself_alone(all_drawn, in_folder, monkeypatch):
+    benchmark_volume(2).save("map.npz")
+    monkeypatch.setattr(DRAW["modes.png"], broken)
+    outcome, _ = pipeline.modes_to("map.npz", "modes", options=ModesOptions(number=1, fix=("u0",)))
+    report, _ = look(outcome.folder)
+    assert set(report["not_drawn"]) == {"modes.png"} and len(report["modes"]["frequencies"]) == 1
 
 
 def test_without_the_interactive_view_the_page_is_whole(in_folder, monkeypatch, chromium, tmp_path):

@@ -34,7 +34,7 @@ def test_a_room_has_its_tones(is_held):
     found = iga_nn.modes(box(1.0, 1.5, 2.0, 6), law, n=3, refine=1)
     known = tones(1)[:3] if is_held else tones(0)[1:4]  # without the constant
     assert found.frequencies == pytest.approx(known, rel=2e-5)
-    assert found.rigid == (0 if is_held else 1) and found.residuals.max() < 1e-6
+    assert found.rigid == (0 if is_held else 1) and found.residuals.max() < 1e-4
 
 
 def timoshenko(length, young):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from example_files import load
 from scipy.integrate import solve_bvp
 
 import iga_nn
@@ -23,27 +24,10 @@ class Warm(iga_nn.Form):
         return u**3
 
 
-class NeoHookean(iga_nn.Form):
-    """P = mu F + (lambda ln J - mu) F^-T, the first Piola stress of F = 1 + grad u."""
-
-    components = 3
-    linear = False
-
-    def __init__(self, young=100.0, poisson_ratio=0.3):
-        constants = iga_nn.Elasticity(displacement=NOTHING, young=young, poisson_ratio=poisson_ratio).constants
-        self.first, self.shear = constants
-
-    def flux(self, u, grad, x):
-        f = [[grad[i, j] + float(i == j) for j in range(3)] for i in range(3)]
-        minor = [[self.cofactor(f, i, j) for j in range(3)] for i in range(3)]
-        det = sum(f[0][j] * minor[0][j] for j in range(3))
-        factor = (self.first * np.log(det) - self.shear) / det
-        return np.stack([np.stack([self.shear * f[i][j] + factor * minor[i][j] for j in range(3)]) for i in range(3)])
-
-    @staticmethod
-    def cofactor(f, i, j):
-        (a, b), (k, m) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
-        return f[a][k] * f[b][m] - f[a][m] * f[b][k]
+def neo_hookean(young=100.0, poisson_ratio=0.3):
+    """The law of the gallery."""
+    small = iga_nn.Elasticity(displacement=NOTHING, young=young, poisson_ratio=poisson_ratio)
+    return load("large_strain").NeoHookean(*small.constants)
 
 
 def test_a_nonlinear_conductivity_has_the_rates_of_its_degree():
@@ -90,26 +74,38 @@ def wavy_box():
 def test_an_affine_deformation_is_exact(natural):
     """The patch test at strains of 30 %: degree 3 on a map of degree 2 is integrated exactly."""
     exact = ("0.3*x+0.1*y", "-0.2*y+0.2*z", "0.1*z+0.05*x")
-    problem = iga_nn.Problem(NeoHookean(), exact=exact, source=NOTHING, neumann=natural)
+    problem = iga_nn.Problem(neo_hookean(), exact=exact, source=NOTHING, neumann=natural)
     found = iga_nn.newton(wavy_box(), problem, degree=3, quadrature="gauss+1", tolerance=1e-13)
     assert found.report.l2 < 1e-10 and found.report.h1_seminorm < 1e-10
 
 
-def bent(load, length=10.0, **how):
+def test_an_affine_deformation_is_exact_under_loads_on_regions():
+    """The same, held on cube faces that are named as a region; the loads are P n by hand."""
+    exact = ("0.3*x+0.1*y", "-0.2*y+0.2*z", "0.1*z+0.05*x")
+    gradient = np.array([[0.3, 0.1, 0.0], [0.0, -0.2, 0.2], [0.05, 0.0, 0.1]])
+    law, f = neo_hookean(), np.eye(3) + gradient
+    piola = law.shear * f + (law.first * np.log(np.linalg.det(f)) - law.shear) * np.linalg.inv(f).T
+    loads = {"nx > 0.99": piola[:, 0].tolist(), "ny < -0.99": (-piola[:, 1]).tolist()}
+    problem = iga_nn.Problem(law, exact=exact, source=NOTHING, value="u0 or v1 or w0 or w1", inflow=loads)
+    found = iga_nn.newton(wavy_box(), problem, degree=3, quadrature="gauss+1", tolerance=1e-13)
+    assert found.report.l2 < 1e-10 and found.report.h1_seminorm < 1e-10
+
+
+def bent(pull, length=10.0, **how):
     """The tip's displacement of a beam of section 1 x 1 and nu = 0 under a dead load across its end."""
     beam = iga_nn.BSplineVolume.from_function(lambda u, v, w: (length * u, v, w), control_points=(12, 4, 4))
-    traction = {**dict.fromkeys(FREE, NOTHING), "u1": ("0", "0", str(load))}
-    law = iga_nn.Problem(NeoHookean(poisson_ratio=0.0), source=NOTHING, neumann=traction)
+    traction = {**dict.fromkeys(FREE, NOTHING), "u1": ("0", "0", str(pull))}
+    law = iga_nn.Problem(neo_hookean(poisson_ratio=0.0), source=NOTHING, neumann=traction)
     small = iga_nn.Elasticity(traction=traction, young=100.0, poisson_ratio=0.0)
     place = [[1.0, 0.5, 0.5]]
     return iga_nn.newton(beam, law, **how)(place)[0], solve_problem(beam, small)(place)[0]
 
 
-def elastica(load, stiffness, length):
+def elastica(pull, stiffness, length):
     """The tip (along, across) of an inextensible rod clamped at one end, load across: EI t'' = -P cos t."""
     s = np.linspace(0.0, length, 101)
     found = solve_bvp(
-        lambda s, y: np.array([y[1], -load / stiffness * np.cos(y[0]), np.cos(y[0]) - 1.0, np.sin(y[0])]),
+        lambda s, y: np.array([y[1], -pull / stiffness * np.cos(y[0]), np.cos(y[0]) - 1.0, np.sin(y[0])]),
         lambda a, b: np.array([a[0], b[1], a[2], a[3]]),
         s,
         np.zeros((4, len(s))),
@@ -159,6 +155,16 @@ def test_what_cannot_be_solved_is_refused():
         iga_nn.newton(volume, iga_nn.Problem(Blind(), **data))
     with pytest.raises(ValueError, match="Wrong has a derivative that is not symmetric"):
         iga_nn.newton(volume, iga_nn.Problem(Wrong(), exact="1+x"))
+
+    class Open(Warm):
+        def flux(self, u, grad, x):
+            return grad
+
+        react = iga_nn.Form.react
+
+    every = dict.fromkeys(("u0", "u1", "v0", "v1", "w0", "w1"), "0")
+    with pytest.raises(ValueError, match="leave the solution open"):
+        iga_nn.newton(volume, iga_nn.Problem(Open(), neumann=every, **data))
     with pytest.raises(ValueError, match="load_steps must be"):
         iga_nn.newton(volume, iga_nn.Problem(Warm(), **data), load_steps=0)
     with pytest.raises(ConvergenceError, match="no convergence, residual .* after 1 iterations: raise load_steps"):

@@ -20,10 +20,14 @@ SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss"}
 SCALAR = dict.fromkeys(("exact", "source", "boundary", "kappa", "reaction"), "1")
 VECTOR = dict.fromkeys(("exact", "body_force", "displacement"), "1;1;1")
 OTHERS = {
-    PoissonOptions(source="2"): SPACE | SCALAR | {"neumann": ("u1=1",), "robin": ("u1=1:1",)},
+    PoissonOptions(source="2"): SPACE
+    | SCALAR
+    | {"neumann": ("u1=1",), "robin": ("u1=1:1",), "value": ("x < 1=1",), "flux": ("x < 1=1",)}
+    | {"exchange": ("x < 1=1:1",)},
     ElasticityOptions(body_force="2;2;2"): SPACE
     | VECTOR
-    | {"traction": ("u1=1;1;1",), "young": 2.0, "poisson_ratio": 0.25},
+    | {"traction": ("u1=1;1;1",), "young": 2.0, "poisson_ratio": 0.25, "fix": ("x < 1",), "roller": ("x < 1",)}
+    | {"symmetry": ("x < 1",), "load": ("x < 1=1;1;1",), "pressure": ("x < 1=1",), "spring": ("x < 1=1",)},
 }
 
 

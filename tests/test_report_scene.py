@@ -325,6 +325,25 @@ def test_a_tap_reads_values_on_a_phone(chromium, tmp_path):
     assert float(read["u"]) == pytest.approx(2 + numbers(read["x, y, z"])[0], abs=1e-3) and width == 390
 
 
+def test_a_page_around_the_view_hears_which_face_is_clicked_and_where(chromium, tmp_path):
+    volume = benchmark_volume(1)
+    written(tmp_path, scene_of(volume))
+    outer = "<script>addEventListener('message', one => { if (one.data.face) window.heard = one.data; })</script>"
+    outer += '<iframe src="view.html" style="width: 900px; height: 800px; border: 0"></iframe>'
+    (tmp_path / "outer.html").write_text(outer, encoding="utf-8")
+
+    async def work(browser):
+        tab = await browser.open((tmp_path / "outer.html").as_uri())
+        await tab.until("document.readyState == 'complete' && document.querySelector('iframe') !== null")
+        for kind in ("mousePressed", "mouseReleased"):
+            await tab.call("Input.dispatchMouseEvent", type=kind, x=450, y=400, button="left", clickCount=1)
+        return await tab.until("window.heard")
+
+    heard = in_browser(chromium, tmp_path, work)
+    axis, side = "uvw".index(heard["face"][0]), float(heard["face"][1])
+    assert volume.locate([heard["point"]])[0][axis] == pytest.approx(side, abs=0.02)
+
+
 def test_a_plane_of_space_cuts_the_body_in_its_colours(chromium, tmp_path):
     """u = x has one colour on a plane across x."""
     volume = benchmark_volume(2)
@@ -339,6 +358,33 @@ def test_a_plane_of_space_cuts_the_body_in_its_colours(chromium, tmp_path):
     middle = np.rint(255 * np.array(colormaps[evaluate.MAP](128))[:3])
     near = {name: np.abs(np.array(name.split(","), dtype=float) - middle).max() < 6 for name in seen}
     assert sum(count for name, count in seen.items() if near[name]) > 0.9 * sum(seen.values()) > 1000
+
+
+def test_element_lines_are_those_of_the_solutions_mesh(chromium, tmp_path):
+    """A cube of 3 x 3 x 3 elements as seen along x: two dark lines cross a row, at a third and at two thirds."""
+    volume = benchmark_volume(3, amplitude=0.0)
+    scene = scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="x")))
+    assert scene["spans"] == [pytest.approx([0, 1 / 3, 2 / 3, 1])] * 3
+    finer = scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="x"), refine=1))
+    assert [len(row) for row in finer["spans"]] == [7, 7, 7]
+    row = """(() => {
+      const gl = document.getElementById("view").getContext("webgl2"), w = gl.drawingBufferWidth;
+      const data = new Uint8Array(4 * w);
+      gl.readPixels(0, Math.round(0.42 * gl.drawingBufferHeight), w, 1, gl.RGBA, gl.UNSIGNED_BYTE, data);
+      return [...data];
+    })()"""
+
+    async def work(browser):
+        tab = await opened(browser, written(tmp_path, scene))
+        await tab.value(typed("views", "+x") + ", document.getElementById('lined').click()")
+        return await tab.value(row)
+
+    found = np.array(in_browser(chromium, tmp_path, work), dtype=float).reshape(-1, 4)
+    body = np.flatnonzero(found[:, 3] == 255)
+    light = found[body, :3].sum(axis=1)
+    dark = (np.flatnonzero(light < 0.85 * np.median(light)) + 0.5) / len(body)
+    inner = dark[(dark > 0.05) & (dark < 0.95)]
+    assert len(inner) >= 2 and np.abs(inner[:, None] - [1 / 3, 2 / 3]).min(axis=1).max() < 0.01
 
 
 def test_a_range_colours_what_lies_outside_by_its_ends(chromium, solved, tmp_path):

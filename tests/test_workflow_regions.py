@@ -1,88 +1,97 @@
-"""What regions are on a box of sides 1, 2 and 3 with two triangles a side: areas and counts known by hand."""
+"""Data on regions from the command line: read, judged before the map is made, solved with, and told."""
 
-from __future__ import annotations
-
-from pathlib import Path
+import json
 
 import numpy as np
 import pytest
-from mesh_files import CUBE, TRIANGLES, obj
 
+import iga_nn
 from iga_nn.cli.commands import main
-from iga_nn.workflow.regions import cover, facts_of, placed_on, share_of
-from parameterize.surface.surface import surface_from_arrays
+from iga_nn.errors import InputError
+from iga_nn.options import ElasticityOptions, PoissonOptions
+from iga_nn.workflow.regions import check_regions, share_of
+from solve import Elasticity, Region
 
-SIDES = [1.0, 2.0, 3.0]
-AREA = 22.0
-
-
-@pytest.fixture(scope="module")
-def box():
-    return surface_from_arrays(CUBE * SIDES, TRIANGLES)
+PULLED = ("--fix", "face(0.5, 0.5, 0)", "--load", "nz > 0.9 and x < 0.5=0;0;2", "--young", "100")
 
 
 @pytest.mark.parametrize(
-    ("text", "area", "triangles"),
-    [("nz > 0.9", 2.0, 2), ("face(1, 1, 1)", 6.0, 2), ("nx > 0.9 or ny > 0.9", 9.0, 4), ("x > -1", AREA, 12)],
+    ("entry", "region", "data"),
+    [
+        ("x < 1", "x < 1", None),
+        ("x <= 1=0;0;1", "x <= 1", ["0", "0", "1"]),
+        ("x < 1 = 0;;", "x < 1", ["0", None, None]),
+        ("x >= 1 and z<=2=0", "x >= 1 and z<=2", ["0", "0", "0"]),
+        ('group:"a=b"=1;2;3', 'group:"a=b"', ["1", "2", "3"]),
+    ],
 )
-def test_a_region_of_whole_triangles_has_their_area_exactly(box, text, area, triangles):
-    (region,) = placed_on([text], box)
-    found = facts_of(region, box)
-    assert found == {
-        "region": text,
-        "area": pytest.approx(area, rel=1e-14),
-        "share": pytest.approx(area / AREA, rel=1e-14),
-        "triangles": triangles,
-    }
-
-
-def test_a_region_that_ends_within_triangles_has_its_share_of_each(box):
-    (region,) = placed_on(["nz > 0.9 and x < 0.25"], box)
-    assert facts_of(region, box)["area"] == pytest.approx(0.5, rel=0.05)
-    shares = cover(region, box)
-    assert np.sort(shares)[:10].max() == 0.0
-    np.testing.assert_allclose(np.sort(shares)[10:], [1 / 16, 7 / 16], atol=0.03)  # of triangles cut at 1/4
-    assert share_of(region, box) == pytest.approx(0.5 / AREA, rel=0.1)
-
-
-def test_scaled_coordinates_are_those_of_volume_1_about_the_middle(box):
-    inside, outside = placed_on(["nx > 0.9 and Y < 0", "Z > 0.83"], box)  # 6^(1/3) = 1.817, and 1.5 of it is 0.8255
-    assert facts_of(inside, box)["area"] == pytest.approx(3.0, rel=0.05)
-    with pytest.raises(ValueError, match=r"no point of the surface lies there; .* z from 0 to 3"):
-        facts_of(outside, box)
-
-
-def test_check_tells_regions_and_draws_them(in_folder, capsys, monkeypatch):
-    drawn = []
-    monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: True)
-    monkeypatch.setattr("iga_nn.figures.regions.draw_regions", lambda path, *given: drawn.append((path, *given)))
-    Path("box.obj").write_text(obj(CUBE * SIDES, TRIANGLES))
-    regions = ["--region", "nz > 0.9", "--region", "face(1, 1, 1)"]
-    assert main(["check", "box.obj", *regions, "--picture", "regions.png"]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[-2:] == [
-        "region:          nz > 0.9, area 2, 9.09% of the surface, 2 triangles",
-        "region:          face(1, 1, 1), area 6, 27.27% of the surface, 2 triangles",
+def test_a_region_ends_at_the_equals_sign_that_is_no_comparison(entry, region, data):
+    (found,) = ElasticityOptions(fix=(entry,), load=("nz > 0=1;0;0",)).problem().conditions[:1]
+    assert str(found.region) == region
+    given = [None if free else value for value, free in zip(found.data, found.free or (False,) * 3, strict=True)]
+    assert [str(float(v)) if v is not None else v for v in given] == [
+        str(float(v)) if v is not None else v for v in (data or ["0", "0", "0"])
     ]
-    (found,) = drawn
-    assert str(found[0]) == "regions.png" and list(map(str, found[2])) == ["nz > 0.9", "face(1, 1, 1)"]
 
 
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--region", "nz > 2"], "region 'nz > 2': no point of the surface lies there; x runs from 0 to 1"),
-        (["--region", "u0"], "region 'u0': has faces of the cube, which are known once the part is mapped"),
-        (["--region", "nz >"], "region 'nz >'"),
-        (["--region", "group:inlet"], "group 'inlet' does not exist"),
-        (["--picture", "regions.jpg"], "such files end in .png: choose another name with --picture"),
-        (["--picture", "there.png"], "there.png: exists; --force replaces it"),
+        (ElasticityOptions(fix=("x < 1", "x < 1")), "region 'x < 1' is given twice"),
+        (ElasticityOptions(fix=("=1;0;0",)), "write a region before the ="),
+        (ElasticityOptions(fix=("x < 1=1;0",)), "write three formulas"),
+        (ElasticityOptions(fix=("x",), load=("y < 1=0;0;1",)), "region 'x': expression"),
+        (ElasticityOptions(fix=("x < 1",), load=("y < 1",)), "load 'y < 1': has no data"),
+        (ElasticityOptions(fix=("x < 1",), traction=("u0=0",)), "not both"),
+        (PoissonOptions(exchange=("x < 1=2",)), "write REGION=ALPHA:OUTSIDE"),
+        (PoissonOptions(value=("x < 1=q",)), "value 'x < 1': expression"),
     ],
 )
-def test_a_region_or_a_picture_that_is_refused_is_one_line(in_folder, capsys, options, says):
-    Path("box.obj").write_text(obj(CUBE * SIDES, TRIANGLES))
-    Path("there.png").write_bytes(b"a picture")
-    assert main(["check", "box.obj", *options]) == 2
-    said = capsys.readouterr()
-    assert says in said.err and said.err.count("\n") == 1 and said.out == ""
-    assert Path("there.png").read_bytes() == b"a picture"
+def test_wrong_entries_are_refused_in_one_line(options, says):
+    with pytest.raises(InputError, match=says) as caught:
+        options.problem()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_run_holds_and_loads_faces_of_the_part(formula_training, in_folder, capsys):
+    formula_training()
+    assert main(["run", "elasticity", "cube", *PULLED, "--refine", "0", "--out", "out", "--quiet"]) == 0
+    level = json.loads((in_folder / "out" / "report.json").read_text())["elasticity"]["levels"][0]
+    area = level["areas"]["load 'nz > 0.9 and x < 0.5'"]  # half of the top of a map by formula, which bulges
+    assert area == pytest.approx(0.5, abs=0.1) and level["load"] == pytest.approx([0.0, 0.0, 2.0 * area], abs=1e-9)
+    (reaction,) = level["reactions"].values()
+    assert np.add(level["load"], reaction) == pytest.approx([0.0, 0.0, 0.0], abs=1e-8)
+    assert level["imbalance"] < 1e-8
+    # the volume knows the part again by the boundary.npz beside it
+    assert main(["solve", "elasticity", "out/volume.npz", *PULLED, "--refine", "0", "--out", "again", "--quiet"]) == 0
+    again = json.loads((in_folder / "again" / "report.json").read_text())["elasticity"]["levels"][0]
+    assert again["reactions"] == level["reactions"]
+    (in_folder / "out" / "boundary.npz").unlink()
+    capsys.readouterr()
+    assert main(["solve", "elasticity", "out/volume.npz", *PULLED, "--out", "third", "--quiet"]) == 2
+    assert "boundary.npz: is not there" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("region", "says"),
+    [
+        ("z > 5", "no point of the surface lies there; x runs from 0 to 1"),
+        ("group:inlet", "group 'inlet' does not exist"),
+        ("nz > 2", "no point of the surface lies there"),
+    ],
+)
+def test_a_region_that_is_not_on_the_part_is_refused_before_the_map_is_made(region, says, in_folder, capsys):
+    code = main(["run", "elasticity", "cube", "--fix", "nz < -0.9", "--load", f"{region}=0;0;1", "--quiet"])
+    assert code == 2
+    error = capsys.readouterr().err
+    assert says in error and error.count("\n") == 1 and not (in_folder / "cube").exists()
+
+
+def test_shares_of_a_surface_are_those_of_its_area():
+    cube = iga_nn.sample("cube")
+    assert share_of(Region("nz > 0.9"), cube) == pytest.approx(1.0 / 6.0, abs=0.01)
+    assert share_of(Region("z > 0.5"), cube) == pytest.approx(0.5, abs=0.015)
+    assert share_of(Region("z > 5"), cube) == 0.0
+    corner = share_of(Region("x + y + z < 1e-6"), cube)
+    assert 0.0 < corner < 1e-4
+    check_regions(Elasticity(fix="u0", load={"z > 0.9": (0, 0, 1)}), cube)  # of the cube's faces nothing is known yet

@@ -17,7 +17,8 @@ import numpy as np
 from matplotlib import colormaps
 from numpy.typing import NDArray
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, Knots
+from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import AXES, BSplineVolume
 from solve import SplineField
 from solve.forms.form import Quantity
@@ -51,13 +52,14 @@ class Frame:
     """Hold one mode, or one step in time: what is shown of it, and its name beside the slider.
 
     label: such as "mode 1: 12.5 Hz" or "t = 0.1 s". fields: the first is shown first. vectors: (..., 3), or None.
-    displaces: whether the vectors displace the body.
+    displaces: whether the vectors displace the body. knots: of the mesh that is drawn, those of the volume by default.
     """
 
     label: str
     fields: Sequence[Field]
     vectors: Samples | None = None
     displaces: bool = False
+    knots: Knots | None = None
 
     @classmethod
     def of(cls, label: str, solution: SplineField, quantities: Mapping[str, Quantity] | None = None) -> Self:
@@ -78,7 +80,7 @@ class Frame:
         named = [quantity_of(solution, quantity, name, name) for name, quantity in (quantities or {}).items()]
         fields = [field for field in named if field is not None] + fields_of(solution)
         vectors = vectors_of(solution) if solution.coefficients.shape[3:] == (3,) else None
-        return cls(label, fields, vectors, is_displacement(solution))
+        return cls(label, fields, vectors, is_displacement(solution), solution.knots)
 
 
 def scene_of(
@@ -158,6 +160,7 @@ def _scene(volume: BSplineVolume, frames: Sequence[Frame], coarser: int) -> Scen
         "octant": list(octant),  # what the cut leaves out
         "places": _both(points, coarser, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
         "axes": list(AXES),
+        "spans": [breakpoints(row).tolist() for row in frames[0].knots or volume.knots],
         "colors": list(evaluate.FACE_COLORS),
         "labels": evaluate.face_labels(),
         "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)

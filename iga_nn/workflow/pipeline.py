@@ -40,7 +40,16 @@ from .cost_estimate import tell_memory
 from .mapping import map_surface
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
 from .repeat import command_line, gives_the_same
-from .solving import described, each_level, notices_of, reported, scene_of, solve_levels, verdict_of
+from .solving import (
+    described,
+    each_level,
+    moving_scene_of,
+    notices_of,
+    reported,
+    scene_of,
+    solve_levels,
+    verdict_of,
+)
 from .verdict import write_certificate
 
 log = logging.getLogger(__name__)
@@ -279,8 +288,8 @@ def modes_to(
     """
     check_kind("volume", volume, str | Path)
     options, path = options or ModesOptions(), Path(volume)
-    body, loaded = options.problem(), load_volume(path)
-    check_size(loaded, options.refine, options.degree, body.components)
+    body, loaded = with_part(options.problem(), path), load_volume(path)
+    check_size(loaded, options.refine, options.degree, body.form.components)
     with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
         state.begin("modes")
         write_certificate(state, path, loaded, command_line("modes", path, options, out=out))
@@ -289,7 +298,7 @@ def modes_to(
         found.save(state.folder / "modes.npz")
         state.write(modes=asdict(options) | found.as_dict())
         state.draw("modes", volume=loaded, modes=found)
-        return _finish(state, loaded), str(found)
+        return _finish(state, loaded, scene=moving_scene_of(state, loaded, found)), str(found)
 
 
 def _finished_by(command: str, finished: Outcome, vector: bool, problem: ProblemOptions | None) -> Outcome:
@@ -314,9 +323,10 @@ def _finish(
     volume: BSplineVolume,
     solution: Solution | None = None,
     equation: "Equation | None" = None,
+    scene: Any = None,
 ) -> Outcome:
     """Finish the report, write the page that shows it and return the output folder."""
-    scene = scene_of(state, volume, solution, equation)
+    scene = scene or scene_of(state, volume, solution, equation)
     outcome = state.finish()
     html.write(outcome.folder, outcome.report, scene)
     return outcome

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.spline.volume import BSplineVolume
-from solve import ConvergenceError, ConvergenceRow, Solution, SolveReport, rates, solve_problem
+from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveReport, rates, solve_problem
 from solve.forms.condition import WITH_FACTOR, Condition
 from solve.forms.frame import UnitFrame
 
@@ -190,4 +190,15 @@ def scene_of(state: RunFolder, volume: BSplineVolume, *solved: Any) -> Any:
         from ..report import viewer
 
         return viewer.scene_of(volume, *solved)
+    return None
+
+
+def moving_scene_of(state: RunFolder, volume: BSplineVolume, found: Modes) -> Any:
+    """Return the view in which a body swings in its modes; None where it cannot be drawn."""
+    with state.timed("report"), state.drawing("interactive view"):
+        from ..report import viewer
+
+        named = enumerate(zip(found.frequencies, found.shapes, strict=True), start=1)
+        frames = [viewer.Frame.of(f"mode {i}: {hertz:.4g} Hz", shape) for i, (hertz, shape) in named]
+        return viewer.scene_of_frames(volume, frames, oscillates=True)
     return None

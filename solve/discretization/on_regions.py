@@ -195,7 +195,7 @@ class _Builder:
             found = self.problem.flux_on(condition, points, normal[:, here])
             lost = np.abs(np.einsum("cdm,dm->cm", projector[:, :, here], found)).max(axis=0)
             wrong = here[lost > CONTRADICTION * np.abs(found).max()]
-            if condition.data is not None and self._is_area(wrong, here):
+            if condition.role in self.problem.data and self._is_area(wrong, here):
                 self._refuse_load(condition, wrong[0])
             loads[:, here] += found
             if f"{condition.role}: factor" in self.problem.data:

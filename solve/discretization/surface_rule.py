@@ -2,13 +2,15 @@
 
 Every point has a code, which says to which regions it belongs. A cell (at first a span) on which the code is constant
 has Gauss points. Any other is cut into lines along one of its directions, the codes' jumps on each are found by
-bisection, and every piece between two jumps has Gauss points: the rule is as exact there as lines meet the rim.
+bisection, and every piece between two jumps has Gauss points. Where the lines of a cell meet the rim alike, that is
+exact to high order; where the rim ends or bends between them, the cell is halved.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import evaluate_at
@@ -17,14 +19,17 @@ from parameterize.spline.volume import BSplineVolume
 
 from .space import TrialSpace
 
+Mask = NDArray[np.bool_]
 Codes = Callable[[Array, Array], IntArray]  # of points (3, m) and outward unit normals (3, m)
 
 SAMPLES = 5  # points a direction at which the code of a cell is looked at, its ends included
 FEWEST = 120  # of these a direction and face: a mesh of few spans is looked at as finely as one of many
 PIECES = 8  # intervals of a line, in each of which a jump is looked for
 BISECTIONS = 20
-TOLERANCE = 1e-4  # share of the area of all regions that halving the cells once more may change
-HALVINGS = 4  # of the cells at a rim, at most
+TOLERANCE = 1e-4  # share of the area of a face's regions by which it may be wrong
+SPREAD = 0.05  # of a cell in which lines differ, its usual error; these are of either sign
+HALVINGS = 8  # of such cells, at most
+MOST_CELLS = 6000  # of one size, of rims that are ragged as the triangles of a mesh are
 TANGENTS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
@@ -73,7 +78,7 @@ class SurfaceRule:
 def surface_rule(volume: BSplineVolume, space: TrialSpace, axis: int, side: int, codes: Codes) -> SurfaceRule | None:
     """Return the rule of a face, without the points whose code is zero; None where all are.
 
-    The cells at rims are halved until the areas of all codes stay within TOLERANCE of their sum.
+    Cells in which lines differ are halved until their usual error is within TOLERANCE of the regions' area.
     """
     return _Cutter(volume, orientation(volume), space, axis, side, codes).rule()
 
@@ -89,24 +94,51 @@ class _Cutter:
 
     def rule(self) -> SurfaceRule | None:
         """Return the rule."""
-        cells = self._spans()
-        seen = self._seen(cells, max(SAMPLES, -(-FEWEST // int(len(cells) ** 0.5))))
-        constant = (seen == seen[:, :1, :1]).all(axis=(1, 2))
-        whole = [self._gauss(cells[constant], seen[constant, 0, 0])]
-        cut = cells[~constant]
-        lines = self._on_lines(cut)
-        for _ in range(HALVINGS if len(cut) else 0):
-            halves = _quartered(cut)
-            seen = self._seen(halves, SAMPLES)
+        cells, parts, covered = self._spans(), [], 0.0
+        samples = max(SAMPLES, -(-FEWEST // int(len(cells) ** 0.5)))
+        for halvings in range(HALVINGS + 1):
+            seen = self._seen(cells, samples)
             constant = (seen == seen[:, :1, :1]).all(axis=(1, 2))
-            whole.append(self._gauss(halves[constant], seen[constant, 0, 0]))
-            finer = self._on_lines(halves[~constant])
-            changed = _area_of_codes(lines), _area_of_codes(whole[-1], finer)
-            cut, lines = halves[~constant], finer
-            if _difference(*changed) <= TOLERANCE * sum(_area_of_codes(*whole, lines).values()):
+            parts.append(self._gauss(cells[constant], seen[constant, 0, 0]))
+            covered += float(_sizes(cells[constant & (seen[:, 0, 0] != 0)]).sum())
+            cells, is_bent = self._across_rims(cells[~constant])
+            is_bent |= samples > SAMPLES  # lines would lose a small part that is seen
+            sizes = _sizes(cells)
+            error = SPREAD * float(np.linalg.norm(sizes[is_bent]))
+            covered += 0.5 * float(sizes[~is_bent].sum())
+            is_last = halvings == HALVINGS or samples == SAMPLES and 4 * np.count_nonzero(is_bent) > MOST_CELLS
+            if is_last or error <= TOLERANCE * (covered + 0.5 * float(sizes[is_bent].sum())):
+                parts.append(self._on_lines(cells))
                 break
-        parts = [part for part in (*whole, lines) if part is not None]
-        return _joined(parts) if parts else None
+            parts.append(self._on_lines(cells[~is_bent]))
+            cells, samples = _quartered(cells[is_bent]), max(SAMPLES, samples // 2 + 1)  # as close together as before
+        found = [part for part in parts if part is not None]
+        return _joined(found) if found else None
+
+    def _across_rims(self, cells: Array) -> tuple[Array, Mask]:
+        """Return cells at rims, those first whose lines run in the first direction, and in which of them lines differ.
+
+        Lines differ where a rim ends, bends or leaves the cell between them; else the rule is exact to high order.
+        """
+        if not len(cells):
+            return cells, np.zeros(0, dtype=bool)
+        bent = np.zeros(len(cells), dtype=bool)
+        for along, chosen in enumerate(self._directions(cells)):
+            if len(chosen):
+                t = _with_ends(_unit_rule(max(self.space.degrees) + 1)[0])
+                grid = np.stack(np.meshgrid(np.linspace(0.0, 1.0, PIECES + 1), t, indexing="ij"), axis=-1)
+                points = _placed(cells[chosen][:, None, None], grid if along == 0 else grid[..., ::-1])
+                seen = self._code(points.reshape(-1, 2))[1].reshape(points.shape[:3])
+                jumps = np.count_nonzero(np.diff(seen, axis=1), axis=1)
+                marks = np.stack([seen[:, 0], seen[:, -1], jumps], axis=-1)
+                bent[chosen] = (marks != marks[:, :1]).any(axis=(1, 2))
+        return cells, bent
+
+    def _directions(self, cells: Array) -> tuple[IntArray, IntArray]:
+        """Return the numbers of the cells whose codes jump more often along the first direction, and of the others."""
+        seen = self._seen(cells, SAMPLES)
+        jumps = [np.count_nonzero(np.diff(seen, axis=1 + along), axis=(1, 2)) for along in (0, 1)]
+        return np.flatnonzero(jumps[0] >= jumps[1]), np.flatnonzero(jumps[0] < jumps[1])
 
     def _spans(self) -> Array:
         """Return the spans of the face as cells (k, 2, 2): lower and upper ends of both directions."""
@@ -121,10 +153,14 @@ class _Cutter:
         return at, self.codes(at.x, at.normal)
 
     def _seen(self, cells: Array, samples: int) -> IntArray:
-        """Return the codes (k, samples, samples) of cells on grids that contain their ends."""
-        t = np.linspace(0.0, 1.0, samples)
+        """Return the codes (k, samples + 2, samples + 2) of cells on grids that contain their ends.
+
+        A grid reaches one point beyond its cell: so it sees a rim that bulges into the cell between two points.
+        """
+        step = 1.0 / (samples - 1)
+        t = np.linspace(-step, 1.0 + step, samples + 2)
         grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
-        points = _placed(cells[:, None, None], grid)
+        points = np.clip(_placed(cells[:, None, None], grid), 0.0, 1.0)
         return self._code(points.reshape(-1, 2))[1].reshape(points.shape[:3])
 
     def _gauss(self, cells: Array, codes: IntArray) -> SurfaceRule | None:
@@ -151,10 +187,7 @@ class _Cutter:
         """Return points on cells at a rim: on lines in that direction in which the code jumps more often."""
         if not len(cells):
             return None
-        seen = self._seen(cells, SAMPLES)
-        jumps = [np.count_nonzero(np.diff(seen, axis=1 + along), axis=(1, 2)) for along in (0, 1)]
-        first = jumps[0] >= jumps[1]
-        parts = [self._lines_along(cells[chosen], along) for along, chosen in enumerate((first, ~first))]
+        parts = [self._lines_along(cells[chosen], along) for along, chosen in enumerate(self._directions(cells))]
         found = [part for part in parts if part is not None]
         return _joined(found) if found else None
 
@@ -216,18 +249,13 @@ def _quartered(cells: Array) -> Array:
     return np.concatenate(parts)
 
 
-def _area_of_codes(*parts: SurfaceRule | None) -> dict[int, float]:
-    """Return the area of every code."""
-    found: dict[int, float] = {}
-    for part in filter(None, parts):
-        values, place = np.unique(part.codes, return_inverse=True)
-        for code, area in zip(values.tolist(), np.bincount(place, part.weights).tolist(), strict=True):
-            found[code] = found.get(code, 0.0) + area
-    return found
+def _sizes(cells: Array) -> Array:
+    """Return the sizes (k,) of cells in the parameters."""
+    return np.asarray(np.prod(cells[:, 1] - cells[:, 0], axis=-1))
 
 
-def _difference(one: dict[int, float], other: dict[int, float]) -> float:
-    return max((abs(one.get(code, 0.0) - other.get(code, 0.0)) for code in one.keys() | other.keys()), default=0.0)
+def _with_ends(t: Array) -> Array:
+    return np.concatenate([[0.0], t, [1.0]])
 
 
 def _joined(parts: Sequence[SurfaceRule]) -> SurfaceRule:

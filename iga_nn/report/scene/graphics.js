@@ -2,6 +2,7 @@
 
 const OUTLINE = "#7f8b97";
 const NEARER = 0.002;  // of the depth: keeps outlines before the patches they surround
+const BINS = 1024;  // of a parameter, in each of which one element line is nearest
 const LIT = 0, FLAT = 1, FAINT = 2;  // how a plain colour looks
 
 const VERTEX_SHADER = `#version 300 es
@@ -24,7 +25,7 @@ const FRAGMENT_SHADER = `#version 300 es
 precision highp float;
 in vec3 facing, parameters;
 in float share;
-uniform sampler2D map;
+uniform sampler2D map, spans;
 uniform vec3 plain, octant;
 uniform int clip, look;
 uniform bool mapped, lined;
@@ -43,8 +44,9 @@ void main() {
   if (mapped) base = texture(map, vec2(share, 0.5)).rgb;
   else if (look == ${LIT}) base *= 0.5 + 0.5 * towards;
   if (lined && look != ${FLAT}) {
-    vec3 cell = parameters * 10.0, width = fwidth(cell);
-    vec3 near = mix(vec3(9.0), abs(cell - round(cell)) / max(width, 1e-6), greaterThan(width, vec3(1e-6)));
+    vec3 width = fwidth(parameters), nearest;
+    for (int k = 0; k < 3; k++) nearest[k] = texelFetch(spans, ivec2(int(parameters[k] * ${BINS - 1}.0 + 0.5), 0), 0)[k];
+    vec3 near = mix(vec3(9.0), abs(parameters - nearest) / max(width, 1e-7), greaterThan(width, vec3(1e-7)));
     base *= 1.0 - 0.45 * (1.0 - smoothstep(0.4, 1.3, min(near.x, min(near.y, near.z))));
   }
   color = vec4(base, 1.0);
@@ -81,6 +83,19 @@ function normals(places, corners) {
   return sums;
 }
 
+// The element line that is nearest to each of some even parameters, of u, v and w.
+function nearestLines(spans) {
+  const found = new Float32Array(3 * BINS);
+  spans.forEach((lines, axis) => {
+    for (let bin = 0, next = 0; bin < BINS; bin++) {
+      const at = bin / (BINS - 1);
+      while (next + 1 < lines.length && lines[next + 1] - at < at - lines[next]) next++;
+      found[3 * bin + axis] = lines[next];
+    }
+  });
+  return found;
+}
+
 function rgb(color) {
   return [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16) / 255);
 }
@@ -95,13 +110,21 @@ class Graphics {
     const gl = this.gl;
     this.program = compiled(gl);
     this.loaded = [];
-    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, 256, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, scene.map);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+    this.#texture("spans", 1, gl.RGB32F, BINS, gl.FLOAT, nearestLines(scene.spans));
+    this.#texture("map", 0, gl.RGB, 256, gl.UNSIGNED_BYTE, scene.map);
     gl.uniform3fv(this.uniform("octant"), scene.octant);
     gl.enable(gl.DEPTH_TEST);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+  }
+
+  #texture(name, unit, format, width, kind, data) {
+    const gl = this.gl;
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    gl.texImage2D(gl.TEXTURE_2D, 0, format, width, 1, 0, gl.RGB, kind, data);
+    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
+    for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
+    gl.uniform1i(this.uniform(name), unit);
   }
 
   uniform(name) {

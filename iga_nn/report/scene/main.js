@@ -67,9 +67,16 @@ class View {
     this.probed = hit(this.shown.patches, this.scene.octant, this.camera, this.canvas, x, y);
     this.say(chosen("part"), Number(element("at").value));
     this.draw();
-    if (window.parent === window) return;  // else the page that shows this one in a frame hears of it
-    const face = this.probed ? this.shown.patches[this.probed.patch].face : -1;
-    if (face >= 0) window.parent.postMessage({face: this.scene.labels[face].slice(0, 2)}, "*");
+    if (window.parent !== window) this.tell();
+  }
+
+  // Tells the page that shows this one in a frame which face was clicked, and where.
+  tell() {
+    const patch = this.probed && this.shown.patches[this.probed.patch];
+    if (patch?.face >= 0) {
+      const point = pointAt(this.scene, patch, this.probed);
+      window.parent.postMessage({face: this.scene.labels[patch.face].slice(0, 2), point}, "*");
+    }
     window.dispatchEvent(new Event("resize"));  // there are more lines now
   }
 
@@ -97,6 +104,7 @@ class View {
     element("frame").value = player.frame;
     element("moment").textContent = scene.frames[player.frame].label;
     element("play").textContent = player.plays ? "Pause" : "Play";
+    element("picked").ariaLive = player.plays ? "off" : "polite";
     const patch = this.probed && this.shown.patches[this.probed.patch];
     if (!patch) return element("picked").replaceChildren("Click the body to read the values there.");
     element("picked").replaceChildren();

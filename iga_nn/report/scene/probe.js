@@ -48,13 +48,21 @@ function isCutAway(patch, corners, weights, octant) {
   return patch.octant === WITHOUT ? inside > 0 : inside < -1e-6;
 }
 
-// What is said of a place: pairs of a name and a text.
-function readings(scene, frame, patch, {corners, weights}) {
-  const at = (data, entry) => mixed(data, 3, corners, weights, entry);
+// The point x, y, z of the body at rest, rounded to what is known of it.
+function pointAt(scene, patch, {corners, weights}) {
   const rest = patch.take(scene.places, 3), step = scene.size * PLACES;
+  return AXES.map((axis) => {
+    const exact = scene.middle[axis] + scene.size * mixed(rest, 3, corners, weights, axis);
+    return Number((step * Math.round(exact / step)).toPrecision(6));
+  });
+}
+
+// What is said of a place: pairs of a name and a text.
+function readings(scene, frame, patch, hit) {
+  const {corners, weights} = hit;
   const found = [
-    ["x, y, z", AXES.map((axis) => written(step * Math.round((scene.middle[axis] + scene.size * at(rest, axis)) / step))).join(", ")],
-    ["u, v, w", AXES.map((axis) => at(patch.parameters, axis).toFixed(3)).join(", ")],
+    ["x, y, z", pointAt(scene, patch, hit).map(written).join(", ")],
+    ["u, v, w", AXES.map((axis) => mixed(patch.parameters, 3, corners, weights, axis).toFixed(3)).join(", ")],
   ];
   for (const field of scene.fields)
     found.push([field.title, reading(field, mixed(patch.take(valuesOf(scene, frame, field), 1), 1, corners, weights))]);
