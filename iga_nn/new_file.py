@@ -7,16 +7,16 @@ from parameterize.files import save_bytes
 from .errors import InputError
 
 
-def check_new(path: str | Path, ending: str) -> Path:
-    """Return the path of a file to write. Raises InputError where it cannot be a file with that ending."""
+def check_new(path: str | Path, ending: str, flag: str = "--out") -> Path:
+    """Return the path of a file to write, given by an option. Raises InputError where it cannot be one."""
     target = Path(path)
     if target.is_dir() or not target.name:
-        raise InputError(f"{target}: is a directory: name the file to write with --out")
+        raise InputError(f"{target}: is a directory: name the file to write with {flag}")
     if target.suffix != ending:
-        raise InputError(f"{target}: such files end in {ending}: choose another name with --out")
+        raise InputError(f"{target}: such files end in {ending}: choose another name with {flag}")
     if not target.parent.is_dir():
         raise InputError(
-            f"{target}: cannot be written (there is no folder {target.parent}): make it, or choose another with --out"
+            f"{target}: cannot be written (there is no folder {target.parent}): make it, or choose another with {flag}"
         )
     return target
 

@@ -39,7 +39,12 @@ def test_a_study_has_its_exact_solution_and_a_map_no_problem():
 
 
 def test_regions_are_listed_where_there_are_some():
-    region = {"kind": "traction", "region": "nx > 0.9", "data": ["0", "0", "-2"]}
-    assert regions_of({"elasticity": {"regions": [region]}}) == [("traction", "nx > 0.9", "0, 0, -2")]
-    assert regions_of({"elasticity": {}, "regions": [region]}) == [("traction", "nx > 0.9", "0, 0, -2")]
+    region = {"kind": "load", "region": "nx > 0.9", "data": "0;0;-2", "area": 0.25}
+    held = {"kind": "fix", "region": "u0", "data": "0;0;0"}
+    head = ("condition", "on", "data", "area")
+    row = ("load", "nx > 0.9", "0;0;-2", "0.25")
+    assert regions_of({"elasticity": {"regions": [region]}}) == [head, row]
+    assert regions_of({"elasticity": {}, "regions": [region]}) == [head, row]
+    with_unit = regions_of({"elasticity": {"regions": [held], "unit": "mm"}})
+    assert with_unit == [(*head[:3], "area [mm²]"), ("fix", "u0", "0;0;0", "")]
     assert regions_of({"elasticity": {}}) == regions_of({}) == []

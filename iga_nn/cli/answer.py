@@ -5,7 +5,7 @@ from typing import Any
 
 from ..batch.table import Batch
 from ..levels import ESTIMATES, EXACT_ERRORS, TITLES
-from ..report import advice, extremes
+from ..report import advice, balance, extremes
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..rounding import rounded
@@ -39,8 +39,9 @@ def verdict_in_words(outcome: Outcome) -> str:
     if chosen := reports.control_points_in_words(outcome.report):
         lines.append(f"control points   {chosen}")
     levels = [_level(level) for level in verdict.get("levels", [])]
-    found = extremes.lines(reports.solved(outcome.report))
-    lines += [f"{name:16s} {line}" for name, line in zip_longest(["extremes"][: len(found)], found, fillvalue="")]
+    section = reports.solved(outcome.report)
+    for title, found in (("extremes", extremes.lines(section)), ("balance", balance.lines(section))):
+        lines += [f"{first:16s} {line}" for first, line in zip_longest([title][: len(found)], found, fillvalue="")]
     lines += [*levels[:-1], f"{rounded(verdict['seconds'], 1)} s", *advice.in_words(outcome.report)]
     proved = f"{reports.claim(outcome.report)} {verdict['bijective']}; one-to-one: {verdict['one_to_one']}"
     ending = {"verdict": proved, "error": "".join(levels[-1:]), "open": str(outcome.folder / PAGE)}
@@ -63,10 +64,16 @@ def volume_in_words(facts: reports.Report) -> str:
 
 
 def surface_in_words(facts: dict[str, Any]) -> str:
-    """Return the facts that `check` found out about a surface, and a line for each group of its faces."""
-    others = {key: value for key, value in facts.items() if key != "groups"}
+    """Return the facts that `check` found out about a surface, and a line for each group of faces and each region."""
+    others = {key: value for key, value in facts.items() if key not in ("groups", "regions")}
     groups = [f"{'group:':16s} {g['name']}, {g['faces']} faces, area {g['area']:.6g}" for g in facts["groups"]]
-    return "\n".join([facts_in_words(others), *groups])
+    regions = [f"{'region:':16s} {_region(found)}" for found in facts.get("regions", ())]
+    return "\n".join([facts_in_words(others), *groups, *regions])
+
+
+def _region(found: dict[str, Any]) -> str:
+    count = "1 triangle" if found["triangles"] == 1 else f"{found['triangles']} triangles"
+    return f"{found['region']}, area {found['area']:.6g}, {found['share']:.2%} of the surface, {count}"
 
 
 def facts_in_words(facts: dict[str, Any]) -> str:

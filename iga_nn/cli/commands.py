@@ -275,12 +275,26 @@ def find_modes(volume: Volume, /, *, output: OutputOptions = OUTPUT, modes: Mode
 
 
 @app.command(name="check")
-def check(path: str, /, *, surface: SurfaceOptions = SURFACE, strict: bool = False, as_json: Json = False) -> int:
-    """Say whether a surface is accepted, or whether a volume is certified; write nothing.
+def check(
+    path: str,
+    /,
+    *,
+    surface: SurfaceOptions = SURFACE,
+    strict: bool = False,
+    region: tuple[str, ...] = (),
+    picture: Path | None = None,
+    force: bool = False,
+    as_json: Json = False,
+) -> int:
+    """Say whether a surface is accepted, or whether a volume is certified; write nothing but a picture of regions.
 
     Args:
         path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
         strict: refuse a surface that intersects itself; without this option it is a notice.
+        region: regions of the surface to look at, such as "nz > 0.9 and x < 2": each is told with its area and the
+            number of triangles that lie mostly in it, and refused where no point of the surface lies in it.
+        picture: PNG of the surface to write, with the regions in colours.
+        force: replace that picture where it exists.
     """
     from ..io.formats import is_volume, load_volume
     from ..models import resolve
@@ -293,10 +307,15 @@ def check(path: str, /, *, surface: SurfaceOptions = SURFACE, strict: bool = Fal
         if strict:
             given.refuse_crossings()
         facts = given.summary()
+        if region or picture:
+            from ..workflow.regions import looked_at
+
+            facts |= {"regions": looked_at(region, given, picture, force)}
         _print(reports.as_json(facts) if as_json else "accepted\n" + answer.surface_in_words(facts))
         return DONE
-    if surface != SURFACE or strict:
-        raise InputError(f"{path}: is a volume; --component, --max-faces, --decimate and --strict are for surfaces")
+    if surface != SURFACE or strict or region or picture:
+        options = "--component, --max-faces, --decimate, --strict, --region and --picture"
+        raise InputError(f"{path}: is a volume; {options} are for surfaces")
     facts = certified_facts(load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED

@@ -14,7 +14,7 @@ from ..options import PROBLEMS
 
 Part = Literal["report", "map", "solution", "study", "modes"]
 
-REPORT, PAGE = "report.json", "report.html"
+REPORT, PAGE, REGIONS = "report.json", "report.html", "regions.png"
 SOLVED = {name: kind.title for name, kind in PROBLEMS.items()} | {"study": "convergence study"}  # section -> title
 SECTIONS: dict[str, Part] = {"config": "map", **dict.fromkeys(PROBLEMS, "solution"), "study": "study", "modes": "modes"}
 
@@ -72,6 +72,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("cut.png", "map", "the volume cut open, with the distortion inside", "map.draw_cut", ("volume",)),
     Artifact("distortion.png", "map", "distortion on three sections", "map.draw_distortion", ("volume",)),
     Artifact("history.png", "map", "loss over the training steps", "curves.draw_history", ("history",)),
+    Artifact(REGIONS, "solution", "where data are given", "regions.draw_conditions", ("volume", "conditions")),
     Artifact("named_faces.png", "solution", "the volume's faces by name", "map.draw_faces", ("named_volume",)),
     Artifact("convergence.png", "solution", "errors over the mesh size", "curves.draw_study", ("levels",)),
     Artifact("error.png", "solution", "error on the boundary and on three sections", "solution.draw_error", _ERROR),

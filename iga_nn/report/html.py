@@ -16,10 +16,10 @@ from parameterize.files import save_text
 from ..errors import one_line
 from ..levels import TITLES, as_rows, capitalized
 from ..rounding import rounded
+from . import balance, extremes
 from . import document as reports
-from . import extremes
 from .advice import in_words
-from .artifacts import PAGE, SOLVED, figures_of
+from .artifacts import PAGE, REGIONS, SOLVED, figures_of
 from .document import Report
 from .statement import regions_of, statement_of
 
@@ -68,6 +68,7 @@ def _bare(report: Report, reason: str) -> str:
 def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
     """Return the page as text."""
     section = reports.solved(report)
+    drawn = _drawn(report, folder)
     what = next((title for name, title in SOLVED.items() if name in report), "spline volume")
     return filled(
         "report/page.html",
@@ -82,7 +83,10 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         levels=_levels(section),
         extremes=extremes.table(section),
         notices=notices(report),
-        figures=figures(report, folder),
+        figures=[(heading, image) for file, heading, image in drawn if file != REGIONS],
+        where=[(heading, image) for file, heading, image in drawn if file == REGIONS],
+        balance=balance.table(section),
+        balance_heading=balance.heading(section),
         details=_details(report),
     )
 
@@ -176,9 +180,15 @@ def notices(report: Report) -> list[str]:
 
 def figures(report: Report, folder: Path) -> list[tuple[str, str]]:
     """Return heading and picture, in Base64, of the figures that belong to this report and are there."""
+    return [(heading, image) for _, heading, image in _drawn(report, folder)]
+
+
+def _drawn(report: Report, folder: Path) -> list[tuple[str, str, str]]:
+    """Return the same, the name of the file before each."""
     there = [figure for figure in figures_of(report) if (folder / figure.file).is_file()]
     return [
-        (capitalized(each.shows), base64.b64encode((folder / each.file).read_bytes()).decode("ascii")) for each in there
+        (each.file, capitalized(each.shows), base64.b64encode((folder / each.file).read_bytes()).decode("ascii"))
+        for each in there
     ]
 
 

@@ -19,10 +19,16 @@ def statement_of(report: Report) -> list[Row]:
 
 
 def regions_of(report: Report) -> list[tuple[str, ...]]:
-    """Return the kind, the region and the data of every condition that is given on a part of the boundary."""
+    """Return the head of a table and a row for every condition that is given on a region: kind, region, data, area.
+
+    Empty where there is none.
+    """
     section = reports.solved(report)
     regions = section.get("regions") or report.get("regions") or []
-    return [tuple(_text(region.get(key)) for key in ("kind", "region", "data")) for region in regions]
+    unit = f" [{section['unit']}²]" if section.get("unit") else ""
+    head = ("condition", "on", "data", f"area{unit}")
+    rows = [(*(_text(one.get(key)) for key in ("kind", "region", "data")), _number(one.get("area"))) for one in regions]
+    return [head, *rows] if rows else []
 
 
 def _poisson(section: Report) -> list[Row]:
@@ -64,6 +70,10 @@ def _rest(what: str, faces: Sequence[Row]) -> str:
 def _faces(entries: Sequence[str]) -> list[Row]:
     """Return the face and the data, "" for none, of entries such as "u1=0;0;-1" and "v0"."""
     return [(face, data) for face, _, data in (entry.partition("=") for entry in entries)]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.6g}"
 
 
 def _text(value: Any) -> str:

@@ -31,7 +31,7 @@ from ..report import document as reports
 from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
-from .regions import check_regions
+from .regions import check_regions, frame_of
 from .verdict import tell
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def _prepare(
         config, device = options.config(), choose_device(options.device)
     with state.timed("load"):
         surface = resolve(str(mesh), **options.reading())
-        corners = read_corners(Path(options.corners), _frame(surface)) if options.corners else None
+        corners = read_corners(Path(options.corners), frame_of(surface)) if options.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
         log.warning("%s: %s", surface.name, notice)
@@ -163,16 +163,9 @@ def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray
     return rows.astype(np.int64)
 
 
-def _frame(surface: Surface) -> UnitFrame:
-    """Return the meaning of X, Y, Z before there is a volume."""
-    low, high = surface.bbox
-    x, y, z = ((low + high) / 2.0).tolist()
-    return UnitFrame((x, y, z), 1.0 / surface.scale)
-
-
 def _check_data(equation: Equation, surface: Surface) -> None:
     """Check the problem's data on the surface: no points inside are known yet. Raises ExpressionError."""
-    equation = equation.placed(_frame(surface))
+    equation = equation.placed(frame_of(surface))
     points = surface.vertices.T
     for evaluate in (equation.boundary_at, equation.source_at, equation.form.tensor, equation.form.mass):
         evaluate(points)

@@ -1,11 +1,20 @@
 """What regions are on the surface of a part: looked at before anything is computed."""
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
+from parameterize.arrays import Array, IntArray
 from parameterize.surface.geometry import doubled_areas
 from parameterize.surface.surface import Surface
+from solve.forms.frame import UnitFrame
 from solve.forms.problem import BoundaryValueProblem
 from solve.forms.region import Region
+
+from ..errors import InputError, input_errors
+from ..new_file import check_new
 
 _SAMPLES = 20_000  # points of the surface, beside its vertices
 _SEED = 0
@@ -18,11 +27,86 @@ def check_regions(equation: BoundaryValueProblem, surface: Surface) -> None:
     """
     for condition in equation.conditions:
         if not condition.region.needs_cube and not share_of(condition.region, surface):
-            low, high = surface.bbox
-            raise ValueError(
-                f"{condition.role}: no point of the surface lies there; x runs from {low[0]:.6g} to {high[0]:.6g}, "
-                f"y from {low[1]:.6g} to {high[1]:.6g}, z from {low[2]:.6g} to {high[2]:.6g}"
-            )
+            raise ValueError(f"{condition.role}: {_nowhere(surface)}")
+
+
+def _nowhere(surface: Surface) -> str:
+    low, high = surface.bbox
+    return (
+        f"no point of the surface lies there; x runs from {low[0]:.6g} to {high[0]:.6g}, "
+        f"y from {low[1]:.6g} to {high[1]:.6g}, z from {low[2]:.6g} to {high[2]:.6g}"
+    )
+
+
+def frame_of(surface: Surface) -> UnitFrame:
+    """Return the meaning of X, Y, Z before there is a volume."""
+    low, high = surface.bbox
+    x, y, z = ((low + high) / 2.0).tolist()
+    return UnitFrame((x, y, z), 1.0 / surface.scale)
+
+
+def placed_on(texts: Sequence[str], surface: Surface) -> list[Region]:
+    """Return regions of these texts on a surface.
+
+    Raises ExpressionError for a text that is refused, ValueError for a face of the cube, which a surface has not.
+    """
+    regions = [Region(text).placed(frame_of(surface), surface.part) for text in texts]
+    if cube := next((region for region in regions if region.needs_cube), None):
+        raise ValueError(f"region {str(cube)!r:.80}: has faces of the cube, which are known once the part is mapped")
+    return regions
+
+
+def looked_at(texts: Sequence[str], surface: Surface, picture: Path | None, force: bool) -> list[dict[str, Any]]:
+    """Return the facts of regions of a surface, and draw them where a picture is named.
+
+    force: replace that picture. Raises InputError for a region that is refused or empty, and for a picture that cannot
+    be drawn or written.
+    """
+    if picture is not None:
+        check_new(picture, ".png", "--picture")
+        if picture.exists() and not force:
+            raise InputError(f"{picture}: exists; --force replaces it")
+    with input_errors():
+        regions = placed_on(texts, surface)
+        found = [facts_of(region, surface) for region in regions]
+        if picture is not None:
+            _draw(picture, surface, regions)
+    return found
+
+
+def _draw(picture: Path, surface: Surface, regions: Sequence[Region]) -> None:
+    from ..figures.regions import draw_regions
+    from ..figures.render import CANNOT_DRAW, can_draw
+
+    if not can_draw():
+        raise InputError(CANNOT_DRAW)
+    draw_regions(picture, surface, regions)
+
+
+def facts_of(region: Region, surface: Surface) -> dict[str, Any]:
+    """Return a region's text, its area, its share of the surface's, and how many triangles lie mostly in it.
+
+    Raises ValueError where no point of the surface lies in it.
+    """
+    if not share_of(region, surface):
+        raise ValueError(f"region {str(region)!r:.80}: {_nowhere(surface)}")
+    covered, areas = cover(region, surface), 0.5 * _lengths(doubled_areas(surface.vertices, surface.faces))
+    area = float(areas @ covered)
+    return {
+        "region": str(region),
+        "area": area,
+        "share": area / float(areas.sum()),
+        "triangles": int(np.count_nonzero(covered > 0.5)),
+    }
+
+
+def cover(region: Region, surface: Surface) -> Array:
+    """Return the share of each triangle (m,) that lies in a region, by points on it: the more, the larger it is."""
+    areas = _lengths(doubled_areas(surface.vertices, surface.faces))
+    counts = np.maximum(1, np.round(_SAMPLES * areas / areas.sum())).astype(int)
+    chosen = np.repeat(np.arange(len(counts)), counts)
+    found = region.holds(*_points(surface, chosen, np.random.default_rng(_SEED)))
+    return np.asarray(np.bincount(chosen, found, len(counts)) / counts)
 
 
 def share_of(region: Region, surface: Surface) -> float:
@@ -32,14 +116,29 @@ def share_of(region: Region, surface: Surface) -> float:
     """
     rng = np.random.default_rng(_SEED)
     cross = doubled_areas(surface.vertices, surface.faces)
-    size = np.linalg.norm(cross, axis=1)
+    size = _lengths(cross)
     chosen = rng.choice(len(size), _SAMPLES, p=size / size.sum())
-    a, b = np.sort(rng.uniform(size=(2, _SAMPLES)), axis=0)
-    weights = np.stack([a, b - a, 1.0 - b], axis=1)
-    points = np.einsum("mk,mkd->dm", weights, surface.vertices[surface.faces[chosen]])
-    found = region.holds(points, (cross[chosen] / size[chosen, None]).T)
+    found = region.holds(*_points(surface, chosen, rng))
     if found.any():
         return float(found.mean())
     corners = surface.vertices[surface.faces].reshape(-1, 3).T
-    normals = np.repeat(cross / np.where(size > 0.0, size, 1.0)[:, None], 3, axis=0).T
+    normals = np.repeat(_units(cross), 3, axis=0).T
     return 1.0 / _SAMPLES if region.holds(corners, normals).any() else 0.0
+
+
+def _points(surface: Surface, chosen: IntArray, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return a point without a pattern on each of the chosen triangles (k,), (3, k), and the unit normals (3, k)."""
+    corners = surface.vertices[surface.faces[chosen]]
+    a, b = np.sort(rng.uniform(size=(2, len(chosen))), axis=0)
+    points = np.einsum("mk,mkd->dm", np.stack([a, b - a, 1.0 - b], axis=1), corners)
+    return points, _units(doubled_areas(surface.vertices, surface.faces[chosen])).T
+
+
+def _lengths(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
+
+
+def _units(vectors: Array) -> Array:
+    """Return vectors (k, 3) of length 1, zero where they are zero."""
+    size = _lengths(vectors)
+    return vectors / np.where(size > 0.0, size, 1.0)[:, None]

@@ -5,12 +5,14 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 from parameterize.spline.volume import BSplineVolume
 from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveReport, rates, solve_problem
+from solve.forms.condition import WITH_FACTOR, Condition
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
@@ -46,6 +48,7 @@ def solve_levels(
     state.write(
         **{
             options.section: {name: value for name, value in known.items() if value is not None and value != ()}
+            | ({"regions": regions_of(equation, found[-1])} if equation.conditions else {})
             | {"levels": levels, "rates": rates(found), "notices": [*notices_of(found), *growth]}
         }
     )
@@ -132,7 +135,42 @@ def _draw(
         if len(solutions) > 1:
             rows = [ConvergenceRow(solution.report, None, None) for solution in solutions]
             known["levels"] = {max(solutions[-1].degrees): rows}
+    if equation.conditions:
+        known["conditions"] = (equation.placed(UnitFrame.of(volume)) if equation.is_scaled else equation).conditions
     state.draw("solution", **known)
+
+
+def regions_of(equation: Equation, report: SolveReport) -> list[dict[str, Any]]:
+    """Return the conditions of a problem for a report: the kind, the region and the data as text, and the area.
+
+    Of whole faces of the cube the area is not told.
+    """
+    areas = report.balance.areas if report.balance else {}
+    return [
+        {"kind": condition.kind, "region": str(condition.region), "data": _as_text(condition)}
+        | ({"area": areas[condition.role]} if condition.role in areas else {})
+        for condition in equation.conditions
+    ]
+
+
+def _as_text(condition: Condition) -> str:
+    """Return data as text: of an exchange or a spring the factor and what stands outside, where it is not zero."""
+    if condition.kind in WITH_FACTOR:
+        factor, outside = map(_joined, condition.data)
+        return (
+            factor if condition.kind == "spring" and condition.data[1] == [0.0] * 3 else f"{factor}, outside {outside}"
+        )
+    return _joined(condition.data, condition.free)
+
+
+def _joined(data: Any, free: Sequence[bool] = ()) -> str:
+    """Return a formula or a number, or the entries of a vector with semicolons between them."""
+    if isinstance(data, list | tuple):
+        held = zip_longest(data, free, fillvalue=False)
+        return ";".join("free" if is_free else _joined(entry) for entry, is_free in held)
+    if data is None:
+        return "that of the exact solution"
+    return f"{data:.12g}" if isinstance(data, float) else str(data)
 
 
 def described(equation: Equation, volume: BSplineVolume) -> dict[str, Any]:

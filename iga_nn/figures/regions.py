@@ -1,0 +1,97 @@
+"""Draws regions of a boundary, each in its colour and named: on a solid, and on the surface of a part."""
+
+from collections.abc import Sequence
+from itertools import cycle, islice
+from pathlib import Path
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch as Swatch
+
+from parameterize.arrays import Array, IntArray
+from parameterize.spline.orientation import FACES
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.surface.surface import Surface
+from solve.forms.condition import Condition
+from solve.forms.frame import face_geometry
+from solve.forms.region import Region
+
+from .render import Patch
+from .style import panels_of, save, show_around
+
+REST = "0.82"  # the grey of what no region names
+SAMPLES = 161  # a direction of a face of the solid
+CELLS = 40_000  # of a surface: large triangles are divided into as many
+FINEST = 100  # cells along a side of a triangle
+LINES_UP_TO = 3_000  # triangles are outlined on surfaces of at most so many
+LONGEST = 60  # letters of a name
+
+
+def draw_conditions(path: str | Path | None, volume: BSplineVolume, conditions: Sequence[Condition]) -> Figure:
+    """Draw where a problem's conditions hold on the solid, from the front and from behind.
+
+    conditions: with their regions placed. Where two meet, the first is shown.
+    """
+    palette, rows = _palette(len(conditions)), np.linspace(0.0, 1.0, SAMPLES)
+    patches = []
+    for (axis, side), name in zip(FACES, FACE_NAMES, strict=True):
+        x, normal = face_geometry(volume, [rows] * 3, axis, side)
+        points = np.asarray(x)
+        units = normal / np.linalg.norm(normal, axis=0)
+        first = _first([condition.region for condition in conditions], points, units, name)
+        patches.append(Patch(np.moveaxis(points, 0, -1), palette[first], every=SAMPLES - 1))
+    names = [f"{condition.kind}: {condition.region}" for condition in conditions]
+    return _draw(path, patches, palette, names, "Where data are given")
+
+
+def draw_regions(path: str | Path | None, surface: Surface, regions: Sequence[Region]) -> Figure:
+    """Draw regions on a surface, from the front and from behind. Where two meet, the first is shown."""
+    palette, corners = _palette(len(regions)), surface.vertices[surface.faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(cross, axis=1)
+    sides = np.clip(np.sqrt(CELLS * size / size.sum()).astype(int), 1, FINEST)
+    grids = [_grid(triangle, side) for triangle, side in zip(corners, sides, strict=True)]
+    counts = (sides + 1) ** 2
+    points = np.concatenate([grid.reshape(-1, 3) for grid in grids]).T
+    normals = np.repeat(cross / np.where(size > 0.0, size, 1.0)[:, None], counts, axis=0).T
+    parts = np.split(palette[_first(regions, points, normals)], np.cumsum(counts)[:-1])
+    outlined = len(sides) <= LINES_UP_TO
+    patches = [
+        Patch(grid, part.reshape(grid.shape), every=int(side) if outlined else 0)
+        for grid, part, side in zip(grids, parts, sides, strict=True)
+    ]
+    return _draw(path, patches, palette, list(map(str, regions)), "Regions of the surface")
+
+
+def _grid(triangle: Array, side: int) -> Array:
+    """Return points (side + 1, side + 1, 3) of a triangle (3, 3), whose first corner takes the place of a side."""
+    along = np.linspace(0.0, 1.0, side + 1)
+    a, b, c = triangle
+    return np.asarray(a + along[:, None, None] * (b - a + along[None, :, None] * (c - b)))
+
+
+def _first(regions: Sequence[Region], points: Array, normals: Array, face: str = "") -> IntArray:
+    """Return the number of the first region that holds at each of the points (3, ...), -1 where none does."""
+    found = np.full(points.shape[1:], -1)
+    for number in reversed(range(len(regions))):
+        found[regions[number].holds(points, normals, face)] = number
+    return found
+
+
+def _palette(count: int) -> Array:
+    """Return as many colours, and that of the rest as the last, (count + 1, 3)."""
+    chosen = islice(cycle(colormaps["tab10"].colors), count)  # type: ignore[attr-defined]
+    return np.array([*map(to_rgb, chosen), to_rgb(REST)])
+
+
+def _draw(path: str | Path | None, patches: list[Patch], palette: Array, names: Sequence[str], title: str) -> Figure:
+    figure, (panels,) = panels_of(1, 2)
+    show_around(panels, patches)
+    labels = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in names]
+    swatches = [
+        Swatch(color=color, label=label.replace("$", r"\$")) for color, label in zip(palette, labels, strict=False)
+    ]
+    figure.legend(handles=swatches, loc="outside lower center", ncols=2, frameon=False, fontsize=12)
+    return save(figure, path, title)

@@ -1,0 +1,69 @@
+"""Tells what acts on a body and what its supports answer, as a level of report.json holds it; older ones lack it.
+
+Of elasticity these are forces, of a scalar law what flows in. Forces have the unit of stresses times that of areas.
+"""
+
+from typing import Any
+
+from ..levels import capitalized
+
+AXES = ("x", "y", "z")
+TINY = 1e-6  # of the largest number: the linear solver's own error is smaller
+
+
+def heading(section: dict[str, Any]) -> str:
+    """Return what the table is called."""
+    return "What holds the body" if _is_force(section) else "What flows into the body"
+
+
+def table(section: dict[str, Any]) -> list[list[str]]:
+    """Return the head of a table, and a row for the load, for each support and for the rest that is not balanced.
+
+    Empty where the finest level tells no reactions.
+    """
+    level = _finest(section)
+    if not level.get("reactions"):
+        return []
+    unit = _behind(section)
+    head = [f"{axis}{unit and f' [{unit}]'}" for axis in AXES] if _is_force(section) else ["inflow"]
+    rows = [("load", level["load"]), *level["reactions"].items()]
+    shown = [["", *head], *([capitalized(role), *_numbers(values, level)] for role, values in rows)]
+    if "imbalance" in level:
+        shown.append(["Imbalance, relative", f"{level['imbalance']:.1e}", *[""] * (len(head) - 1)])
+    return shown
+
+
+def lines(section: dict[str, Any]) -> list[str]:
+    """Return a line for the load and one for each support; none where the finest level tells no reactions."""
+    level = _finest(section)
+    if not level.get("reactions"):
+        return []
+    unit = _behind(section)
+    rows = [("load", level["load"]), *((f"{role} answers", force) for role, force in level["reactions"].items())]
+    return [f"{said} {_vector(_numbers(values, level))}{unit and f' {unit}'}" for said, values in rows]
+
+
+def _finest(section: dict[str, Any]) -> dict[str, Any]:
+    levels: list[dict[str, Any]] = section.get("levels") or [{}]
+    return levels[-1]
+
+
+def _is_force(section: dict[str, Any]) -> bool:
+    return len(_finest(section).get("load", ())) == len(AXES)
+
+
+def _behind(section: dict[str, Any]) -> str:
+    """Return the unit of forces, where those of stresses and of lengths are known."""
+    stress, length = section.get("stress_unit"), section.get("unit")
+    return f"{stress}·{length}²" if stress and length else ""
+
+
+def _numbers(values: list[float], level: dict[str, Any]) -> list[str]:
+    """Return numbers as text; what is tiny beside the largest is 0."""
+    everything = [*level["load"], *(value for force in level["reactions"].values() for value in force)]
+    least = TINY * max(map(abs, everything))
+    return [f"{value if abs(value) > least else 0.0:.5g}" for value in values]
+
+
+def _vector(numbers: list[str]) -> str:
+    return numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"

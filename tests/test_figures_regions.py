@@ -1,0 +1,73 @@
+"""Regions in colours: on a solid and on the surface of a part, whose shares are known by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.colors import rgb_to_hsv
+from mesh_files import CUBE, TRIANGLES
+
+import iga_nn
+from iga_nn.figures import regions as figures
+from iga_nn.figures import render
+from parameterize.surface.surface import surface_from_arrays
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The patches that would be drawn, from the front and from behind."""
+    found = []
+    monkeypatch.setattr(figures, "show_around", lambda panels, patches: found.append(patches))
+    return found
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def shares(patches, palette):
+    """How many of the corners of all patches have each colour."""
+    colors = np.concatenate([patch.colors.reshape(-1, 3) for patch in patches])
+    return [np.mean(np.all(colors == color, axis=1)) for color in palette]
+
+
+def test_conditions_on_a_solid_have_their_shares_of_its_faces(drawn):
+    grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 4)] * 3, indexing="ij"), axis=-1)
+    body = iga_nn.Elasticity(fix="u0", load={"nz > 0.9 and x > 0.75": ("0", "0", "-1"), "nz > 0.9": ("0", "0", "1")})
+    figure = figures.draw_conditions(None, iga_nn.BSplineVolume.uniform(grid), body.conditions)
+    assert legend(figure) == ["fix: u0", "load: nz > 0.9 and x > 0.75", "load: nz > 0.9"]
+    found = shares(drawn[0], figures._palette(3))
+    np.testing.assert_allclose(found, [1 / 6, 1 / 24, 3 / 24, 4 / 6], atol=2e-3)
+    assert np.all(drawn[0][0].colors == figures._palette(3)[0])  # u0 is the first face
+
+
+def test_regions_on_a_surface_end_within_triangles(drawn):
+    surface = surface_from_arrays(CUBE, TRIANGLES)
+    told = [iga_nn.Region(text, surface.part) for text in ("nz > 0.9", "x < 0.25", "y < 0.5")]
+    figure = figures.draw_regions(None, surface, told)
+    assert legend(figure) == ["nz > 0.9", "x < 0.25", "y < 0.5"]
+    points = np.concatenate([patch.points.reshape(-1, 3) for patch in drawn[0]])
+    colors = np.concatenate([patch.colors.reshape(-1, 3) for patch in drawn[0]])
+    palette = figures._palette(3)
+    rest = points[np.all(colors == palette[-1], axis=1)]
+    assert rest[:, 0].min() >= 0.25 and rest[:, 1].min() >= 0.5 and rest[:, 1].max() == 1.0
+    first = points[np.all(colors == palette[0], axis=1)]
+    assert np.ptp(first, axis=0).tolist() == [1.0, 1.0, 0.0] and np.all(first[:, 2] == 1.0)
+
+
+def test_more_regions_than_colours_repeat_them():
+    assert np.array_equal(figures._palette(11)[0], figures._palette(11)[10])
+
+
+@pytest.mark.pictures
+def test_the_picture_shows_the_region_and_grey(tmp_path):
+    if not render.can_draw():
+        pytest.skip(f"VTK cannot draw on this machine; remedy: {render.REMEDY}")
+    surface = surface_from_arrays(CUBE, TRIANGLES)
+    figures.draw_regions(tmp_path / "a.png", surface, [iga_nn.Region("x > -1")])
+    figure = figures.draw_regions(None, surface, [iga_nn.Region("nz > 0.9")])
+    blue = []
+    for panel in figure.axes:
+        pixels = rgb_to_hsv(panel.images[0].get_array().reshape(-1, 3) / 255.0)
+        blue.append(np.count_nonzero((pixels[:, 1] > 0.5) & (np.abs(pixels[:, 0] - 0.57) < 0.05)))
+    assert max(blue) > 2000 and min(blue) < 500 and (tmp_path / "a.png").is_file()  # one side shows the top

@@ -1,0 +1,47 @@
+"""What acts on a body and what holds it, in words and as a table."""
+
+from __future__ import annotations
+
+from iga_nn.report.balance import heading, lines, table
+
+LEVEL = {
+    "load": [0.0, 1e-9, -2.0],
+    "reactions": {"fix 'u0'": [-0.25, 0.0, 1.5], "spring 'nx > 0.9'": [0.25, 0.0, 0.5]},
+    "areas": {},
+    "imbalance": 3.2e-9,
+}
+BODY = {"levels": [{"load": [9.0] * 3, "reactions": {}}, LEVEL]}
+
+
+def test_forces_are_told_of_the_finest_level():
+    assert lines(BODY) == [
+        "load (0, 0, -2)",
+        "fix 'u0' answers (-0.25, 0, 1.5)",
+        "spring 'nx > 0.9' answers (0.25, 0, 0.5)",
+    ]
+    assert heading(BODY) == "What holds the body"
+    assert table(BODY) == [
+        ["", "x", "y", "z"],
+        ["Load", "0", "0", "-2"],
+        ["Fix 'u0'", "-0.25", "0", "1.5"],
+        ["Spring 'nx > 0.9'", "0.25", "0", "0.5"],
+        ["Imbalance, relative", "3.2e-09", "", ""],
+    ]
+
+
+def test_forces_have_a_unit_where_those_of_stresses_and_lengths_are_known():
+    known = BODY | {"unit": "mm", "stress_unit": "MPa"}
+    assert lines(known)[0] == "load (0, 0, -2) MPa·mm²"
+    assert table(known)[0] == ["", "x [MPa·mm²]", "y [MPa·mm²]", "z [MPa·mm²]"]
+    assert lines(BODY | {"unit": "mm"}) == lines(BODY)
+
+
+def test_of_a_scalar_law_what_flows_in_is_told():
+    heat = {"unit": "mm", "levels": [{"load": [3.0], "reactions": {"value 'u0'": [-3.0]}}]}
+    assert lines(heat) == ["load 3", "value 'u0' answers -3"] and heading(heat) == "What flows into the body"
+    assert table(heat) == [["", "inflow"], ["Load", "3"], ["Value 'u0'", "-3"]]
+
+
+def test_what_older_reports_lack_is_not_told():
+    for section in ({}, {"levels": []}, {"levels": [{"dofs": 8}]}, {"levels": [{"load": [1.0], "reactions": {}}]}):
+        assert lines(section) == table(section) == []
