@@ -101,6 +101,21 @@ def test_a_problem_is_solved_on_a_finished_volume_and_again_on_the_same(tmp_path
     jobs.close()
 
 
+def test_of_a_part_called_boundary_volume_and_surface_are_kept_apart(tmp_path):
+    jobs = Jobs(tmp_path, resolve_path, lambda job: iter([Ended("done")]), lambda job: None)
+    first = accepted(jobs, "boundary.obj")
+    first.results.mkdir()
+    first.volume.write_bytes(b"volume")
+    first.volume.with_name("boundary.npz").write_bytes(b"part")
+    jobs.start(first)
+    wait_for(first, "done")
+    second = jobs.solve(first, PoissonOptions(exact="x"))
+    wait_for(second, "done")
+    assert second.volume.read_bytes() == b"volume"
+    assert second.volume.with_name("boundary.npz").read_bytes() == b"part"
+    jobs.close()
+
+
 def test_a_run_is_told_step_by_step(jobs, runs):
     job = accepted(jobs)
     jobs.start(job)

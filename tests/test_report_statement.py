@@ -38,6 +38,14 @@ def test_a_study_has_its_exact_solution_and_a_map_no_problem():
     assert statement_of({"parameterization": {}}) == []
 
 
+def test_outside_the_regions_the_boundary_is_free():
+    region = {"kind": "fix", "region": "u0", "data": "0;0;0"}
+    assert dict(statement_of({"elasticity": {"regions": [region]}}))["traction σ n outside the regions below"] == "0"
+    rows = dict(statement_of({"poisson": {"regions": [region], "exact": "x"}}))
+    assert rows["flux κ ∂u/∂n outside the regions below"] == "from the exact solution"
+    assert not any(name.endswith("on the boundary") for name in rows)
+
+
 def test_regions_are_listed_where_there_are_some():
     region = {"kind": "load", "region": "nx > 0.9", "data": "0;0;-2", "area": 0.25}
     held = {"kind": "fix", "region": "u0", "data": "0;0;0"}

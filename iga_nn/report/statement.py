@@ -37,7 +37,7 @@ def _poisson(section: Report) -> list[Row]:
     rows = [("equation", f"−∇·(κ ∇u){' + c u' if has_reaction else ''} = f"), ("κ", _text(section.get("kappa", "1")))]
     rows += [("c", _text(section["reaction"]))] if has_reaction else []
     rows += [("f", _text(section.get("source", given)))]
-    rows += [(_rest("u", [*faces, *exchanges]), _text(section.get("boundary", given)))]
+    rows += [_rest(section, "u", "boundary", "flux κ ∂u/∂n", [*faces, *exchanges])]
     rows += [(f"flux κ ∂u/∂n on {face}", data or FROM_EXACT) for face, data in faces]
     for face, data in exchanges:
         alpha, _, value = data.partition(":")
@@ -53,7 +53,7 @@ def _elasticity(section: Report) -> list[Row]:
         ("equation", "−∇·σ = f,  σ = λ (∇·u) I + μ (∇u + ∇uᵀ)"),
         ("material", f"Young's modulus E = {young:g}, Poisson's ratio ν = {ratio:g}; λ = {first:.6g}, μ = {shear:.6g}"),
         ("force f per volume", _text(section.get("body_force", given))),
-        (_rest("displacement u", faces), _text(section.get("displacement", given))),
+        _rest(section, "displacement u", "displacement", "traction σ n", faces),
         *((f"traction σ n on {face}", data or FROM_EXACT) for face, data in faces),
     ]
 
@@ -63,8 +63,15 @@ def _derived(section: Report) -> str:
     return FROM_EXACT if section.get("exact") else "0"
 
 
-def _rest(what: str, faces: Sequence[Row]) -> str:
-    return f"{what} elsewhere on the boundary" if faces else f"{what} on the boundary"
+def _rest(section: Report, essential: str, key: str, natural: str, faces: Sequence[Row]) -> Row:
+    """Return what is given on the rest of the boundary: natural data where regions are named, else essential ones.
+
+    key: under which the section has them. faces: those with data of their own.
+    """
+    if section.get("regions"):
+        return f"{natural} outside the regions below", _derived(section)
+    where = "elsewhere on the boundary" if faces else "on the boundary"
+    return f"{essential} {where}", _text(section.get(key, _derived(section)))
 
 
 def _faces(entries: Sequence[str]) -> list[Row]:
