@@ -180,13 +180,16 @@ def _bound(frames: Sequence[Frame]) -> float:
 
 
 def _opening(frame: Frame) -> dict[str, str]:
-    """Return what is seen first: the first field, on the boundary, unless half of that has nearly one value."""
+    """Return what is seen first: the first field, on the boundary, unless half of that has nearly one value.
+
+    A body is seen as a whole: its shape says more than the colours of its inside.
+    """
     if not frame.fields:
         return {"field": "faces", "part": "surface"}
     field = frame.fields[0]
     quarters = np.percentile([field.limits.shares(patch) for patch in field.patches[:6]], [25.0, 75.0])
     is_even = quarters[1] - quarters[0] < EVEN and not field.limits.remark
-    return {"field": field.name, "part": "cut" if is_even else "surface"}
+    return {"field": field.name, "part": "cut" if is_even and not frame.displaces else "surface"}
 
 
 def _described(field: Field, frame: Frame) -> dict[str, Any]:
