@@ -228,30 +228,25 @@ class _Builder:
         largest eigenvalue of the law's matrix n . C . n (a polynomial of degree p on [0, 1] has
         f(0)^2 <= (p + 1)^2 int f^2), times what the map's change across the span adds.
         """
-        form, at, c = self.problem.form, self.rule.at, self.problem.form.components
-        axis, side = divmod(FACE_NAMES.index(self.name), 2)
-        columns = []
-        for d in range(c):
-            unit = np.zeros((c, len(at.parameters)))
-            unit[d] = 1.0
-            flux = np.asarray(form.flux(np.zeros_like(unit), unit[:, None] * normal, x), dtype=np.float64)
-            columns.append((flux * normal).sum(axis=1))
-        matrix: Array = np.stack(columns).transpose(2, 0, 1).astype(np.float64)
-        strength = np.linalg.eigvalsh(0.5 * (matrix + matrix.swapaxes(-1, -2)))[..., -1]
+        at, (axis, side) = self.rule.at, divmod(FACE_NAMES.index(self.name), 2)
+        strength = np.linalg.eigvalsh(self.problem.form.matrix_along(normal, x))[..., -1]
         breaks = breakpoints(self.space.whole.knots[axis])
         span = breaks[-1] - breaks[-2] if side else breaks[1] - breaks[0]
-        det = np.abs(np.linalg.det(at.jacobian))
-        change = np.ones(len(det))
-        inverse = np.linalg.inv(at.jacobian)
+        thickness = span * np.abs(np.linalg.det(at.jacobian)) / at.size
+        steepest = MARGIN * self._sharing() * (self.space.degrees[axis] + 1) ** 2 * self._change(axis, side, span)
+        return steepest * strength / thickness, strength * span / thickness
+
+    def _change(self, axis: int, side: int, span: float) -> Array:
+        """Return by how much (m,) the map may lower the energy inside the span behind each point, against the face."""
+        at, change = self.rule.at, np.ones(len(self.rule.weights))
+        inverse, det = np.linalg.inv(at.jacobian), np.abs(np.linalg.det(at.jacobian))
         for depth in DEPTHS:
             parameters = at.parameters.copy()
             parameters[:, axis] = 1.0 - depth * span if side else depth * span
             inside = self.volume.jacobian(parameters)
             stretch = np.linalg.norm(inside @ inverse, ord=2, axis=(1, 2)) ** 2
             change = np.maximum(change, stretch * det / np.abs(np.linalg.det(inside)))
-        thickness = span * det / at.size
-        steepest = MARGIN * self._sharing() * (self.space.degrees[axis] + 1) ** 2 * change
-        return steepest * strength / thickness, strength * span / thickness
+        return change
 
     def _sharing(self) -> Array:
         """Return how many faces (m,) may take their part of the energy of the span behind each point."""

@@ -120,20 +120,32 @@ class Form:
         unit[component] = 1.0
         return reaction(self, unit, np.zeros((self.components, 3, *x.shape[1:])), x)[component]
 
-    def symbol(self, wave: Array, x: Array) -> Array:
-        """Return the least factor (...) by which the law multiplies waves exp(i k . x), k (3, ...)."""
+    def matrix_along(self, wave: Array, x: Array) -> Array:
+        """Return the symmetric part (..., c, c) of the matrix from d to flux(d (x) k) . k, for vectors k (3, ...)."""
         columns = []
         for d in range(self.components):
             unit = np.zeros((self.components, *wave.shape[1:]))
             unit[d] = 1.0
-            none = np.zeros_like(unit)
-            flux = self.flux(none, unit[:, None] * wave, x)
-            columns.append((flux * wave).sum(axis=1) + reaction(self, unit, none[:, None] * wave, x))
-        if self.components == 1:
-            return columns[0][0]
-        matrix = np.moveaxis(np.stack(columns), (0, 1), (-2, -1))
-        least: Array = np.linalg.eigvalsh(0.5 * (matrix + matrix.swapaxes(-1, -2)))[..., 0]
-        return least
+            flux = np.asarray(self.flux(np.zeros_like(unit), unit[:, None] * wave, x), dtype=np.float64)
+            columns.append((flux * wave).sum(axis=1))
+        return _symmetric(columns)
+
+    def symbol(self, wave: Array, x: Array) -> Array:
+        """Return the least factor (...) by which the law multiplies waves exp(i k . x), k (3, ...)."""
+        matrix = self.matrix_along(wave, x)
+        if self.has_reaction:
+            units = np.eye(self.components).reshape(self.components, -1, *(1,) * (wave.ndim - 1))
+            none = np.zeros((self.components, 3, *wave.shape[1:]))
+            ones = np.ones(wave.shape[1:])
+            matrix = matrix + _symmetric([reaction(self, unit * ones, none, x) for unit in units])
+        least = matrix[..., 0, 0] if self.components == 1 else np.linalg.eigvalsh(matrix)[..., 0]
+        return np.asarray(least, dtype=np.float64)
+
+
+def _symmetric(columns: Sequence[Array]) -> Array:
+    """Return the symmetric part (..., c, c) of matrices whose columns are c arrays (c, ...)."""
+    matrix: Array = np.moveaxis(np.stack(columns), (0, 1), (-2, -1))
+    return 0.5 * (matrix + matrix.swapaxes(-1, -2))
 
 
 def reaction(form: Form, u: Array, grad: Array, x: Array) -> Array:
