@@ -57,6 +57,11 @@ class Balance:
         found["areas"] = dict(self.areas)
         return found | ({} if self.imbalance is None else {"imbalance": self.imbalance})
 
+    @property
+    def is_told(self) -> bool:
+        """Whether a reader wants it: of a force, and where data are given on regions."""
+        return len(self.load) > 1 or not set(self.reactions) <= set(FACE_NAMES)
+
     def __str__(self) -> str:
         answers = [f"{role} answers {_shown(force)}" for role, force in self.reactions.items()]
         rest = "" if self.imbalance is None else f" (balanced to {self.imbalance:.0e})"
@@ -102,7 +107,7 @@ def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array)
     found: dict[str, Array] = {}
     for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
         here = np.zeros_like(fixed)
-        if axis > 0 or _has_end(space, name):
+        if fixed.size and (axis > 0 or _has_end(space, name)):
             here[tuple((-1 if name[1] == "1" else 0) if a == axis else slice(None) for a in range(3))] = True
         here &= ~fixed
         fixed |= here
@@ -115,7 +120,9 @@ def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array)
 def _has_end(space: TrialSpace, name: str) -> bool:
     """Return whether the first or the last row of u is among those of this process."""
     rows = space.rows
-    return rows.stop == space.whole.shape[0] if name == "u1" else rows.start == 0
+    if rows.start == rows.stop:
+        return False
+    return bool(rows.stop == space.whole.shape[0] if name == "u1" else rows.start == 0)
 
 
 def _of_regions(

@@ -107,7 +107,7 @@ class SolveReport:
         """Return the entry as report.json holds it; errors that are not known are absent."""
         names = ("elements", "dofs", "h", *NORMS, "iterations", "converged", "residual", "meaningful", "seconds")
         found = {name: value for name in names if (value := getattr(self, name)) is not None}
-        found |= self.balance.as_dict() if self.balance else {}
+        found |= self.balance.as_dict() if self.balance and self.balance.is_told else {}
         return found | ({"traffic": dict(self.traffic)} if self.traffic else {})
 
     def __str__(self) -> str:
@@ -115,7 +115,7 @@ class SolveReport:
         found = {shown: getattr(self, norm) for norm, shown in NORMS.items()}
         parts += [f"{shown} {value:.4e}" for shown, value in found.items() if value is not None]
         state = "" if self.converged else f", NOT CONVERGED (residual {self.residual:.1e})"
-        answers = [str(self.balance)] if self.balance and self.balance.reactions else []
+        answers = [str(self.balance)] if self.balance and self.balance.reactions and self.balance.is_told else []
         return "\n".join([", ".join([*parts, f"{self.iterations} iterations{state}"]), *answers, *self.notices])
 
 

@@ -17,14 +17,14 @@ def smooth(x, y, z):
     return np.exp(x + z) * np.sin(y)
 
 
-def values(points):
+def values(points, face):
     return smooth(*points)[None]
 
 
 @pytest.mark.parametrize("component", [0, 1, 2])
 def test_data_in_the_space_are_reproduced(volume, component):
     """x, y and z are splines on the map: their coefficients are its control points."""
-    found = boundary_coefficients(volume, trial_space(volume), lambda x: x[component][None])[0]
+    found = boundary_coefficients(volume, trial_space(volume), lambda x, face: x[component][None])[0]
     expected = volume.control_points[..., component].copy()
     expected[1:-1, 1:-1, 1:-1] = 0.0
     assert np.allclose(found, expected, atol=1e-12)

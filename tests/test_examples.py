@@ -128,7 +128,7 @@ def test_vibration_near_beam_theory(tmp_path, capsys):
     assert shown(load("vibration").main(out=tmp_path))
     out = capsys.readouterr().out
     frequencies = numbers(out, r"frequency (\S+)")
-    assert len(frequencies) == 4 and max(numbers(out, r"residual (\S+)")) < 1e-5
+    assert len(frequencies) == 4 and max(numbers(out, r"residual (\S+)")) < 1e-4
     assert frequencies[:2] == pytest.approx(2 * numbers(out, r"theory (\S+)"), rel=0.01)  # both ways to bend
 
 

@@ -29,7 +29,7 @@ def of(runs):
 
 def test_numbers_stand_beside_each_other_with_their_ratio(runs):
     tables = comparison.rows(*of(runs))
-    assert list(tables) == ["The map", "The finest solve", "Largest and smallest values", "Seconds"]
+    assert list(tables) == ["The map", "The finest solve", "Largest and smallest values", "Forces and flows", "Seconds"]
     extremes = {row[0]: row[1:] for row in tables["Largest and smallest values"]}
     assert extremes["largest displacement [mm]"][2] == "2"
     stiff, soft = extremes["von Mises at most [MPa]"], extremes["von Mises at most [N/mm2]"]

@@ -68,7 +68,7 @@ def test_no_time_of_a_finished_solve_is_zero(in_folder, capsys):
     folder = in_folder / "out"
     report = reports.read(folder)
     report["seconds"] = dict.fromkeys(report["seconds"], 0.004)
-    assert verdict_in_words(Outcome(folder, report)).splitlines()[0] == "below 0.1 s"
+    assert "below 0.1 s" in verdict_in_words(Outcome(folder, report)).splitlines()
     html.write(folder, report, None)
     page = (folder / "report.html").read_text()
     assert "below 0.1 s" in page and page.count("below 0.01") == len(report["seconds"])
