@@ -142,7 +142,7 @@ def _of_regions(
             if condition.is_essential and condition.role in found:
                 found[condition.role] += face.force(coefficients, here & ~taken)
                 taken |= here
-            elif condition.kind in WITH_FACTOR:
+            elif condition.kind in WITH_FACTOR and here.any():
                 chosen = np.flatnonzero(here)
                 x = Points.at(np.ascontiguousarray(face.x[:, chosen]), face.x.places[chosen])  # type: ignore[index]
                 free = np.eye(len(coefficients))[:, :, None] - face.projector[:, :, chosen]

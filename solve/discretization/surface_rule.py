@@ -79,8 +79,13 @@ def surface_rule(volume: BSplineVolume, space: TrialSpace, axis: int, side: int,
     """Return the rule of a face, without the points whose code is zero; None where all are.
 
     Cells in which lines differ are halved until their usual error is within TOLERANCE of the regions' area.
+    Of a slab they are the points on its spans, of the rule of the whole face: so that it does not depend on processes.
     """
-    return _Cutter(volume, orientation(volume), space, axis, side, codes).rule()
+    whole = _Cutter(volume, orientation(volume), space.whole, axis, side, codes).rule()
+    if whole is None or space.comm.size == 1:
+        return whole
+    u, (first, *_, last) = whole.at.parameters[:, 0], space.breaks[0]
+    return _part(whole, np.flatnonzero((u >= first) & (u <= last)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,6 +261,15 @@ def _sizes(cells: Array) -> Array:
 
 def _with_ends(t: Array) -> Array:
     return np.concatenate([[0.0], t, [1.0]])
+
+
+def _part(rule: SurfaceRule, chosen: IntArray) -> SurfaceRule | None:
+    """Return some points of a rule; None for none."""
+    if not len(chosen):
+        return None
+    at = rule.at
+    points = FacePoints(at.parameters[chosen], at.x[:, chosen], at.area[:, chosen], at.jacobian[chosen])
+    return SurfaceRule(points, rule.weights[chosen], rule.codes[chosen])
 
 
 def _joined(parts: Sequence[SurfaceRule]) -> SurfaceRule:
