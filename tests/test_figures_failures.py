@@ -34,7 +34,7 @@ def all_drawn(in_folder, monkeypatch):
         monkeypatch.setattr(draw, lambda path, *given: path.write_bytes(b""))
 
 
-def broken(path, *given):
+def broken(path, *given, **named):
     raise ValueError("Invalid vmin or vmax")
 
 

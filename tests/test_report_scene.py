@@ -20,6 +20,7 @@ from iga_nn.batch.table import page as batch_page
 from iga_nn.cli.commands import main
 from iga_nn.figures import evaluate, fields
 from iga_nn.figures.solution import draw_error
+from iga_nn.options import Units
 from iga_nn.report import document
 from iga_nn.report.html import filled
 from iga_nn.report.viewer import Frame, scene_of, scene_of_frames
@@ -514,3 +515,11 @@ def test_controls_are_named(chromium, pulled, tmp_path):
 
     found = in_browser(chromium, tmp_path, work)
     assert all(found) and len(found) > 20
+
+
+def test_the_titles_of_bars_have_the_units_that_are_given():
+    body = solve.Elasticity(fix="u0", load={"u1": (0, 0, 1)})
+    scene = scene_of(
+        solve.benchmark_volume(1), solve.solve_problem(solve.benchmark_volume(1), body), units=Units("mm", "MPa")
+    )
+    assert [field["title"] for field in scene["fields"]][:2] == ["von Mises stress [MPa]", "|u| [mm]"]

@@ -26,6 +26,7 @@ from solve.forms.form import Quantity
 from ..figures import evaluate
 from ..figures.cutaway import best_cut, patches_of
 from ..figures.fields import (
+    STRESS,
     Field,
     Samples,
     diagonal_of,
@@ -36,9 +37,9 @@ from ..figures.fields import (
     quantity_of,
     vectors_of,
 )
-from ..figures.style import even_range
+from ..figures.style import even_range, with_unit
 from ..figures.warp import factor_for, is_displacement, warp_of
-from ..options import Equation
+from ..options import NO_UNITS, Equation, Units
 
 Scene = dict[str, Any]
 
@@ -88,18 +89,25 @@ def scene_of(
     solution: SplineField | None = None,
     problem: "Equation | None" = None,
     *,
+    units: Units = NO_UNITS,
     coarser: int = 1,
 ) -> Scene:
     """Return what the script draws, in JSON's own types; solution and error only where they are known and finite.
 
-    coarser: 2 leaves out every second point.
+    units: behind the titles of the bars. coarser: 2 leaves out every second point.
     """
     if solution is None or not np.all(np.isfinite(solution.coefficients)):
         return _scene(volume, [Frame("", [])], coarser)
     frame = Frame.of("", solution)
     if problem is not None and problem.exact is not None:
         frame = replace(frame, fields=[*frame.fields, error_of(volume, solution, problem)])
+    frame = replace(frame, fields=[_with_unit(field, units) for field in frame.fields])
     return _scene(volume, [frame], coarser) | {"warp": warp_of(solution, diagonal_of(points_of(volume)))}
+
+
+def _with_unit(field: Field, units: Units) -> Field:
+    """Return a field whose title has its unit."""
+    return replace(field, title=with_unit(field.title, units.stress if field.name == STRESS else units.displacement))
 
 
 def scene_of_frames(

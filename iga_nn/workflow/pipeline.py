@@ -25,6 +25,7 @@ from ..io.formats import load_volume
 from ..kinds import check_kind
 from ..levels import as_csv, as_table, rows_of
 from ..options import (
+    NO_UNITS,
     PROBLEMS,
     Equation,
     MapOptions,
@@ -32,6 +33,7 @@ from ..options import (
     PoissonOptions,
     ProblemOptions,
     StudyOptions,
+    Units,
     check_size,
 )
 from ..report import document as reports
@@ -144,7 +146,8 @@ def parameterize_to(
         if problem is None or equation is None:
             return _finish(state, result.volume)
         equation = equation.on_surface(result.boundary.part)
-        return _finish(state, result.volume, solve_levels(state, result.volume, equation, problem), equation)
+        solution = solve_levels(state, result.volume, equation, problem)
+        return _finish(state, result.volume, solution, equation, problem.units)
 
 
 def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, problem: ProblemOptions | None) -> str:
@@ -218,7 +221,7 @@ def solve_to(
             deque(each_level(loaded, equation, options, comm=comm), maxlen=0)
             return None
         solution = solve_levels(state, loaded, equation, options, comm=comm, **elsewhere)
-        return _finish(state, loaded, solution, equation)
+        return _finish(state, loaded, solution, equation, options.units)
 
 
 def with_part(equation: Equation, volume: Path) -> Equation:
@@ -323,10 +326,11 @@ def _finish(
     volume: BSplineVolume,
     solution: Solution | None = None,
     equation: "Equation | None" = None,
+    units: Units = NO_UNITS,
     scene: Any = None,
 ) -> Outcome:
     """Finish the report, write the page that shows it and return the output folder."""
-    scene = scene or scene_of(state, volume, solution, equation)
+    scene = scene or scene_of(state, volume, solution, equation, units=units)
     outcome = state.finish()
     html.write(outcome.folder, outcome.report, scene)
     return outcome

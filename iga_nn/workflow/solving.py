@@ -16,7 +16,7 @@ from solve.forms.condition import WITH_FACTOR, Condition
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
-from ..options import Equation, ProblemOptions, Units
+from ..options import NO_UNITS, Equation, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
 from ..report.extremes import growth_notices
@@ -184,12 +184,12 @@ def notices_of(found: Iterable[SolveReport]) -> list[str]:
     return list(dict.fromkeys(notice for item in found for notice in item.notices))
 
 
-def scene_of(state: RunFolder, volume: BSplineVolume, *solved: Any) -> Any:
+def scene_of(state: RunFolder, volume: BSplineVolume, *solved: Any, units: Units = NO_UNITS) -> Any:
     """Return the interactive view of a volume and what is solved on it; None where it cannot be drawn."""
     with state.timed("report"), state.drawing("interactive view"):
         from ..report import viewer
 
-        return viewer.scene_of(volume, *solved)
+        return viewer.scene_of(volume, *solved, units=units)
     return None
 
 
