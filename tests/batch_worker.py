@@ -49,4 +49,4 @@ if isinstance(pipeline.parameterize_to, FunctionType):  # dask loads this file m
     MapOptions.config = lambda _: tiny_config()
     SampledBoundary.of.__func__.__defaults__ = FEW
     RunFolder.draw = lambda *_, **__: None
-    pipeline.scene_of = lambda *_: None
+    pipeline.scene_of = lambda *_, **__: None

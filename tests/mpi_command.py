@@ -14,7 +14,7 @@ from iga_nn.workflow.output_folder import RunFolder
 from solve.linear.krylov import conjugate_gradients
 
 RunFolder.draw = lambda *_, **__: None
-viewer.scene_of = lambda *_: None
+viewer.scene_of = lambda *_, **__: None
 processes.GRACE = 1.0
 
 
