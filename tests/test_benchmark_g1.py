@@ -11,7 +11,7 @@ import dask
 import pytest
 from example_files import cells, load
 from mesh_files import obj
-from small_run import small_surface
+from small_run import BATCH_WORKER, small_surface
 
 import iga_nn
 import solve
@@ -220,7 +220,7 @@ def test_models_run_in_processes_of_their_own(tmp_path):
     (tmp_path / "duck.obj").write_text(obj(surface.vertices, surface.faces))
     (tmp_path / "pig.obj").write_text("no surface\n")
     arguments = ["--models", str(tmp_path), "--out", str(tmp_path / "out"), "--only", "pig", "duck"]
-    with dask.config.set({"distributed.worker.preload": [str(Path(__file__).with_name("batch_worker.py"))]}):
+    with dask.config.set({"distributed.worker.preload": [str(BATCH_WORKER)]}):
         assert g1.main([*arguments, "--steps-factor", "0.003"]) == 1
     found = table(tmp_path / "out")
     assert list(found) == ["duck", "pig"]
