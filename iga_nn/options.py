@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass, fields
+from dataclasses import KW_ONLY, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from parameterize.config import MAX_CONTROL_POINTS
 
@@ -18,9 +18,9 @@ from .kinds import Checked
 if TYPE_CHECKING:
     from parameterize.config import Config
     from parameterize.spline.volume import BSplineVolume
-    from solve import Elasticity, Poisson, Problem
+    from solve import Elasticity, Poisson, SolveOptions
+    from solve.forms.problem import BoundaryValueProblem
 
-Equation: TypeAlias = "Poisson | Elasticity | Problem"
 Formula = str  # one that starts with a minus is written --option=-x
 
 LONGEST_UNIT = 20  # letters
@@ -146,7 +146,7 @@ class ProblemOptions(Checked, ABC):
     title: ClassVar[str]
 
     @abstractmethod
-    def problem(self) -> Equation:
+    def problem(self) -> BoundaryValueProblem:
         """Return the problem of these options. Raises InputError."""
 
     def __post_init__(self) -> None:
@@ -162,9 +162,11 @@ class ProblemOptions(Checked, ABC):
         """Return what stands beside colour bars."""
         return NO_UNITS
 
-    def solver(self) -> dict[str, Any]:
-        """Return the keywords of `solve.solve_problem` that are the same on every level."""
-        return {"degree": self.degree, "quadrature": self.quadrature}
+    def solve_options(self) -> SolveOptions:
+        """Return the options of the solve on the finest mesh."""
+        from solve import SolveOptions
+
+        return SolveOptions(refine=max(self.refine), degree=self.degree, quadrature=self.quadrature)
 
 
 @dataclass(frozen=True)
@@ -288,9 +290,9 @@ class ElasticityOptions(ProblemOptions):
     section: ClassVar[str] = "elasticity"
     title: ClassVar[str] = "linear elasticity"
 
-    def solver(self) -> dict[str, Any]:
-        """Return the keywords of the solver: a slender body with one end held takes more iterations than a scalar."""
-        return super().solver() | {"max_iterations": MOST_ITERATIONS}
+    def solve_options(self) -> SolveOptions:
+        """Return the options of the solve on the finest mesh: a slender body takes more iterations than a scalar."""
+        return replace(super().solve_options(), max_iterations=MOST_ITERATIONS)
 
     @property
     def units(self) -> Units:
@@ -347,7 +349,7 @@ class StudyOptions(Checked):
 
     command: ClassVar[str] = "study"
 
-    def problem(self) -> Equation:
+    def problem(self) -> BoundaryValueProblem:
         """Return the problem of these options. Raises InputError."""
         return PoissonOptions(exact=self.exact).problem()
 
@@ -379,7 +381,7 @@ class ElasticityStudyOptions(StudyOptions):
 
     command: ClassVar[str] = "study elasticity"
 
-    def problem(self) -> Equation:
+    def problem(self) -> BoundaryValueProblem:
         """Return the problem of these options. Raises InputError."""
         if given := [entry for entry in self.traction if "=" in entry]:
             face = given[0].partition("=")[0]

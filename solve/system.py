@@ -5,7 +5,6 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -27,14 +26,13 @@ from .discretization.weak import WeakFace
 from .field import Points, SplineField
 from .forms.form import check_law
 from .forms.mass import Mass
-from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
+from .options import IterationOptions, SolveOptions, check_device
 from .reactions import balance
 from .solution import Solution, SolveReport
 
-DEVICES = ("cpu", "cuda")
 SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
 
 LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
@@ -47,44 +45,6 @@ _controller = functools.cache(ThreadpoolController)  # looks for the libraries a
 def one_blas_thread() -> Any:
     """Context in which each matrix product stays in the thread that calls it: the threads are ours to share out."""
     return _controller().limit(limits=1, user_api="blas")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SolverOptions:
-    """Hold what the linear solver is told: keywords of `iga_nn.solve`, which describes them.
-
-    Raises ValueError where a tolerance or a number of iterations is out of range.
-    """
-
-    tolerance: float = 1e-10
-    max_iterations: int = 1000
-    certified: str | None = None
-    device: str = "cpu"
-    start: SplineField | None = None
-    estimate: bool | None = None
-    strict: bool = False
-
-    def __post_init__(self) -> None:
-        if not (isinstance(self.tolerance, Real) and 0.0 < self.tolerance < 1.0):
-            raise ValueError(f"tolerance must be a number between 0 and 1, got {self.tolerance!r:.80}")
-        if not (isinstance(self.max_iterations, Integral) and self.max_iterations >= 1):
-            raise ValueError(f"max_iterations must be a whole number, at least 1, got {self.max_iterations!r:.80}")
-
-
-def check_device(device: str, problem: BoundaryValueProblem) -> None:
-    """Raise ValueError for a device that is unknown or absent, or that cannot solve the problem."""
-    if device not in DEVICES:
-        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
-    if device != "cpu":
-        if not isinstance(problem, Poisson):
-            raise ValueError(f"{type(problem).__name__.lower()} runs on device='cpu' only, got device={device!r}")
-        if problem.robin:
-            raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
-        if problem.conditions:
-            raise ValueError(f"regions run on device='cpu' only, got device={device!r}")
-        from .linear.cuda import check_available  # torch comes in here only
-
-        check_available(device)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +153,10 @@ class System:
         how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`.
         Raises ConvergenceError where the linear solver fails before its first iteration, else only for `strict`.
         """
-        options = SolverOptions(**how)
+        return self.solve_with(IterationOptions.of(how))
+
+    def solve_with(self, options: IterationOptions) -> Solution:
+        """Return what `solve` does, of options as one object."""
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
@@ -203,7 +166,7 @@ class System:
             raise ConvergenceError(solution.report.notices[-1], solution)
         return solution
 
-    def _solve(self, options: SolverOptions) -> Solution:
+    def _solve(self, options: IterationOptions) -> Solution:
         volume, problem, space = self.volume, self.problem, self.space
         dofs = len(self.known) * space.dofs
         clock, sent = [time.process_time()], space.traffic()
@@ -257,7 +220,7 @@ class System:
             return None
         return float(self.space.total((self.right * free).sum()))
 
-    def _iterate(self, options: SolverOptions) -> LinearResult:
+    def _iterate(self, options: IterationOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
         operator, limits = self.matrix, (options.tolerance, options.max_iterations)
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
@@ -285,8 +248,7 @@ def build(
     volume: BSplineVolume,
     problem: BoundaryValueProblem,
     space: TrialSpace,
-    threads: int = 1,
-    quadrature: str = "spline",
+    options: SolveOptions,
     shift: float = 0.0,
 ) -> System:
     """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
@@ -295,7 +257,7 @@ def build(
     """
     start = time.process_time()
     with one_blas_thread():
-        operator, load, known = assemble_data(volume, problem, space, threads, quadrature)
+        operator, load, known = assemble_data(volume, problem, space, options)
         if shift == 0.0:
             weak = [face for face in operator.faces.values() if isinstance(face, WeakFace)]
             demand_supports(problem, space, weak, float(np.ptp(volume.control_points, axis=(0, 1, 2)).max()))
@@ -318,11 +280,7 @@ def build(
 
 
 def assemble_data(
-    volume: BSplineVolume,
-    problem: BoundaryValueProblem,
-    space: TrialSpace,
-    threads: int = 1,
-    quadrature: str = "spline",
+    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, options: SolveOptions
 ) -> tuple[Operator | FormOperator, Array, Array]:
     """Return operator and load, the data on faces included, and the coefficients that are fixed."""
     form, couples = problem.form, False
@@ -334,9 +292,9 @@ def assemble_data(
         space,
         form,
         problem.source_at,
-        rule_of(volume, space, form.tensor, quadrature),
+        rule_of(volume, space, form.tensor, options.quadrature),
         component=0 if form.components == 1 and form.symmetric and not couples else None,
-        threads=threads,
+        threads=options.thread_count,
     )
     with agreed(space.comm):
         if problem.conditions:

@@ -101,24 +101,24 @@ def run_batch(
     >>> len(batch.rows), batch.rows[0].report == outcome.report
     (1, True)
     """
-    mapping, options, workers = mapping or MapOptions(), poisson or PoissonOptions(), workers or WorkerOptions()
+    mapping, statement, workers = mapping or MapOptions(), poisson or PoissonOptions(), workers or WorkerOptions()
     for name, value, kind in (
         ("surfaces", surfaces, tuple[str | Path, ...]),
         ("out", out, str | Path),
         ("mapping", mapping, MapOptions),
-        ("poisson", options, PoissonOptions),
+        ("poisson", statement, PoissonOptions),
         ("workers", workers, WorkerOptions),
         ("progress", progress, Callable | None),
     ):
         check_kind(name, value, kind)
-    pipeline.checked(mapping, options)
+    pipeline.checked(mapping, statement)
     if out == "":
         raise InputError("out is empty: name a folder")
     corners = None if mapping.corners is None else Path(mapping.corners).absolute()
     common = replace(mapping, corners=corners, resume=True)
     entries = entries_of([str(surface) for surface in surfaces], Path(out))
     demand_one(entries)
-    tasks = [Task(entry.name, entry.mesh, entry.folder, common, options, vector) for entry in entries]
+    tasks = [Task(entry.name, entry.mesh, entry.folder, common, statement, vector) for entry in entries]
     return run_tasks(Path(out), tasks, workers, force=force, progress=progress)
 
 
@@ -151,7 +151,7 @@ def _found(task: Task, force: bool) -> Row:
         if force:
             forget(task.folder)
             return row
-        finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.options, vector=task.vector)
+        finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.statement, vector=task.vector)
     except expected_errors() as error:
         refused = row.ended(Ended("refused", one_line(error)))
         log.warning("%s", refused.told())

@@ -139,12 +139,14 @@ def run_elasticity(
     return _run(mesh, output, mapping, elasticity)
 
 
-def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: ProblemOptions | None = None) -> int:
+def _run(mesh: str, output: OutputOptions, mapping: MapOptions, statement: ProblemOptions | None = None) -> int:
     """Parameterize a surface, solve a problem on the volume, print the verdict and return the exit code."""
     from ..workflow import pipeline
 
     with shown_progress(output.quiet) as progress:
-        outcome = pipeline.parameterize_to(mesh, mapping=mapping, problem=problem, progress=progress, **output.folder)
+        outcome = pipeline.parameterize_to(
+            mesh, mapping=mapping, statement=statement, progress=progress, **output.folder
+        )
     return _finish(outcome, output)
 
 
@@ -217,13 +219,13 @@ def solve_elasticity(
     return _solve(volume, output, elasticity, mpi)
 
 
-def _solve(volume: Path, output: OutputOptions, problem: ProblemOptions, mpi: bool, device: str = "cpu") -> int:
+def _solve(volume: Path, output: OutputOptions, statement: ProblemOptions, mpi: bool, device: str = "cpu") -> int:
     """Solve a problem on a volume, print the verdict and return the exit code."""
     from ..workflow import pipeline, processes
 
     with shown_progress(output.quiet):
         comm = processes.all_processes() if mpi else None
-        outcome = pipeline.solve_to(volume, problem=problem, device=device, comm=comm, **output.folder)
+        outcome = pipeline.solve_to(volume, statement=statement, device=device, comm=comm, **output.folder)
     return DONE if outcome is None else _finish(outcome, output)
 
 
@@ -251,7 +253,7 @@ def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
     from .answer import exit_code
 
     with shown_progress(output.quiet):
-        outcome, table = pipeline.study_to(volume, options=study, **output.folder)
+        outcome, table = pipeline.study_to(volume, study_options=study, **output.folder)
     _print(reports.as_json(outcome.report["study"]) if output.as_json else f"{table}\nresults in {outcome.folder}")
     return exit_code(outcome.report)
 
@@ -268,7 +270,7 @@ def find_modes(volume: Volume, /, *, output: OutputOptions = OUTPUT, modes: Mode
     from .answer import exit_code
 
     with shown_progress(output.quiet):
-        outcome, table = pipeline.modes_to(volume, options=modes, **output.folder)
+        outcome, table = pipeline.modes_to(volume, modes_options=modes, **output.folder)
     verdict = reports.verdict(outcome.report, outcome.folder)
     _print(reports.as_json(verdict) if output.as_json else f"{table}\nresults in {outcome.folder}")
     return exit_code(outcome.report)
@@ -419,8 +421,8 @@ def serve_page(
     """
     from ..live.app import serve
 
-    options = MapOptions(**vars(mapping))
-    serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=options, poisson=poisson)
+    surfaces = MapOptions(**vars(mapping))
+    serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=surfaces, poisson=poisson)
 
 
 def main(argv: list[str]) -> int:

@@ -212,7 +212,7 @@ def assemble(
     an answer to show if not to trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
     Raises ValueError where det J is zero at a point, naming it.
     """
-    rule = rule or operator_rule(space)
+    rule = rule or operator_rule(space, "spline")
     parts = space, rule, threads
     basis, part = MatrixFree(*parts), component or 0
     load = np.zeros((form.components, *space.shape))
