@@ -10,7 +10,8 @@ from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume, demand_volume
 
 from .discretization.quadrature import gauss_rule, map_planes
-from .discretization.space import TrialSpace, agreed, trial_space
+from .discretization.slab import shared_space
+from .discretization.space import TrialSpace, trial_space
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
@@ -148,9 +149,7 @@ def prepared(
     if any(part.stop <= part.start for part in space.free):
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
     _warm_up(volume.degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
-    if options.comm is not None:
-        space = space.slab(options.comm)
-    return placed, space
+    return placed, shared_space(space, options.comm)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
@@ -160,15 +159,13 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
     problem.demand_held()
-    problem, space = problem.on(volume), trial_space(volume, dirichlet=problem.dirichlet)
-    if comm is not None:
-        space = space.slab(comm)
+    problem, space = problem.on(volume), shared_space(trial_space(volume, dirichlet=problem.dirichlet), comm)
     _, load, _ = assemble_data(volume, problem, space, SolveOptions(threads=1, quadrature="gauss"))
     if problem.fixes_nothing and not problem.form.has_reaction:
         space.add(load)
         balanced(load[:, *space.window], space)
     if problem.exact is not None:
-        with agreed(space.comm):
+        with space.agreed():
             for _, _, x in map_planes(volume, gauss_rule(space)):
                 problem.exact_at(x)
 

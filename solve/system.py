@@ -21,7 +21,7 @@ from .discretization.estimate import error_estimate
 from .discretization.on_regions import demand_area, demand_supports, weak_faces
 from .discretization.operator import FormOperator, Operator, assemble, with_mass
 from .discretization.quadrature import rule_of
-from .discretization.space import TrialSpace, agreed, embedded, longest_edge
+from .discretization.space import TrialSpace, embedded, longest_edge
 from .discretization.weak import WeakFace
 from .field import Points, SplineField
 from .forms.form import check_law
@@ -129,8 +129,7 @@ class System:
 
     def _spline(self, full: Array) -> SplineField:
         """Return the spline of coefficients (c, n_u, n_v, n_w), those of all processes together."""
-        own = self.space.owned[self.space.comm.rank]
-        whole = self.space.gather(full[:, : own.stop - own.start])
+        whole = self.space.gather(full[:, self.space.own])
         coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
 
@@ -160,7 +159,7 @@ class System:
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
-        for notice in solution.report.notices if self.space.comm.rank == 0 else ():
+        for notice in solution.report.notices if self.space.rank == 0 else ():
             log.warning("%s", notice)
         if options.strict and not solution.report.converged:
             raise ConvergenceError(solution.report.notices[-1], solution)
@@ -296,7 +295,7 @@ def assemble_data(
         component=0 if form.components == 1 and form.symmetric and not couples else None,
         threads=options.thread_count,
     )
-    with agreed(space.comm):
+    with space.agreed():
         if problem.conditions:
             terms: dict[str, Any] = _on_regions(volume, problem, space, load)
         else:

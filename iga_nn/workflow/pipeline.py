@@ -18,7 +18,7 @@ from parameterize.files import save_text
 from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import BSplineVolume
 from solve import ConvergenceRow, Solution, check_device, check_problem, convergence, modes
-from solve.discretization.space import agreed
+from solve.discretization.slab import agreed
 from solve.forms.problem import BoundaryValueProblem
 
 from ..errors import InputError, input_errors

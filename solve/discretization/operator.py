@@ -23,7 +23,7 @@ from ..forms.jets import PAIRS
 from ..forms.mass import WithMass
 from . import kernels
 from .quadrature import GaussRule, geometry_planes, operator_rule
-from .space import TrialSpace, agreed
+from .space import TrialSpace
 
 
 class FaceTerm(Protocol):
@@ -233,7 +233,7 @@ def assemble(
                 for density, total in zip(source(x), load, strict=True):
                     add_integrals(basis.tables, q, density * size, total)
 
-    with agreed(space.comm):
+    with space.agreed():
         if component is not None:
             factors = np.empty((rule.shape[0], 6 + form.has_reaction, *rule.plane_shape))
         elif form.constant:
