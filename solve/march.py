@@ -14,20 +14,21 @@ from parameterize.arrays import Array
 from parameterize.display import Brief, above
 from parameterize.spline.volume import BSplineVolume
 
+from .assembly import assemble_data
 from .diagnostics import ConvergenceError
 from .discretization.operator import Operator, assemble
 from .discretization.projection import projected
 from .discretization.quadrature import GaussRule
 from .discretization.space import TrialSpace, embedded
 from .field import SplineField
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import Data, parse
 from .forms.frame import UnitFrame
 from .forms.mass import Mass
-from .forms.problem import BoundaryValueProblem
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
 from .options import IterationOptions, SolveOptions
 from .solver import prepared
-from .system import System, assemble_data, build, one_blas_thread
+from .system import System, build, one_blas_thread
 
 SCHEMES = ("bdf2", "trapezoidal")
 EULER = 1.0  # the factors of capacity / dt that a step adds to the matrix

@@ -17,7 +17,7 @@ from parameterize.spline.volume import BSplineVolume
 
 from .diagnostics import ConvergenceError
 from .field import SplineField
-from .forms.problem import BoundaryValueProblem
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .linear.krylov import conjugate_gradients
 from .options import SolveOptions
 from .solver import discretized

@@ -11,19 +11,21 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
+from .assembly import assemble_data
 from .diagnostics import ConvergenceError, judge
 from .discretization.errors import error_norms
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .field import SplineField
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
-from .forms.problem import BoundaryValueProblem, Problem
+from .forms.problem import Problem
 from .linear.krylov import INDEFINITE, conjugate_gradients, generalized_residuals
 from .linear.preconditioner import fast_diagonalization
 from .options import SolveOptions
 from .solution import Solution, SolveReport
 from .solver import prepared
-from .system import assemble_data, one_blas_thread
+from .system import one_blas_thread
 
 ENOUGH = 0.8  # share of the forces along a step that may be left at its end
 SHORTEST = 2.0**-12  # of a step

@@ -9,8 +9,8 @@ from typing import Any, Self
 from parameterize.threads import default_threads
 
 from .field import SplineField
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.poisson import Poisson
-from .forms.problem import BoundaryValueProblem
 
 DEVICES = ("cpu", "cuda")
 

@@ -15,8 +15,8 @@ from .discretization.operator import MatrixFree
 from .discretization.space import TrialSpace
 from .discretization.weak import WeakFace
 from .field import Points
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.condition import WITH_FACTOR
-from .forms.problem import BoundaryValueProblem
 
 
 @dataclass(frozen=True)

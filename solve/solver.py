@@ -9,15 +9,17 @@ from parameterize.compilation import compilation_told
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume, demand_volume
 
+from .assembly import assemble_data, balanced
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.slab import shared_space
 from .discretization.space import TrialSpace, trial_space
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
-from .forms.problem import BoundaryValueProblem, Problem
+from .forms.problem import Problem
 from .options import SolveOptions, check_device
 from .solution import Solution
-from .system import System, assemble_data, balanced, build
+from .system import System, build
 
 
 def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution:

@@ -10,7 +10,7 @@ from parameterize.display import Shown
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
-from .forms.problem import BoundaryValueProblem
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .options import SolveOptions
 from .solution import SolveReport
 from .solver import solve_with

@@ -1,4 +1,4 @@
-"""Defines the commands of `iga-nn` and their arguments; nothing is computed here.
+"""Defines the commands of `iga-nn`; nothing is computed here.
 
 A command imports what it runs when it runs: `--help` and `--version` load neither numpy nor the packages below.
 """
@@ -6,20 +6,15 @@ A command imports what it runs when it runs: `--help` and `--version` load neith
 from __future__ import annotations
 
 import os
-import re
 import sys
-from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, fields
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter, Token, UnusedCliTokensError, convert
+from cyclopts import App, CycloptsError, Parameter
 
-from ..errors import InputError, expected_errors, input_errors, one_line
+from ..errors import InputError, expected_errors, input_errors
 from ..options import (
-    PROBLEMS,
     ElasticityOptions,
     ElasticityStudyOptions,
     MapOptions,
@@ -32,28 +27,39 @@ from ..options import (
 )
 from ..version import __version__
 from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED, NOT_SOLVED
+from .arguments import (
+    ELASTICITY,
+    ELASTICITY_STUDY,
+    MAP,
+    MODES,
+    OUTPUT,
+    PAGE,
+    POISSON,
+    STUDY,
+    SURFACE,
+    WORKERS,
+    Json,
+    Mesh,
+    Mpi,
+    ObjFile,
+    OutputOptions,
+    Overwrite,
+    PageOptions,
+    Volume,
+    converted,
+)
 from .progress import shown_batch, shown_progress
+from .refusal import refusal
 
 if TYPE_CHECKING:
     from ..workflow.output_folder import Outcome
-
-# A suggestion that begins with another letter than the unknown option: --force, for --source, replaces results.
-_FAR_HINT = re.compile(r"(Unknown option: \W*(\w).*?) Did you mean --(?!\2).*")
-
-
-def _converted(kind: Any, tokens: Sequence[Token]) -> Any:
-    """Convert an argument as cyclopts does, but refuse a fraction for a whole number: it would be rounded."""
-    if int in (kind, *get_args(kind)) and (wrong := [token for token in tokens if "." in token.value]):
-        raise CycloptsError(msg=f"{wrong[0].keyword}: must be a whole number, got {wrong[0].value}")
-    return convert(kind, tokens)
-
 
 app = App(
     name="iga-nn",
     help="From a closed surface mesh to a solved PDE on a certified trivariate B-spline.",
     version=f"iga-nn {__version__}",
     suppress_keyboard_interrupt=False,
-    default_parameter=Parameter(negative=(), consume_multiple=1, converter=_converted),
+    default_parameter=Parameter(negative=(), consume_multiple=1, converter=converted),
 )
 run_app = App(name="run", help="Parameterize a surface and solve a problem on its volume.")
 solve_app = App(name="solve", help="Solve a problem on a volume.")
@@ -62,57 +68,6 @@ study_app = App(
 )
 for group in (run_app, solve_app, study_app):
     app.command(group)
-
-
-Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
-Volume = Annotated[
-    Path, Parameter(help="volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.")
-]
-ObjFile = Annotated[Path | None, Parameter(help="file to write; NAME.obj in the current folder by default.")]
-Overwrite = Annotated[bool, Parameter(help="replace that file where it has other content.")]
-Mpi = Annotated[
-    bool, Parameter(help="share the solve among the processes of `mpiexec -n 4 iga-nn solve ...`; docs/mpi.md.")
-]
-Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.")]
-
-
-@dataclass(frozen=True)
-class OutputOptions:
-    """Say where the results go, and what is printed.
-
-    Args:
-        out: output folder; the input's stem in the current folder by default.
-        force: replace a finished result in that folder.
-        vector: write plots of curves (loss history, errors over the mesh size) as PDF, too.
-        quiet: show no progress.
-    """
-
-    out: str | None = None
-    force: bool = False
-    vector: bool = False
-    quiet: bool = False
-    as_json: Json = False
-
-    @property
-    def folder(self) -> dict[str, Any]:
-        """Return what the pipeline takes of these options."""
-        return {"out": self.out, "force": self.force, "vector": self.vector}
-
-
-@dataclass(frozen=True)
-class PageOptions(MapOptions):
-    """Say how surfaces of the live page become volumes: what belongs to one surface is no option there."""
-
-    corners: Annotated[Path | None, Parameter(parse=False)] = None
-    resume: Annotated[bool, Parameter(parse=False)] = False
-
-
-for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions, ModesOptions):
-    Parameter(name="*")(kind)  # each field of these options, and of those derived from them, is a flag
-
-OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
-WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
-PAGE, MODES = PageOptions(), ModesOptions()
 
 
 @run_app.command(name="poisson")
@@ -436,18 +391,9 @@ def main(argv: list[str]) -> int:
     except expected_errors() + (CycloptsError,) as error:
         from solve import ConvergenceError
 
-        print(f"iga-nn: {_refusal(error, argv)}", file=sys.stderr)
+        print(f"iga-nn: {refusal(error, argv)}", file=sys.stderr)
         return NOT_SOLVED if isinstance(error, ConvergenceError) else BAD_INPUT
     return code if isinstance(code, int) else DONE  # a command that only writes a file returns nothing
-
-
-def _refusal(error: Exception, argv: list[str]) -> str:
-    """Return what is wrong and what to do, in one line."""
-    if isinstance(error, UnusedCliTokensError):
-        return f"arguments that mean nothing here: {' '.join(error.unused_tokens or ())}; --help lists what there is"
-    if isinstance(error, CycloptsError):
-        return _FAR_HINT.sub(r"\1 --help lists the options.", one_line(error)) + _minus_hint(argv)
-    return one_line(error)
 
 
 def _processes(argv: list[str]) -> AbstractContextManager[None]:
@@ -457,15 +403,6 @@ def _processes(argv: list[str]) -> AbstractContextManager[None]:
     from ..workflow import processes
 
     return processes.together(processes.all_processes())
-
-
-def _minus_hint(argv: list[str]) -> str:
-    """Return the remedy where a formula was taken for an option; those declared as `Formula` take one."""
-    formulas = {field.name for kind in PROBLEMS.values() for field in fields(kind) if "Formula" in str(field.type)}
-    for option, value in pairwise(argv):
-        if option.removeprefix("--").replace("-", "_") in formulas and value.startswith("-"):
-            return f" A formula that starts with a minus is written {option}={value}"
-    return ""
 
 
 def _finish(outcome: Outcome, output: OutputOptions) -> int:

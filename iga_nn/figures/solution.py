@@ -11,7 +11,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 from solve import Solution
 from solve.field import SplineField
-from solve.forms.problem import BoundaryValueProblem
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..levels import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units

@@ -20,7 +20,7 @@ from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
 from solve.field import SplineField
-from solve.forms.problem import BoundaryValueProblem
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, did_you_mean, input_errors
 from ..kinds import check_kind

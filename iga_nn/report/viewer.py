@@ -21,8 +21,8 @@ from parameterize.arrays import Array, Knots
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import AXES, BSplineVolume
 from solve import SplineField
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
-from solve.forms.problem import BoundaryValueProblem
 
 from ..figures import evaluate
 from ..figures.cutaway import best_cut, patches_of

@@ -24,7 +24,7 @@ from parameterize.surface.surface import Surface
 from solve.discretization.errors import POINTS
 from solve.discretization.quadrature import rule_of
 from solve.discretization.space import trial_space
-from solve.forms.problem import BoundaryValueProblem
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.options import SolveOptions
 
 from ..rounding import rounded

@@ -21,8 +21,8 @@ from parameterize.surface.geometry import vertex_normals
 from parameterize.surface.surface import Surface
 from solve import ExpressionError
 from solve.diagnostics import empty_formulas
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
-from solve.forms.problem import BoundaryValueProblem
 
 from ..errors import InputError, input_errors
 from ..models import resolve

@@ -19,7 +19,7 @@ from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import BSplineVolume
 from solve import ConvergenceRow, Solution, check_device, check_problem, convergence, modes
 from solve.discretization.slab import agreed
-from solve.forms.problem import BoundaryValueProblem
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume

@@ -9,8 +9,8 @@ import numpy as np
 from parameterize.arrays import Array, IntArray
 from parameterize.surface.geometry import doubled_areas
 from parameterize.surface.surface import Surface
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
-from solve.forms.problem import BoundaryValueProblem
 from solve.forms.region import Region
 
 from ..errors import InputError, input_errors

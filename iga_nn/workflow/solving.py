@@ -12,9 +12,9 @@ import numpy as np
 
 from parameterize.spline.volume import BSplineVolume
 from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates, solve_with
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.condition import WITH_FACTOR, Condition
 from solve.forms.frame import UnitFrame
-from solve.forms.problem import BoundaryValueProblem
 
 from ..errors import InputError, input_errors, one_line
 from ..options import NO_UNITS, ProblemOptions, Units

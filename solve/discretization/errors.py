@@ -9,7 +9,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
-from ..forms.problem import BoundaryValueProblem
+from ..forms.boundary_value_problem import BoundaryValueProblem
 from . import kernels
 from .quadrature import gauss_rule, geometry_planes
 from .space import TrialSpace

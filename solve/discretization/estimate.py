@@ -15,10 +15,10 @@ from parameterize.spline.bspline import apply_along, collocation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from ..field import Points
+from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.form import strong_form
 from ..forms.frame import face_geometry
 from ..forms.jets import PAIRS, SYMMETRIC, Jet
-from ..forms.problem import BoundaryValueProblem
 from .boundary import has_face
 from .errors import Errors, ratio
 from .quadrature import gauss_rule
