@@ -13,7 +13,7 @@ from iga_nn.live.queue import Jobs, safe_name
 from iga_nn.live.worker import Step
 from iga_nn.models import resolve
 from iga_nn.options import MapOptions, PoissonOptions
-from iga_nn.workflow.watched import Ended
+from iga_nn.workflow.worker_run import Ended
 from parameterize.progress import Progress
 
 AT = Progress("cube", 3, 10, 0.5, 0, 7.0)

@@ -16,7 +16,7 @@ from distributed import CancelledError, Client, Future, KilledWorker, LocalClust
 
 from ..errors import InputError, one_line
 from ..options import WorkerOptions
-from ..workflow.watched import Ended
+from ..workflow.worker_run import Ended
 from .task import LESS_MEMORY, Task, Work, compute, stop
 
 log = logging.getLogger(__name__)

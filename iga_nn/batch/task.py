@@ -10,7 +10,7 @@ from parameterize.progress import Progress
 from ..options import MapOptions, ProblemOptions
 from ..workflow import pipeline
 from ..workflow.output_folder import Outcome
-from ..workflow.watched import Ended, ended, logged, told
+from ..workflow.worker_run import Ended, ended, logged, throttled
 from .surfaces import Entry
 
 LESS_MEMORY = "give workers more --memory-limit, or lower --control-points or --refine"
@@ -47,7 +47,7 @@ def compute(task: Task, number: int, batch: str) -> Ended:
         worker.log_event(batch, {"number": number, "stage": now.stage, "share": share})
 
     def run() -> Outcome:
-        progress = told(tell, lambda: batch in _stopped)
+        progress = throttled(tell, lambda: batch in _stopped)
         given: dict[str, Any] = {"mapping": task.mapping, "statement": task.statement, "vector": task.vector}
         return pipeline.parameterize_to(task.mesh, task.folder, progress=progress, **given)
 

@@ -121,7 +121,7 @@ def run_many(
     Args:
         surfaces: files, folders, patterns in quotes, names of samples and models, or g1 for the set G1.
     """
-    from ..batch.run import run_batch
+    from ..batch.run_batch import run_batch
     from ..report import document as reports
     from .answer import batch_exit_code
 
@@ -176,10 +176,10 @@ def solve_elasticity(
 
 def _solve(volume: Path, output: OutputOptions, statement: ProblemOptions, mpi: bool, device: str = "cpu") -> int:
     """Solve a problem on a volume, print the verdict and return the exit code."""
-    from ..workflow import pipeline, processes
+    from ..workflow import mpi_job, pipeline
 
     with shown_progress(output.quiet):
-        comm = processes.all_processes() if mpi else None
+        comm = mpi_job.all_processes() if mpi else None
         outcome = pipeline.solve_to(volume, statement=statement, device=device, comm=comm, **output.folder)
     return DONE if outcome is None else _finish(outcome, output)
 
@@ -400,9 +400,9 @@ def _processes(argv: list[str]) -> AbstractContextManager[None]:
     """Return the context in which the processes of an MPI job fail together, and one of them prints."""
     if "--mpi" not in argv:
         return nullcontext()
-    from ..workflow import processes
+    from ..workflow import mpi_job
 
-    return processes.together(processes.all_processes())
+    return mpi_job.together(mpi_job.all_processes())
 
 
 def _finish(outcome: Outcome, output: OutputOptions) -> int:

@@ -13,7 +13,7 @@ from solve import Solution
 from solve.field import SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
-from ..levels import EXACT_ERRORS, TITLES
+from ..level_table import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units
 from .cutaway import best_cut, without_octant
 from .evaluate import SECTIONS

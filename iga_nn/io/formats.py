@@ -23,10 +23,10 @@ from solve.field import SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, did_you_mean, input_errors
-from ..kinds import check_kind
 from ..new_file import check_new
 from ..options import PROBLEMS
 from ..report import document as reports
+from ..type_check import check_type
 from . import splinepy, view, vtk
 from .splinepy_gate import CHECKS, kind_of
 
@@ -95,7 +95,7 @@ def load_volume(path: str | Path) -> BSplineVolume:
     >>> iga_nn.load_volume("volume.npz").degrees
     (3, 3, 3)
     """
-    check_kind("path", path, str | Path)
+    check_type("path", path, str | Path)
     if path == "":
         raise InputError("no volume is named: give a volume.npz, or a file of another program")
     source = Path(path)
@@ -156,7 +156,7 @@ def export(
     'seen.vtu'
     """
     for name, value, kind in (("volume", volume, str | Path), ("to", to, str), ("out", out, str | Path | None)):
-        check_kind(name, value, kind)
+        check_type(name, value, kind)
     if to != "view" and (samples is not None or quantity):
         raise InputError(f"format {to!r}: samples and quantities are for --to view")
     if samples is not None and samples < 1:

@@ -21,7 +21,7 @@ from parameterize.surface.surface import MeshError, Surface
 from ..errors import one_line
 from ..options import ProblemOptions
 from ..workflow.output_folder import default_folder, has_checkpoint
-from ..workflow.watched import Ended
+from ..workflow.worker_run import Ended
 from .course import Course
 from .worker import Message, Step
 

@@ -21,7 +21,7 @@ from parameterize.progress import Progress
 from ..options import MapOptions, ProblemOptions
 from ..workflow import pipeline
 from ..workflow.output_folder import Outcome
-from ..workflow.watched import Ended, ended, logged, told
+from ..workflow.worker_run import Ended, ended, logged, throttled
 
 GRACE = 3.0  # seconds a job has to stop by itself, leaving a checkpoint
 
@@ -101,7 +101,9 @@ def _work(
     def work() -> Outcome | None:
         if mapping is None:
             return pipeline.solve_to(name, statement=statement, force=True)  # over what a stopped solve left
-        return pipeline.parameterize_to(name, mapping=mapping, statement=statement, progress=told(tell, halt.is_set))
+        return pipeline.parameterize_to(
+            name, mapping=mapping, statement=statement, progress=throttled(tell, halt.is_set)
+        )
 
     with logged(_Lines(sender), logging.INFO):
         sender.send(ended(work, "lower --control-points or --refine"))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import InputError, input_errors
-from ..kinds import Checked
+from ..type_check import Checked
 from .problem import ElasticityOptions, Formula, PoissonOptions
 from .space import check_level, check_space
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from parameterize.config import MAX_CONTROL_POINTS
 
 from ..errors import InputError, input_errors
-from ..kinds import Checked
+from ..type_check import Checked
 
 if TYPE_CHECKING:
     from parameterize.config import Config

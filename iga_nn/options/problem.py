@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from ..errors import InputError, input_errors
-from ..kinds import Checked
+from ..type_check import Checked
 from . import texts
 from .space import check_space
 

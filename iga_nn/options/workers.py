@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 
 from ..errors import InputError
-from ..kinds import Checked
+from ..type_check import Checked
 
 MAX_WORKERS = 256  # on one machine
 _LOCAL = ("workers", "threads_per_worker", "memory_limit")  # mean nothing for the workers of another scheduler

@@ -23,8 +23,7 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
-from ..kinds import check_kind
-from ..levels import as_csv, as_table, rows_of
+from ..level_table import as_csv, as_table, rows_of
 from ..options import (
     NO_UNITS,
     PROBLEMS,
@@ -38,10 +37,11 @@ from ..options import (
 )
 from ..report import document as reports
 from ..report import html
+from ..type_check import check_type
+from .command_line import command_line, gives_the_same
 from .cost_estimate import tell_memory
 from .mapping import map_surface
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
-from .repeat import command_line, gives_the_same
 from .solving import (
     described,
     each_level,
@@ -111,11 +111,11 @@ def run(
     >>> [level["dofs"] for level in outcome.report["poisson"]["levels"]], (outcome.folder / "report.html").exists()
     ([216], True)
     """
-    check_kind("problem", problem, str)
+    check_type("problem", problem, str)
     if problem not in PROBLEMS:
         raise InputError(f"problem {problem!r}: choose one of {', '.join(PROBLEMS)}")
     mapping, statement = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
-    check_kind(problem, statement, PROBLEMS[problem])
+    check_type(problem, statement, PROBLEMS[problem])
     if others := [name for name, value in given.items() if value is not None]:
         raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
     how: dict[str, Any] = {"force": force, "vector": vector, "progress": progress}
@@ -134,10 +134,10 @@ def parameterize_to(
 ) -> Outcome:
     """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does."""
     mapping = mapping or MapOptions()
-    check_kind("mapping", mapping, MapOptions)
-    check_kind("mesh", mesh, str | Path)
-    check_kind("out", out, str | Path | None)
-    check_kind("progress", progress, Callable | None)
+    check_type("mapping", mapping, MapOptions)
+    check_type("mesh", mesh, str | Path)
+    check_type("out", out, str | Path | None)
+    check_type("progress", progress, Callable | None)
     problem, unknowns = (None, 0) if statement is None else checked(mapping, statement)
     command = _command(mesh, out, mapping, statement)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
@@ -194,7 +194,7 @@ def solve_to(
     call this and share the solve; the first one writes, the others get None. Takes the other options of `run`, and
     raises as it does.
     """
-    check_kind("volume", volume, str | Path)
+    check_type("volume", volume, str | Path)
     statement, path = statement or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
@@ -252,7 +252,7 @@ def study_to(
 
     Takes the other options of `run`, and raises as it does.
     """
-    check_kind("volume", volume, str | Path)
+    check_type("volume", volume, str | Path)
     study_options, path = study_options or StudyOptions(), Path(volume)
     problem, levels = study_options.problem(), study_options.levels()
     loaded = load_volume(path)
@@ -289,7 +289,7 @@ def modes_to(
 
     Takes the other options of `run`, and raises as it does, and ConvergenceError.
     """
-    check_kind("volume", volume, str | Path)
+    check_type("volume", volume, str | Path)
     modes_options, path = modes_options or ModesOptions(), Path(volume)
     body, loaded = with_part(modes_options.problem(), path), load_volume(path)
     check_size(loaded, modes_options.refine, modes_options.degree, body.form.components)

@@ -10,14 +10,14 @@ from threading import RLock
 from parameterize.files import save_text
 
 from ..errors import InputError, expected_errors, one_line
-from ..kinds import check_kind
 from ..options import MapOptions, PoissonOptions, WorkerOptions
 from ..report import document as reports
 from ..rounding import rounded
+from ..type_check import check_type
 from ..workflow import pipeline
 from ..workflow.cost_estimate import warn_of_memory
 from ..workflow.output_folder import forget, locked, new_folder, writable
-from ..workflow.watched import Ended
+from ..workflow.worker_run import Ended
 from .surfaces import demand_one, entries_of
 from .table import Batch, Row, page
 from .task import Task, Work, compute
@@ -110,7 +110,7 @@ def run_batch(
         ("workers", workers, WorkerOptions),
         ("progress", progress, Callable | None),
     ):
-        check_kind(name, value, kind)
+        check_type(name, value, kind)
     pipeline.checked(mapping, statement)
     if out == "":
         raise InputError("out is empty: name a folder")
@@ -154,7 +154,7 @@ def _found(task: Task, force: bool) -> Row:
         finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.statement, vector=task.vector)
     except expected_errors() as error:
         refused = row.ended(Ended("refused", one_line(error)))
-        log.warning("%s", refused.told())
+        log.warning("%s", refused.as_line())
         return refused
     return row if finished is None else row.ended(Ended("done", report=finished.report))
 
@@ -198,7 +198,7 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
                 row = batch.rows[waiting[at]].ended(how)
                 batch = batch.with_row(waiting[at], row)
                 _write(batch)
-                log.log(logging.INFO if row.state == "certified" else logging.WARNING, "%s", row.told())
+                log.log(logging.INFO if row.state == "certified" else logging.WARNING, "%s", row.as_line())
                 show()
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {batch.summary}; the same command goes on") from None
