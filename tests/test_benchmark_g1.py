@@ -4,7 +4,6 @@ import csv
 import io
 import os
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import dask
@@ -185,8 +184,10 @@ def test_what_went_on_from_a_checkpoint_has_no_time(formula):
 
 
 def test_a_solve_that_does_not_converge_is_a_status(formula, monkeypatch):
-    stopped = partial(solve.solve_problem, max_iterations=1)
-    monkeypatch.setattr("iga_nn.workflow.solving.solve_problem", stopped)
+    def stopped(volume, problem, options):
+        return solve.solve_with(volume, problem, replace(options, max_iterations=1))
+
+    monkeypatch.setattr("iga_nn.workflow.solving.solve_with", stopped)
     assert g1.main(formula) == 1
     row = table(Path("out"))["duck"]
     assert "did not converge" in row["status"] and row["iterations_refine_0"] == "1"
