@@ -65,7 +65,7 @@ class Task:
     def sphere(self) -> Layout:
         """The surface at volume 1, laid on the sphere."""
         surface = self.surface
-        return lay_on_sphere(surface.unit_vertices, surface.faces, self.config.layout, self.report["progress"])
+        return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,8 +176,7 @@ def _extended(task: Task, extension: ExtensionConfig, checkpoints: Checkpoints) 
 
 
 def _on_cube(task: Task, turn: int) -> Layout:
-    config = task.config
-    return surface_on_cube(task.sphere, task.own, config.spline, config.layout, seed=task.seed, turn=turn)
+    return surface_on_cube(task.sphere, task.own, task.config.spline, seed=task.seed, turn=turn)
 
 
 def _optimized(
@@ -202,7 +201,7 @@ def _fault(found: Optimized) -> str:
 def _surface_fit(layout: Layout, spline: SplineConfig, task: Task) -> SurfaceFit:
     """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
     return SurfaceFit(
-        SlidingParameters(coarse_knots(spline), spline.degree, layout.places, layout.faces, task.config.layout),
+        SlidingParameters(coarse_knots(spline), spline.degree, layout.places, layout.faces),
         layout.vertices,
         vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
         vertex_weights(layout.vertices, layout.faces, task.own),
@@ -217,11 +216,11 @@ def _layout(mapped: Array, corners: IntArray | None, task: Task) -> Layout:
     """
     vertices, faces = task.mesh
     nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
-    untangled = untangle(nearest, faces, task.config.layout)
+    untangled = untangle(nearest, faces)
     if flipped(untangled, faces).mean() > task.config.spline.few_flips:
         try:
             chosen = choose_corners(mapped) if corners is None else corners
-            return lay_out(mapped, vertices, faces, chosen, task.config.layout)
+            return lay_out(mapped, vertices, faces, chosen)
         except PathError as error:
             _log.warning("the first layout has flipped triangles: %s", error)
     return Layout(vertices, faces, untangled)

@@ -203,48 +203,6 @@ class RefinementConfig:
 
 
 @dataclass(frozen=True)
-class LayoutConfig:
-    """How the surface is cut and laid out on the cube; a share is one of a mesh edge's length."""
-
-    path_snap: float = 0.1  # share: crossings nearer to a vertex than this take the vertex, so paths leave no slivers
-    stray: float = 20.0  # a path costs so many times more at the distance `stray_cell` from its cube edge
-    stray_cell: float = 0.05
-    orders: int = 24  # in which the paths are traced, at most
-    sweeps: int = 600  # of relaxation, at most
-    patience: int = 60  # sweeps after which one more ring of neighbours may move
-    pushes: int = 100  # sweeps that push the corners of flipped triangles alone, at most
-    unflipped: float = 1e-2  # share of the median triangle that one so pushed takes
-    held_rounds: int = 20  # in which points are held so that no further triangle flips, at most
-    same: float = 1e-7  # share: final cuts this close to a vertex take the vertex
-    nudge: float = 1e-4  # by which vertices move where a mesh edge runs through a corner of the cube
-    nudges: int = 10  # at most
-    settle_steps: int = 8  # Gauss-Newton steps of the final cuts along their edges
-    settle_damping: float = 1e-3  # of these, against parallel directions
-    settle_margin: float = 1e-2  # share that a cut keeps from the ends of its edge
-    undo_rounds: int = 10  # in which such steps are undone at flipped triangles, at most
-    least_share: float = 0.25  # that the line which halves a surface keeps from the ends of the edges it divides
-    squeezed: float = 1e8  # energy of the first layout on the sphere (at rest some 50) above which others are tried
-    along: float = 10.0  # weight of edges that lead away from that line, in addition, in the first of the others
-    sharpness: tuple[int, ...] = (2, 4, 8, 16, 32, 64)  # in the next ones: the higher, the straighter edges count
-    one_way: tuple[int, ...] = (4, 16)  # likewise in the last ones, where edges count from their far end alone
-    sphere_steps: int = 300  # of Newton's method for the layout on the sphere, at most
-    usual_sphere_steps: int = 30  # of most surfaces: tells the time left
-    sphere_damping: float = 1e-8  # of these, as a share of the mean diagonal entry
-    sphere_gain: float = 1e-3  # the steps end once one lowers the energy by less than this share
-    turns: int = 200  # of the cube in that layout, drawn at random
-    finals: int = 5  # the best of them, which are turned further
-    turn_steps: int = 60  # of each of these, at most
-    turn_size: float = 0.1  # of the first of these steps, as an angle
-    other_turn: float = 0.3  # a turn that differs from a better one by a larger angle counts as another
-    edge_width: float = 0.15  # from the cube's edges, within which the surface should not be hollow
-    edge_pieces: int = 24  # of each cube edge: one that lies in a hollow is not made up for by ridges beside it
-    hollow: float = 1.0  # times its bend that such a piece counts in addition
-
-
-LAYOUT = LayoutConfig()
-
-
-@dataclass(frozen=True)
 class Config:
     """All options of `parameterize.parameterize`.
 
@@ -257,7 +215,6 @@ class Config:
     stages : tuple of StageConfig
     spline : SplineConfig
         Fit and optimisation, `control_points` a direction and `degree` among them.
-    layout : LayoutConfig
     growth : GrowthConfig
     stiff_growth : GrowthConfig
         Of the second growth.
@@ -283,7 +240,6 @@ class Config:
     train: TrainConfig
     stages: tuple[StageConfig, ...]
     spline: SplineConfig
-    layout: LayoutConfig = LAYOUT
     growth: GrowthConfig = GrowthConfig()
     stiff_growth: GrowthConfig = STIFF
     last_growth: GrowthConfig = LAST

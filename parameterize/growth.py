@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from .arrays import Knots
-from .config import GrowthConfig, LayoutConfig, SplineConfig
+from .config import GrowthConfig, SplineConfig
 from .cube.cube import project_radially, snap
 from .cube.cutting import cut_along_rays, subdivide_finely
 from .cube.flips import Layout
@@ -46,19 +46,17 @@ def stiffened(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
     return replace(spline, fairness=growth.stiffness * spline.fairness, least_floor=growth.least_floor)
 
 
-def surface_on_cube(
-    sphere: Layout, own: int, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
-) -> Layout:
+def surface_on_cube(sphere: Layout, own: int, spline: SplineConfig, *, seed: int, turn: int) -> Layout:
     """Lay a closed surface, laid on the sphere, on the cube without a flipped triangle, its long edges cut.
 
     own: how many vertices are the mesh's; these stay first. seed: draws how the cube may be turned; turn: 0 takes the
     best of these ways, 1 the next, ...
     """
-    rotation = best_turn(sphere, options, np.random.default_rng(seed), turn)
+    rotation = best_turn(sphere, np.random.default_rng(seed), turn)
     columns = np.hstack([sphere.vertices, sphere.places @ rotation.T])
     columns, faces = subdivide_finely(columns, sphere.faces, spline.longest_edge, own + spline.most_points)
     points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])
-    cut = cut_along_rays(places, faces, options.path_snap)
+    cut = cut_along_rays(places, faces)
     return Layout(cut.carry(points), cut.faces, snap(cut.carry(places)))
 
 

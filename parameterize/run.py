@@ -256,5 +256,5 @@ def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSpl
     points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
     volume = BSplineVolume((spline.degree,) * 3, places.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
-    boundary = boundary_map(volume, own, places.triangles, places.parameters, task.config.layout)
+    boundary = boundary_map(volume, own, places.triangles, places.parameters)
     return volume, replace(boundary, part_faces=surface.faces, groups=surface.groups)

@@ -8,7 +8,7 @@ from shapes import ball, is_closed
 from small_run import tiny_config
 
 from parameterize import parameterize
-from parameterize.config import LAYOUT, preset
+from parameterize.config import preset
 from parameterize.cube.flips import flipped
 from parameterize.cube.sphere import lay_on_sphere
 from parameterize.growth import first_cube, growing, surface_on_cube
@@ -29,8 +29,8 @@ def bent_rod(count=900):
 
 
 def on_cube(surface, spline, seed=0):
-    sphere = lay_on_sphere(surface.unit_vertices, surface.faces, LAYOUT)
-    return surface_on_cube(sphere, len(surface.vertices), spline, LAYOUT, seed=seed, turn=0)
+    sphere = lay_on_sphere(surface.unit_vertices, surface.faces)
+    return surface_on_cube(sphere, len(surface.vertices), spline, seed=seed, turn=0)
 
 
 def test_a_bent_rod_lies_on_the_cube_without_a_flip():

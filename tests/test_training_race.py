@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from shapes import ball
 from small_run import STEPS, small_surface, tiny_config
 
-from parameterize.config import LAYOUT, NetworkConfig
+from parameterize.config import NetworkConfig
 from parameterize.cube.flips import Layout
 from parameterize.cube.turning import best_turn, hollowness
 from parameterize.run import parameterize
@@ -66,8 +66,8 @@ def test_the_best_turn_makes_the_hollowness_least():
     points, faces = ball(600)
     points = points * (1.0 + 0.3 * np.sin(5.0 * points[:, :1]) * points[:, 1:2])
     layout = Layout(points, faces, points / np.linalg.norm(points, axis=1, keepdims=True))
-    turn = best_turn(layout, LAYOUT, np.random.default_rng(0))
-    assert hollowness(replace(layout, places=layout.places @ turn.T), LAYOUT) < hollowness(layout, LAYOUT)
+    turn = best_turn(layout, np.random.default_rng(0))
+    assert hollowness(replace(layout, places=layout.places @ turn.T)) < hollowness(layout)
 
 
 @pytest.mark.usefixtures("turns_are_promising")

@@ -13,6 +13,8 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..surface.geometry import edge_table
 
+NEAR_VERTEX = 0.1  # share of an edge's length: a crossing this close to a vertex takes the vertex and leaves no sliver
+_COARSENING = 1.25  # factor of the longest edge each time a mesh would get too many points
 _PLANES = [(a, b, sign) for a, b in ((0, 1), (0, 2), (1, 2)) for sign in (1.0, -1.0)]
 _PIECES = (
     np.array(  # of a triangle 0, 1, 2 with 0 to 3 new vertices: 3 on 0-1, 4 on 1-2, 5 on 2-0; of two, on 0-1 and 2-0
@@ -49,7 +51,7 @@ class CutMesh:
         return result
 
 
-def cut_along_rays(mapped: Array, faces: IntArray, snap: float) -> CutMesh:
+def cut_along_rays(mapped: Array, faces: IntArray, snap: float = NEAR_VERTEX) -> CutMesh:
     """Split the mesh (mapped vertices (n, 3), faces (m, 3)) along the six planes of the cube's edges.
 
     A crossing closer than `snap` (share of the edge's length) to an end takes that vertex instead of a new one.
@@ -98,7 +100,7 @@ def subdivide_finely(vertices: Array, faces: IntArray, longest: float, most: int
         found = subdivide_long_edges(vertices, faces, longest, max(most, len(vertices)))
         if found is not None:
             return found
-        longest *= 1.25
+        longest *= _COARSENING
 
 
 def _crossings(

@@ -15,12 +15,14 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
 
 from ..arrays import Array, IntArray, Mask
-from ..config import LAYOUT, LayoutConfig
 from ..surface.geometry import connected, directed_edges, edge_table, edge_triangles
 from .cube import CORNERS, EDGES, axis_and_side, face_number, project_radially, tangent_axes
 from .cutting import CutMesh, cut_along_rays, split_edges
 from .flips import Layout
 
+_STRAY = 20.0  # extra cost of a path, relative to its length, at the distance _STRAY_DISTANCE from its cube edge
+_STRAY_DISTANCE = 0.05
+_ORDERS = 24  # orders in which the twelve paths are traced before the surface is given up: twice one for each path
 _FLAT = 1e-12  # area of a triangle on the square that counts as turned over
 _TINY = 1e-12
 
@@ -51,15 +53,15 @@ def choose_corners(mapped: Array) -> IntArray:
     return candidates[rows[np.argsort(columns)]]
 
 
-def cut_surface(mapped: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig = LAYOUT) -> CubeSurface:
+def cut_surface(mapped: Array, faces: IntArray, corners: IntArray) -> CubeSurface:
     """Cut the mapped surface (n, 3), close to the cube's boundary, along paths between its eight corners.
 
     Raises PathError where the paths do not bound six discs, which happens only far from a cube, or where the corners
     come in the order of a mirrored cube.
     """
-    cut = cut_along_rays(mapped, faces, layout.path_snap)
+    cut = cut_along_rays(mapped, faces)
     position = cut.carry(mapped)
-    paths = _trace_paths(position, cut.faces, corners, layout)
+    paths = _trace_paths(position, cut.faces, corners)
     labels = _patches(cut.faces, paths, corners)
     left = np.flatnonzero((directed_edges(cut.faces) == paths[0][:2]).all(axis=1))[0] // 3
     if labels[left] != 0:  # u0 lies to the left of the path from (0,0,0) to (0,0,1), seen from outside
@@ -67,11 +69,11 @@ def cut_surface(mapped: Array, faces: IntArray, corners: IntArray, layout: Layou
     return CubeSurface(cut, corners, paths, labels)
 
 
-def _trace_paths(position: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig) -> list[IntArray]:
+def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
     """Return disjoint paths along mesh edges, one for each cube edge; one that is blocked is traced first next time."""
     order = list(range(len(EDGES)))
-    for _ in range(layout.orders):
-        paths, blocked = _trace_in_order(position, faces, corners, order, layout)
+    for _ in range(_ORDERS):
+        paths, blocked = _trace_in_order(position, faces, corners, order)
         if blocked is None:
             return [paths[k] for k in range(len(EDGES))]
         order.remove(blocked)
@@ -81,7 +83,7 @@ def _trace_paths(position: Array, faces: IntArray, corners: IntArray, layout: La
 
 
 def _trace_in_order(
-    position: Array, faces: IntArray, corners: IntArray, order: list[int], layout: LayoutConfig
+    position: Array, faces: IntArray, corners: IntArray, order: list[int]
 ) -> tuple[dict[int, IntArray], int | None]:
     """Return the shortest paths, which cost more away from their cube edge, and the first edge that found no way."""
     edges = edge_table(faces)[0]
@@ -96,7 +98,7 @@ def _trace_in_order(
         usable[corners[[i, j]]] = True
         keep = usable[edges].all(axis=1)
         stray = _distance_to_segment(radial, CORNERS[i], CORNERS[j])[edges[keep]].max(axis=1)
-        cost = (length[keep] + 1e-9) * (1.0 + layout.stray * stray / layout.stray_cell)
+        cost = (length[keep] + 1e-9) * (1.0 + _STRAY * stray / _STRAY_DISTANCE)
         a, b = edges[keep].T
         graph = coo_array((cost, (a, b)), shape=(len(position),) * 2).tocsr()
         _, previous = dijkstra(graph, directed=False, indices=corners[i], return_predecessors=True)
@@ -147,11 +149,9 @@ def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array,
     return np.concatenate(paths), np.concatenate(targets), np.stack([starts, starts + 1], axis=1)
 
 
-def lay_out(
-    mapped: Array, vertices: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig = LAYOUT
-) -> Layout:
+def lay_out(mapped: Array, vertices: Array, faces: IntArray, corners: IntArray) -> Layout:
     """Cut the surface (n, 3) along the paths that the mapped one (n, 3) suggests; lay its patches out on the cube."""
-    surface = cut_surface(mapped, faces, corners, layout)
+    surface = cut_surface(mapped, faces, corners)
     vertices, places = surface.cut.carry(vertices), surface.cut.carry(mapped)
     path, target, _ = edge_targets(places, surface.paths)
     places[path] = target

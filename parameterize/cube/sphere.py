@@ -19,7 +19,6 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import eigsh, splu
 
 from ..arrays import Array, IntArray, Mask
-from ..config import LayoutConfig
 from ..progress import Progress, ProgressCallback, ignore
 from ..surface.geometry import doubled_areas, edge_table
 from .cutting import split_edges
@@ -30,31 +29,39 @@ _Weigh = Callable[[Array, Array, Mask], Array]
 _SHIFT = -1e-6  # below all eigenvalues of the Laplacian, so that it can be factorised
 _THIN = 1e-6  # area of a triangle, and length of an edge, that counts at least, as a share of the mean
 _LEAST_ROOM = 1e-40  # of a triangle on the sphere, as a share of its area: powers of less leave the numbers' range
-_SHORTEST_STEP = 1e-10
+_LEAST_SHARE = 0.25  # of a divided edge's length, from its new vertex to either end
+_SQUEEZED = 1e8  # energy of the first layout above which others are tried; that of a relaxed layout is some 50
+_AWAY = 10.0  # extra weight of edges pointing away from the rim, in the second layout
+_POWERS = (2, 4, 8, 16, 32, 64)  # in the next layouts: the higher, the less edges that lead aside count
+_ONE_WAY_POWERS = (4, 16)  # in the last layouts, where a point is pulled by neighbours nearer to the rim alone
+_STEPS = 300  # Newton steps, at most
+_USUAL_STEPS = 30  # Newton steps of most surfaces, from which the time left is estimated
+_DAMPING = 1e-8  # of a Newton step, as a share of the mean diagonal entry
+_LEAST_GAIN = 1e-3  # share of the energy: the steps end once one of them gains less
+_SHORTEST_STEP = 1e-10  # share of a Newton step
+_ARMIJO = 1e-4  # share of the decrease that the slope promises which a step must reach
 
 
-def lay_on_sphere(
-    vertices: Array, faces: IntArray, layout: LayoutConfig, progress: ProgressCallback = ignore
-) -> Layout:
+def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback = ignore) -> Layout:
     """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
 
     Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh. `progress` is told of each
     Newton step: the stage is "layout", the loss the energy.
     """
-    vertices, faces, upper = _halves(vertices, faces, layout.least_share)
+    vertices, faces, upper = _halves(vertices, faces)
     triangles = _Triangles(vertices, faces)
     directions = _hemispheres(vertices, faces, upper, lambda straight, *_: np.ones(len(straight)))
-    for weigh in _for_long_arms(layout):
-        if triangles.energy(directions) <= layout.squeezed:
+    for weigh in _for_long_arms():
+        if triangles.energy(directions) <= _SQUEEZED:
             break
         directions = min(directions, _hemispheres(vertices, faces, upper, weigh), key=triangles.energy)
-    return Layout(vertices, faces, _relaxed(directions, triangles, layout, progress))
+    return Layout(vertices, faces, _relaxed(directions, triangles, progress))
 
 
-def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntArray, Mask]:
+def _halves(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Mask]:
     """Split edges where the lowest vibration vanishes; return points, triangles, and which of these lie above.
 
-    Only how the mesh hangs together counts: new vertices keep the share `least` of an edge from its ends.
+    Only how the mesh hangs together counts: new vertices keep _LEAST_SHARE of an edge from its ends.
     """
     edges, _ = edge_table(faces)
     links = _links(edges, 1.0 / _lengths(vertices, edges), len(vertices))
@@ -63,13 +70,13 @@ def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntA
     height = np.where(modes[:, 1] == 0.0, np.finfo(np.float64).tiny, modes[:, 1])
     cut = edges[height[edges[:, 0]] * height[edges[:, 1]] < 0.0]
     start, end = height[cut].T
-    share = np.clip(start / (start - end), least, 1.0 - least)[:, None]
+    share = np.clip(start / (start - end), _LEAST_SHARE, 1.0 - _LEAST_SHARE)[:, None]
     points = np.concatenate([vertices, (1.0 - share) * vertices[cut[:, 0]] + share * vertices[cut[:, 1]]])
     faces = split_edges(faces, cut, len(vertices))
     return points, faces, np.concatenate([height, np.zeros(len(cut))])[faces].sum(axis=1) > 0.0
 
 
-def _for_long_arms(layout: LayoutConfig) -> Iterator[_Weigh]:
+def _for_long_arms() -> Iterator[_Weigh]:
     """Yield weights of mesh edges, see `_hemispheres`, that shrink a long arm less; which suits depends on the mesh.
 
     Where each ring of points around an arm is to be nearer to the middle than the last by the same amount, the edges
@@ -77,10 +84,10 @@ def _for_long_arms(layout: LayoutConfig) -> Iterator[_Weigh]:
     lead aside would mix what lies on different sides of the arm, so these count the less, the higher the power. Mixed
     least is what follows the points nearer to the rim alone.
     """
-    yield lambda straight, *_: 1.0 + layout.along * straight
-    for power in layout.sharpness:
+    yield lambda straight, *_: 1.0 + _AWAY * straight
+    for power in _POWERS:
         yield lambda straight, left, _, p=power: 1.0 + straight**p * left**2  # type: ignore[misc]
-    for power in layout.one_way:
+    for power in _ONE_WAY_POWERS:
         yield lambda straight, left, outwards, p=power: 1.0 + straight**p * left * outwards  # type: ignore[misc]
 
 
@@ -215,9 +222,7 @@ def _area_bends(corners: Array) -> Array:
     return bends
 
 
-def _relaxed(
-    directions: Array, triangles: _Triangles, layout: LayoutConfig, progress: ProgressCallback = ignore
-) -> Array:
+def _relaxed(directions: Array, triangles: _Triangles, progress: ProgressCallback = ignore) -> Array:
     """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls.
 
     Where the hemispheres squeeze triangles to less than the numbers can tell, the directions are returned as they are.
@@ -226,28 +231,28 @@ def _relaxed(
     unknowns = (2 * triangles.faces[:, :, None] + np.arange(2)).reshape(-1, 6)
     rows, columns = np.repeat(unknowns, 6, axis=1).ravel(), np.tile(unknowns, (1, 6)).ravel()
     size = 2 * len(directions)
-    for number in range(layout.sphere_steps if math.isfinite(energy) else 0):
+    for number in range(_STEPS if math.isfinite(energy) else 0):
         begun = time.perf_counter()
         tangents = _tangents(directions)
         slopes, hessians = triangles.derivatives(directions, tangents)
         slope = np.asarray(np.bincount(unknowns.ravel(), slopes.ravel(), size), dtype=np.float64)
         matrix = coo_array((hessians.ravel(), (rows, columns)), shape=(size, size)).tocsc()
-        damping = layout.sphere_damping * matrix.diagonal().mean()
+        damping = _DAMPING * matrix.diagonal().mean()
         step = _solved(csc_array(matrix + damping * eye_array(size)), -slope)
         move, length = np.einsum("nca,na->nc", tangents, step.reshape(-1, 2)), 1.0
         while length > _SHORTEST_STEP:
             trial = directions + length * move
             trial /= np.linalg.norm(trial, axis=1, keepdims=True)
             lower = triangles.energy(trial)
-            if lower <= energy + 1e-4 * length * float(slope @ step):
+            if lower <= energy + _ARMIJO * length * float(slope @ step):
                 break
             length *= 0.5
         else:
             break
         gain, directions, energy = energy - lower, trial, lower
-        left = max(layout.usual_sphere_steps - number, 1) * (time.perf_counter() - begun)
-        progress(Progress("layout", number + 1, layout.sphere_steps, energy, 0, left))
-        if gain < layout.sphere_gain * energy:
+        left = max(_USUAL_STEPS - number, 1) * (time.perf_counter() - begun)
+        progress(Progress("layout", number + 1, _STEPS, energy, 0, left))
+        if gain < _LEAST_GAIN * energy:
             break
     return directions
 

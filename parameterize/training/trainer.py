@@ -122,7 +122,7 @@ class Trainer:
         labels = paths = None
         if stage.weights.edge > 0.0:
             assert corners is not None
-            surface = cut_surface(self.mapped(), faces, corners, self.config.layout)
+            surface = cut_surface(self.mapped(), faces, corners)
             vertices, faces, corners = surface.cut.carry(vertices), surface.cut.faces, surface.corners
             path, target, following = edge_targets(self.map(vertices), surface.paths)
             paths = EdgePaths(self._index(path), self._tensor(target), self._index(following))
@@ -159,13 +159,13 @@ class Trainer:
         Returns what goes on, the network left as it is then. The domain is a ball by now. Which turn of it suits the
         cube's edges can be told beforehand; whether that lowers the distortion cannot: corners may be harder to reach.
         """
-        train, layout, begun = self.config.train, self.config.layout, len(self.history.rows)
+        train, begun = self.config.train, len(self.history.rows)
         away, start = self.mapped() - 0.5, self._state()
         directions = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
         ball = Layout(self.vertices, self.faces, directions)
-        turn = best_turn(ball, layout, np.random.default_rng(self.seed))
-        as_it_is = hollowness(ball, layout)
-        if hollowness(replace(ball, places=ball.places @ turn.T), layout) > as_it_is - train.race_gain * abs(as_it_is):
+        turn = best_turn(ball, np.random.default_rng(self.seed))
+        as_it_is = hollowness(ball)
+        if hollowness(replace(ball, places=ball.places @ turn.T)) > as_it_is - train.race_gain * abs(as_it_is):
             return _Run(number, 0, start, start), TrainingOptimizer(self.network, train)
         least, winner = math.inf, None
         for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - train.race_gain)):
