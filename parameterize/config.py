@@ -1,6 +1,7 @@
 """Options of a parameterization: frozen dataclasses, and the presets.
 
-Lengths are in units of the domain scaled to volume 1. Loss weights are those of the paper's Table 1.
+Lengths are in units of the domain scaled to volume 1. Constants that no user sets stand beside the code
+that reads them.
 """
 
 from __future__ import annotations
@@ -8,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import inf
 from numbers import Integral, Real
-from typing import Literal
+from typing import Literal, get_args
 
 MAX_CONTROL_POINTS = 100  # per direction
 
-Target = Literal["S(2)", "S(1)", "cube"]
+StageName = Literal["S(2)", "S(1)", "cube", "corners", "edges"]
 
 
 @dataclass(frozen=True)
@@ -22,52 +23,29 @@ class NetworkConfig:
     width: int = 128
     modules: int = 4
     frequencies: int = 10
-    scale: float = 1.0  # k of the encoding before training
-
-
-@dataclass(frozen=True)
-class StageWeights:
-    """One row of the paper's Table 1."""
-
-    bij: float = 1e6
-    arap: float = 1.0
-    fair: float = 2e-3
-    dist: float = 1e3
-    norm: float = 10.0
-    star: float = 1e3
-    cor: float = 0.0
-    edge: float = 0.0
+    scale: float = 1.0  # k of the encoding before the training
 
 
 @dataclass(frozen=True)
 class StageConfig:
-    """One training stage: its name, the shape to reach, its length and its weights."""
+    """A training stage, by its name in `training/stages.py`, and its number of steps."""
 
-    name: str
-    target: Target
+    name: StageName
     steps: int
-    weights: StageWeights
-    given_corner_weight: float = 1e2  # used from the first stage on where the user gives corners (section 5.4)
 
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """What the four stages share."""
+    """Options of the training that all stages share."""
 
     learning_rate: float = 1e-3  # of Adam
-    matrix_rate: float = 0.015  # of Muon, for the hidden layers' matrices; Adam trains these, too, where it is 0
-    final_share: float = 0.02  # of the rates, reached by cosine decay at the end of each stage
-    easy_loss: float | None = 3.5  # where the first stage ends with more, distortion left out, the map is grown instead
+    matrix_rate: float = 0.015  # of Muon, for the hidden layers' matrices; with 0 Adam trains these, too
+    final_share: float = 0.02  # of both rates, reached by cosine decay at the end of each stage
+    easy_loss: float | None = 3.5  # loss without distortion after the first stage above which the map is grown instead
     cell: float = 0.12  # edge h of the interior cells (section 4.4.2)
-    triangles: int = 700  # surface triangles sampled a step; all of them where there are fewer
-    min_det: float = 0.1  # alpha of the bijectivity term
-    wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
-    whiten: bool = True  # start from the affine map that makes the domain as wide in all directions, not the identity
-    det_floor: float = 0.5  # share of `min_det` at which the distortion term holds smaller determinants
-    edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
+    triangles: int = 700  # surface triangles sampled in a step; all of them where there are fewer
+    whiten: bool = True  # start from the affine map that makes the domain equally wide in all directions
     race: float = 0.45  # share of the first stage towards the cube that is trained twice: as G is, and turned
-    race_steps: int = 8  # the last ones of these, whose distortions are compared
-    race_gain: float = 0.05  # share by which the turned G must be better, in hollows and then in distortion
 
 
 @dataclass(frozen=True)
@@ -294,19 +272,12 @@ class Config:
         return replace(self, spline=replace(self.spline, control_points=n))
 
 
-def _stages(steps: tuple[int, int, int, int, int]) -> tuple[StageConfig, ...]:
-    """Return the stages of section 4.3.1 with the weights of Table 1; S(2) and S(1) are the paper's first stage."""
-    free, tight = StageWeights(), StageWeights(dist=1e4, cor=1e3)
-    return (
-        StageConfig("S(2)", "S(2)", steps[0], free),
-        StageConfig("S(1)", "S(1)", steps[1], free),
-        StageConfig("cube", "cube", steps[2], free),
-        StageConfig("corners", "cube", steps[3], tight),
-        StageConfig("edges", "cube", steps[4], replace(tight, edge=1e4)),
-    )
+def _stages(*steps: int) -> tuple[StageConfig, ...]:
+    """Return the five stages with these numbers of steps."""
+    return tuple(map(StageConfig, get_args(StageName), steps))
 
 
-_FAST = Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((90, 60, 90, 30, 60)), SplineConfig())
+_FAST = Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages(90, 60, 90, 30, 60), SplineConfig())
 PRESETS = {
     "fast": _FAST,
     "grown": replace(_FAST, name="grown", train=replace(_FAST.train, easy_loss=0.0)),
@@ -323,7 +294,7 @@ PRESETS = {
             whiten=False,
             race=0.0,
         ),
-        _stages((600, 400, 1000, 500, 1000)),
+        _stages(600, 400, 1000, 500, 1000),
         SplineConfig(),
         starts=1,  # without `whiten` every start would be the same
     ),

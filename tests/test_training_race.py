@@ -71,17 +71,19 @@ def test_the_best_turn_makes_the_hollowness_least():
 
 
 @pytest.mark.usefixtures("turns_are_promising")
-def test_a_turn_that_does_not_win_leaves_no_trace():
+def test_a_turn_that_does_not_win_leaves_no_trace(monkeypatch):
+    monkeypatch.setattr(trainer, "_RACE_GAIN", NEVER)
     seen = Seen()
-    raced, plain = run(race_gain=NEVER, progress=seen), run(race=0.0)
+    raced, plain = run(progress=seen), run(race=0.0)
     assert np.array_equal(raced.volume.control_points, plain.volume.control_points)
     assert np.array_equal(raced.history["loss"], plain.history["loss"])
     assert seen.count("cube", 1) == 2 and seen.count("cube", RACED) == 2 and seen.count("cube", RACED + 1) == 1
 
 
 @pytest.mark.usefixtures("turns_are_promising")
-def test_a_turn_that_wins_goes_on():
-    raced, plain = run(race_gain=ALWAYS), run(race=0.0)
+def test_a_turn_that_wins_goes_on(monkeypatch):
+    monkeypatch.setattr(trainer, "_RACE_GAIN", ALWAYS)
+    raced, plain = run(), run(race=0.0)
     assert not np.array_equal(raced.volume.control_points, plain.volume.control_points)
     cube = raced.history["stage"] == "cube"
     assert raced.history["step"][cube].tolist() == list(range(STEPS[2]))
@@ -97,8 +99,9 @@ def test_no_turn_is_tried_where_the_edges_lie_well_already(monkeypatch):
 
 
 @pytest.mark.usefixtures("turns_are_promising")
-def test_a_run_killed_in_the_race_resumes_to_the_same_bits(tmp_path):
-    whole, seen = run(race_gain=ALWAYS), Seen()
+def test_a_run_killed_in_the_race_resumes_to_the_same_bits(tmp_path, monkeypatch):
+    monkeypatch.setattr(trainer, "_RACE_GAIN", ALWAYS)
+    whole, seen = run(), Seen()
 
     def interrupt(state):
         seen(state)
@@ -106,6 +109,6 @@ def test_a_run_killed_in_the_race_resumes_to_the_same_bits(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(race_gain=ALWAYS, progress=interrupt, folder=tmp_path)
-    resumed = run(race_gain=ALWAYS, folder=tmp_path, resume=True)
+        run(progress=interrupt, folder=tmp_path)
+    resumed = run(folder=tmp_path, resume=True)
     assert np.array_equal(whole.volume.control_points, resumed.volume.control_points)

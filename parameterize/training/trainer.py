@@ -25,10 +25,13 @@ from .losses import BoundarySamples, EdgePaths, Objective
 from .network import InverseMap
 from .optimizer import TrainingOptimizer
 from .samples import TriangleSampler, interior_points, stencils
+from .stages import STAGES
 
 _log = logging.getLogger(__name__)
 State = dict[str, Tensor]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
+_COMPARED_STEPS = 8  # the last ones of a race, whose mean distortions are compared
+_RACE_GAIN = 0.05  # share by which the turned G must be better, first in hollowness and then in distortion
 
 
 @dataclass
@@ -73,7 +76,7 @@ class Trainer:
             first = start_map(interior_points(vertices, faces, config.train.cell))
             self.network.affine.copy_(self._tensor(first))
         inside = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
-        self.objective = Objective(self.network, inside, config.train)
+        self.objective = Objective(self.network, inside)
 
     def run(self, *, give_up: bool = False) -> InverseMap | None:
         """Train all stages, or those that a checkpoint leaves; return the network at the best state of the last one.
@@ -116,11 +119,12 @@ class Trainer:
 
     def _prepare(self, stage: StageConfig) -> BoundarySamples:
         """Choose corners and cut the surface, where the stage asks for it, by the network as it is."""
-        if stage.weights.cor > 0.0 and self.corners is None:
+        weights = STAGES[stage.name].weights
+        if weights.cor > 0.0 and self.corners is None:
             self.corners = choose_corners(self.mapped())
         vertices, faces, corners = self.vertices, self.faces, self.corners
         labels = paths = None
-        if stage.weights.edge > 0.0:
+        if weights.edge > 0.0:
             assert corners is not None
             surface = cut_surface(self.mapped(), faces, corners)
             vertices, faces, corners = surface.cut.carry(vertices), surface.cut.faces, surface.corners
@@ -144,14 +148,14 @@ class Trainer:
         """
         rows = [row for row in self.history.rows if row[0] == stage.name]
         _, _, loss, _, terms = min(rows, key=lambda row: (row[3], row[2]))
-        return loss - stage.weights.arap * terms["arap"]
+        return loss - STAGES[stage.name].weights.arap * terms["arap"]
 
     @property
     def _race_stage(self) -> int | None:
         """The first stage towards the cube, where G may be turned; None where corners are given or no race is set."""
         if self.corners is not None or self.config.train.race == 0.0:
             return None
-        return next((number for number, stage in enumerate(self.config.stages) if stage.target == "cube"), None)
+        return next((number for number, stage in enumerate(self.config.stages) if stage.name == "cube"), None)
 
     def _race(self, number: int, boundary: BoundarySamples) -> tuple[_Run, TrainingOptimizer]:
         """Begin a stage with G as it is and, where its edges then lie less in hollows, with G turned.
@@ -165,10 +169,10 @@ class Trainer:
         ball = Layout(self.vertices, self.faces, directions)
         turn = best_turn(ball, np.random.default_rng(self.seed))
         as_it_is = hollowness(ball)
-        if hollowness(replace(ball, places=ball.places @ turn.T)) > as_it_is - train.race_gain * abs(as_it_is):
+        if hollowness(replace(ball, places=ball.places @ turn.T)) > as_it_is - _RACE_GAIN * abs(as_it_is):
             return _Run(number, 0, start, start), TrainingOptimizer(self.network, train)
         least, winner = math.inf, None
-        for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - train.race_gain)):
+        for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - _RACE_GAIN)):
             self.network.load_state_dict(start)
             self.network.turn(self._tensor(rotation))
             run, optimizer = _Run(number, 0, self._state(), self._state()), TrainingOptimizer(self.network, train)
@@ -176,7 +180,7 @@ class Trainer:
                 pass
             rows = self.history.rows[begun:]
             del self.history.rows[begun:]
-            distortion = float(np.mean([terms["arap"] for *_, terms in rows[-train.race_steps :]]))
+            distortion = float(np.mean([terms["arap"] for *_, terms in rows[-_COMPARED_STEPS:]]))
             if distortion < share * least:
                 least, winner = distortion, (run, optimizer, self._state(), rows)
         assert winner is not None
@@ -214,7 +218,7 @@ class Trainer:
         """Take one step of the optimiser; nothing of the state changes before the loss is known."""
         self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
         optimizer.clear()
-        loss, folded, terms = self.objective(stage, boundary, self.generator)
+        loss, folded, terms = self.objective(STAGES[stage.name], boundary, self.generator)
         loss.backward()  # type: ignore[no-untyped-call]
         value = float(loss.detach())
         if not math.isfinite(value):
