@@ -49,7 +49,7 @@ def test_no_triangle_is_turned_over_and_the_mesh_stays(shape):
     layout = lay_on_sphere(vertices, faces)
     assert not turned_over(layout.places, layout.faces).any()
     assert np.linalg.norm(layout.places, axis=1) == pytest.approx(1.0)
-    assert np.array_equal(layout.vertices[: len(vertices)], vertices)
+    assert np.array_equal(layout.points[: len(vertices)], vertices)
     again = lay_on_sphere(vertices, faces)
     assert np.array_equal(again.places, layout.places)
 
@@ -57,7 +57,7 @@ def test_no_triangle_is_turned_over_and_the_mesh_stays(shape):
 def test_the_sphere_keeps_its_areas():
     vertices, faces = ball(800)
     layout = lay_on_sphere(vertices, faces)
-    before, after = (np.linalg.det(x[layout.faces]) for x in (layout.vertices, layout.places))
+    before, after = (np.linalg.det(x[layout.faces]) for x in (layout.points, layout.places))
     assert np.median(after / before) == pytest.approx(1.0, abs=0.02)
     assert np.percentile(after / before, [1, 99]) == pytest.approx([1.0, 1.0], abs=0.1)
 
@@ -65,7 +65,7 @@ def test_the_sphere_keeps_its_areas():
 def test_a_thorn_gets_the_room_that_its_area_asks_for():
     vertices, faces = thorn()
     layout = lay_on_sphere(vertices, faces)
-    points = layout.vertices[layout.faces]
+    points = layout.points[layout.faces]
     cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     area, room = np.linalg.norm(cross, axis=1), np.linalg.det(layout.places[layout.faces])
     tip = points[:, :, 0].mean(axis=1) > 3.0
@@ -77,7 +77,7 @@ def test_a_long_rod_is_not_squeezed_to_nothing_at_its_ends():
     vertices, faces = rod()
     layout = lay_on_sphere(vertices, faces)
     assert not turned_over(layout.places, layout.faces).any()
-    points = layout.vertices[layout.faces]
+    points = layout.points[layout.faces]
     area = np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=1)
     room = np.linalg.det(layout.places[layout.faces])
     tenth = np.minimum(points[:, :, 2].mean(axis=1) / 1.2, 9.0).astype(int)
@@ -88,7 +88,7 @@ def test_a_long_rod_is_not_squeezed_to_nothing_at_its_ends():
 def test_first_and_second_derivatives():
     vertices, faces = horseshoe(60)
     layout = lay_on_sphere(vertices, faces)
-    triangles, places = _Triangles(layout.vertices, layout.faces), layout.places
+    triangles, places = _Triangles(layout.points, layout.faces), layout.places
     rng, h = np.random.default_rng(0), 1e-4
     step = rng.normal(size=(len(places), 2))
     tangents = _tangents(places)
@@ -126,7 +126,7 @@ def test_a_needle_is_laid_out_whole_without_a_warning(rings, around, length):
     with np.errstate(all="raise", under="ignore"):
         layout = lay_on_sphere(vertices, faces)
     assert not turned_over(layout.places, layout.faces).any()
-    energies = _Triangles(layout.vertices, layout.faces).energies(layout.places)
+    energies = _Triangles(layout.points, layout.faces).energies(layout.places)
     assert np.isfinite(energies).all()
     assert energies.sum() < 2.0 * 8.0 * np.pi * length  # 8 pi is that of a sphere
 

@@ -1,23 +1,25 @@
 """The cube's edges are turned out of hollows and towards ridges."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from shapes import ball, rounded_cube
 
 from parameterize.cube.cube import project_radially
-from parameterize.cube.flips import Layout
+from parameterize.cube.layout import CubeLayout
 from parameterize.cube.turning import _HOLLOW, _OTHER_TURN, _angle_between, _bends, _hollowness, best_turn
 
 
 def laid(vertices, faces):
     centred = vertices - vertices.mean(axis=0)
-    return Layout(vertices, faces, centred / np.linalg.norm(centred, axis=1, keepdims=True))
+    return CubeLayout(vertices, faces, centred / np.linalg.norm(centred, axis=1, keepdims=True), len(vertices))
 
 
 def turned(layout, seed, number=0):
     rotation = best_turn(layout, np.random.default_rng(seed), number)
-    return Layout(layout.vertices, layout.faces, layout.places @ rotation.T)
+    return replace(layout, places=layout.places @ rotation.T)
 
 
 def test_a_hollow_counts_positive_and_a_ridge_negative():

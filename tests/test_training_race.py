@@ -11,7 +11,7 @@ from shapes import ball
 from small_run import STEPS, small_surface, tiny_config
 
 from parameterize.config import NetworkConfig
-from parameterize.cube.flips import Layout
+from parameterize.cube.layout import CubeLayout
 from parameterize.cube.turning import best_turn, hollowness
 from parameterize.run import parameterize
 from parameterize.training import trainer
@@ -65,7 +65,7 @@ def test_a_turned_network_maps_to_the_turned_places():
 def test_the_best_turn_makes_the_hollowness_least():
     points, faces = ball(600)
     points = points * (1.0 + 0.3 * np.sin(5.0 * points[:, :1]) * points[:, 1:2])
-    layout = Layout(points, faces, points / np.linalg.norm(points, axis=1, keepdims=True))
+    layout = CubeLayout(points, faces, points / np.linalg.norm(points, axis=1, keepdims=True), len(points))
     turn = best_turn(layout, np.random.default_rng(0))
     assert hollowness(replace(layout, places=layout.places @ turn.T)) < hollowness(layout)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..surface.geometry import edge_table
+from .layout import CubeLayout
 
 NEAR_VERTEX = 0.1  # share of an edge's length: a crossing this close to a vertex takes the vertex and leaves no sliver
 _COARSENING = 1.25  # factor of the longest edge each time a mesh would get too many points
@@ -49,6 +50,10 @@ class CutMesh:
             a, b = self.parents[i]
             result[i] = (1.0 - self.share[i]) * result[a] + self.share[i] * result[b]
         return result
+
+    def laid_out(self, layout: CubeLayout) -> CubeLayout:
+        """Return the layout of the input with this mesh's triangles, its points and places at all vertices."""
+        return CubeLayout(self.carry(layout.points), self.faces, self.carry(layout.places), layout.n_own)
 
 
 def cut_along_rays(mapped: Array, faces: IntArray, snap: float = NEAR_VERTEX) -> CutMesh:

@@ -1,6 +1,4 @@
-"""Layout of a closed surface on the boundary of the cube: places of its points, orientation of its triangles."""
-
-from dataclasses import dataclass
+"""Flipped triangles of a surface laid out on the cube: how they are found, prevented and turned back."""
 
 import numba
 import numpy as np
@@ -15,18 +13,6 @@ _PATIENCE = 60  # sweeps of `untangle` after which one more ring of neighbours m
 _PUSHES = 100  # sweeps of `unflip`, at most
 _PUSHED_VOLUME = 1e-2  # of a triangle that `unflip` has turned outwards, as a share of the median triangle's
 _HOLDING_ROUNDS = 20  # of `new_flips`, at most: each holds more points
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Surface points (n, 3), those of the mesh first, triangles (m, 3) between them, and where the points go (n, 3).
-
-    places: on the boundary of the cube; on the unit sphere around the origin as long as sphere.py and turning.py work.
-    """
-
-    vertices: Array
-    faces: IntArray
-    places: Array
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

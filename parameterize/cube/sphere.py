@@ -22,7 +22,7 @@ from ..arrays import Array, IntArray, Mask
 from ..progress import Progress, ProgressCallback, ignore
 from ..surface.geometry import doubled_areas, edge_table
 from .cutting import split_edges
-from .flips import Layout
+from .layout import CubeLayout
 
 _Weigh = Callable[[Array, Array, Mask], Array]
 
@@ -42,20 +42,20 @@ _SHORTEST_STEP = 1e-10  # share of a Newton step
 _ARMIJO = 1e-4  # share of the decrease that the slope promises which a step must reach
 
 
-def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback = ignore) -> Layout:
+def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback = ignore) -> CubeLayout:
     """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
 
     Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh. `progress` is told of each
     Newton step: the stage is "layout", the loss the energy.
     """
-    vertices, faces, upper = _halves(vertices, faces)
-    triangles = _Triangles(vertices, faces)
-    directions = _hemispheres(vertices, faces, upper, lambda straight, *_: np.ones(len(straight)))
+    points, faces, upper = _halves(vertices, faces)
+    triangles = _Triangles(points, faces)
+    directions = _hemispheres(points, faces, upper, lambda straight, *_: np.ones(len(straight)))
     for weigh in _for_long_arms():
         if triangles.energy(directions) <= _SQUEEZED:
             break
-        directions = min(directions, _hemispheres(vertices, faces, upper, weigh), key=triangles.energy)
-    return Layout(vertices, faces, _relaxed(directions, triangles, progress))
+        directions = min(directions, _hemispheres(points, faces, upper, weigh), key=triangles.energy)
+    return CubeLayout(points, faces, _relaxed(directions, triangles, progress), len(vertices))
 
 
 def _halves(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Mask]:

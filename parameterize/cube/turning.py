@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from ..arrays import Array
 from ..surface.geometry import doubled_areas, edge_triangles
 from ..threads import in_parallel
-from .flips import Layout
+from .layout import CubeLayout
 
 _TURNS = 200  # rotations of the cube that are drawn at random
 _FINALISTS = 5  # the best of these, which are turned further
@@ -24,7 +24,7 @@ _PIECES = 24  # of each cube edge: a piece in a hollow is not made up for by rid
 _HOLLOW = 1.0  # extra weight of a piece in a hollow
 
 
-def best_turn(layout: Layout, generator: np.random.Generator, number: int = 0) -> Array:
+def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 0) -> Array:
     """Return the rotation (3, 3) of a layout by which the cube's edges lie least in hollows; 1 is the next best, ...
 
     The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
@@ -61,7 +61,7 @@ def best_turn(layout: Layout, generator: np.random.Generator, number: int = 0) -
     return np.asarray(turns[min(number, len(turns) - 1)].as_matrix())
 
 
-def hollowness(layout: Layout) -> float:
+def hollowness(layout: CubeLayout) -> float:
     """Return how much the cube's edges lie in hollows of a layout, which `best_turn` makes small: below 0 on ridges."""
     return _hollowness(*_bends(layout))
 
@@ -75,18 +75,18 @@ def _angle_between(first: Rotation, second: Rotation) -> float:
     return float((first * second.inv()).reduce(left=Rotation.create_group("O")).magnitude())
 
 
-def _bends(layout: Layout) -> tuple[Array, Array, Array]:
+def _bends(layout: CubeLayout) -> tuple[Array, Array, Array]:
     """Return of each mesh edge middle and direction on the sphere (e, 3), and how much the surface bends there (e,).
 
     That is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """
-    vertices, faces, places = layout.vertices, layout.faces, layout.places
+    points, faces, places = layout.points, layout.faces, layout.places
     edges, owners = edge_triangles(faces)
     here, there = owners.T
-    normals = doubled_areas(vertices, faces)
+    normals = doubled_areas(points, faces)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     angle = np.arccos(np.clip((normals[here] * normals[there]).sum(axis=1), -1.0, 1.0))
-    middle_there = vertices[faces[there]].mean(axis=1) - vertices[edges[:, 0]]
+    middle_there = points[faces[there]].mean(axis=1) - points[edges[:, 0]]
     hollow = np.where((middle_there * normals[here]).sum(axis=1) > 0.0, angle, -angle)
     step = places[edges[:, 1]] - places[edges[:, 0]]
     length = np.linalg.norm(step, axis=1)

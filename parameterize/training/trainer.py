@@ -18,7 +18,7 @@ from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
-from ..cube.flips import Layout
+from ..cube.layout import CubeLayout
 from ..cube.turning import best_turn, hollowness
 from ..progress import History, Progress, ProgressCallback
 from .losses import BoundarySamples, EdgePaths, Objective
@@ -126,8 +126,8 @@ class Trainer:
         labels = paths = None
         if weights.edge > 0.0:
             assert corners is not None
-            surface = cut_surface(self.mapped(), faces, corners)
-            vertices, faces, corners = surface.cut.carry(vertices), surface.cut.faces, surface.corners
+            surface = cut_surface(CubeLayout(vertices, faces, self.mapped(), len(vertices)), corners)
+            vertices, faces = surface.layout.points, surface.layout.faces
             path, target, following = edge_targets(self.map(vertices), surface.paths)
             paths = EdgePaths(self._index(path), self._tensor(target), self._index(following))
             labels = self._index(surface.face_labels)
@@ -166,7 +166,7 @@ class Trainer:
         train, begun = self.config.train, len(self.history.rows)
         away, start = self.mapped() - 0.5, self._state()
         directions = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
-        ball = Layout(self.vertices, self.faces, directions)
+        ball = CubeLayout(self.vertices, self.faces, directions, len(self.vertices))
         turn = best_turn(ball, np.random.default_rng(self.seed))
         as_it_is = hollowness(ball)
         if hollowness(replace(ball, places=ball.places @ turn.T)) > as_it_is - _RACE_GAIN * abs(as_it_is):
