@@ -15,7 +15,7 @@ from ..arrays import Array, IntArray, in_brackets
 from ..cube.cube import VARYING_AXES
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
-from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, settled
+from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, is_proved
 
 Point = tuple[float, float, float]
 
@@ -68,7 +68,7 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 24) -> BoundaryChe
     most = _MOST_PAIRS[0] + _MOST_PAIRS[1] * len(own)
     for depth in range(max_depth + 1):
         hopeless = len(pairs) > most  # then only a common point is searched for
-        pairs = pairs if hopeless else pairs[~settled(pieces, pairs, error)]
+        pairs = pairs if hopeless else pairs[~is_proved(pieces, pairs, error)]
         if not len(pairs):
             return BoundaryCheck(True, None, 0)
         met = _search(local, pieces, pairs, error)

@@ -182,7 +182,7 @@ class _Search:
             if len(top.spans) > _PIECES:
                 stack.append(top.subset(slice(_PIECES, None)))
                 top = top.subset(slice(_PIECES))
-            doubtful = self._settle(top)
+            doubtful = self._conclude(top)
             if len(doubtful.spans):
                 stack.append(doubtful.halved())
 
@@ -191,7 +191,7 @@ class _Search:
         """Return the bound of det J above which a proof is tight enough."""
         return max(0.0, _TIGHT * self.known)
 
-    def _settle(self, pieces: _Pieces) -> _Pieces:
+    def _conclude(self, pieces: _Pieces) -> _Pieces:
         """Draw the conclusions that can be drawn; return the pieces to be cut."""
         errors = self.form.errors(pieces.permanents, pieces.depth)
         least = pieces.values.min(axis=(1, 2, 3))

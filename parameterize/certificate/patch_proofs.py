@@ -98,7 +98,7 @@ def as_rows(nets: Array) -> Array:
     return nets.reshape(len(nets), nets.shape[1] * nets.shape[2], 3)
 
 
-def settled(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
+def is_proved(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
     """Return for each pair (k, 2) whether it is proved that the two meet only where they are joined."""
     done = np.zeros(len(pairs), dtype=bool)
     for start in range(0, len(pairs), _CHUNK):

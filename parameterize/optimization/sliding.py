@@ -105,7 +105,7 @@ class SlidingParameters:
             self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
         self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
 
-    def settled(self, control: Tensor, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
+    def at_closest_points(self, control: Tensor, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
         """Return the parameters where F's boundary is closest to their points (N, 3), as far as no triangle flips.
 
         They slide `slides` times; triangles that this flips are relaxed in at most so many sweeps; then they slide as

@@ -11,9 +11,11 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..cube.cutting import subdivide_finely
 from ..spline.bspline import breakpoints
+from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import area_shares, doubled_areas
-from .distances import Distances, SampledBoundary, nearest_on_boundary, to_mesh
+from ..surface.nearest import distance_to_mesh
+from .distances import Distances, nearest_on_boundary
 
 _PER_SPAN = 2.0  # samples on the mesh a direction, where spans have the mean area
 _LEAST_SAMPLES = 4_000  # some, also of a spline of few spans; halving edges gives two to four times as many
@@ -61,7 +63,7 @@ def two_sided(volume: BSplineVolume, vertices: Array, faces: IntArray) -> TwoSid
     return TwoSided(
         OneWay(distances, area_shares(points, triangles), parameters),
         OneWay(
-            to_mesh(boundary.points, vertices, faces),
+            distance_to_mesh(boundary.points, vertices, faces),
             area_shares(boundary.points, boundary.triangles),
             boundary.parameters,
         ),
