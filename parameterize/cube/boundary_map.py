@@ -89,7 +89,7 @@ class BoundaryMap(Brief):
 
     @cached_property
     def part(self) -> PartSurface:
-        """Return the surface as it was before it was cut, with its groups; as it was cut where that is unknown."""
+        """Return the surface before it was cut, with its groups; where a file lacks it, the cut surface."""
         faces = self.faces if self.part_faces is None else self.part_faces
         return PartSurface(self.vertices[: faces.max(initial=-1) + 1], faces, self.groups)
 
@@ -123,7 +123,7 @@ class BoundaryMap(Brief):
 
     @classmethod
     def load(cls, path: str | Path) -> "BoundaryMap":
-        """Read boundary.npz. Raises FileNotFoundError, or ValueError naming what is wrong with the file."""
+        """Read boundary.npz. Raises FileNotFoundError, or ValueError that names the defect of the file."""
         data = load_arrays(path, ("vertices", "parameters", "faces"), PART)
         places = data["vertices"], data["parameters"], data["faces"]
         try:
@@ -136,10 +136,10 @@ class BoundaryMap(Brief):
 
 
 def read_part(path: str | Path) -> PartSurface:
-    """Read from boundary.npz the surface that a run was made of, with its groups.
+    """Read the surface of a run, with its groups, from boundary.npz.
 
-    A file written before it held these gives the surface as it was cut along the cube's edges. Raises
-    FileNotFoundError, or ValueError naming what is wrong with the file.
+    Older files give the surface cut along the cube's edges, without groups. Raises FileNotFoundError, or ValueError
+    that names the defect of the file.
     """
     return BoundaryMap.load(path).part
 
@@ -168,10 +168,10 @@ def _on_faces(parameters: Array) -> Mask:
 
 
 def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parameters: Array) -> BoundaryMap:
-    """Cut the surface (vertices (n, 3), user's units) where its parameters (n, 3) pass an edge of the cube.
+    """Return the map of a surface (vertices (n, 3), user's units) that is cut where it crosses the cube's edges.
 
-    Parameters come from closest points of the volume's boundary, which may turn a few triangles over where the spline
-    smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
+    parameters (n, 3): closest points of the volume's boundary. Where the spline smooths a detail away they may flip a
+    few triangles, which are untangled first. The cut vertices follow the input's, and are fitted to the volume.
     """
     placed = untangle_whole(parameters, faces)
     for number in range(_NUDGES):
@@ -183,7 +183,7 @@ def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parame
         if not len(turned):
             break
         placed = _nudged(placed, cut, turned, number)
-    closer = plain  # then each cut vertex slides along its mesh edge, its parameter along the cube's, to meet F
+    closer = plain  # each cut vertex then slides along its mesh edge, and its parameter along the cube's, to meet F
     for _ in range(_FITTING_STEPS):
         share, moved = _fitted_once(volume, cut, closer, len(vertices))
         cut, closer = _without_flips(vertices, cut, closer, share, moved)
@@ -191,7 +191,7 @@ def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parame
 
 
 def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int) -> Array:
-    """Shift the vertices (n, 3) around degenerate pieces a little: a mesh edge ran through a corner of the cube."""
+    """Shift the vertices (n, 3) around degenerate triangles a little: a mesh edge ran through a corner of the cube."""
     corners = np.unique(cut.faces[turned])
     around = np.unique(np.concatenate([corners[corners < len(placed)], cut.parents[corners].ravel()]))
     around = around[around < len(placed)]
@@ -207,7 +207,7 @@ def _fitted_once(volume: BSplineVolume, cut: CutMesh, best: BoundaryMap, count: 
     """
     where, new = best.parameters[count:], best.vertices[count:]
     inner = (where > 0.0) & (where < 1.0)  # (k, 3)
-    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; ends of cuts within a face stay
+    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; cut vertices within a face stay
     start, end = best.vertices[cut.parents[count:].T]
     along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
     shift, slide = damped_fit(end - start, -along_cube, volume(where) - new, _FITTING_DAMPING)

@@ -23,8 +23,8 @@ from .layout import CubeLayout
 _STRAY = 20.0  # extra cost of a path, relative to its length, at the distance _STRAY_DISTANCE from its cube edge
 _STRAY_DISTANCE = 0.05
 _ORDERS = 24  # orders in which the twelve paths are traced before the surface is given up: twice one for each path
-_FLAT = 1e-12  # area of a triangle on the square that counts as turned over
-_TINY = 1e-12
+_FLAT = 1e-12  # doubled area on the square up to which a triangle counts as turned over
+_TINY = 1e-12  # least length, and least 1 + cosine and 1 - cosine, in half tangents
 
 
 class PathError(RuntimeError):
@@ -45,7 +45,7 @@ class CubeSurface:
 
 
 def choose_corners(mapped: Array) -> IntArray:
-    """Return the vertices (8,) farthest towards the cube's corners, argmax <v - A, P - A>, all different."""
+    """Return eight different vertices, the farthest towards each of the cube's corners P: argmax <v - A, P - A>."""
     reach = (mapped - 0.5) @ (CORNERS - 0.5).T  # (n, 8)
     candidates = np.unique(np.argsort(-reach, axis=0)[:8])
     rows, columns = linear_sum_assignment(-reach[candidates])
@@ -68,7 +68,7 @@ def cut_surface(layout: CubeLayout, corners: IntArray) -> CubeSurface:
 
 
 def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
-    """Return disjoint paths along mesh edges, one for each cube edge; one that is blocked is traced first next time."""
+    """Return disjoint paths along mesh edges, one for each cube edge; a blocked one comes first in the next order."""
     order = list(range(len(EDGES)))
     for _ in range(_ORDERS):
         paths, blocked = _trace_in_order(position, faces, corners, order)
@@ -83,7 +83,7 @@ def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[In
 def _trace_in_order(
     position: Array, faces: IntArray, corners: IntArray, order: list[int]
 ) -> tuple[dict[int, IntArray], int | None]:
-    """Return the shortest paths, which cost more away from their cube edge, and the first edge that found no way."""
+    """Return the cheapest paths by edge number, and the first blocked one; ways off the cube edge cost more."""
     edges = edge_table(faces)[0]
     length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
     radial = 0.5 + project_radially(position - 0.5)
@@ -163,7 +163,9 @@ def lay_out(layout: CubeLayout, corners: IntArray) -> CubeLayout:
     for face in range(6):
         patch = surface.layout.faces[surface.face_labels == face]
         edges, count = edge_table(patch)
-        bridges = edges[(count == 2) & fixed[edges].all(axis=1)]  # inner edges: a triangle of them could end up flat
+        bridges = edges[
+            (count == 2) & fixed[edges].all(axis=1)
+        ]  # inner edges between fixed points: a triangle of three would be flat
         patch = split_edges(patch, bridges, len(points))
         points, places = (np.concatenate([x, x[bridges].mean(axis=1)]) for x in (points, places))
         fixed = np.concatenate([fixed, np.zeros(len(bridges), dtype=bool)])

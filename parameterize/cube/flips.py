@@ -35,12 +35,12 @@ def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
 
 
 def flipped(places: Array, faces: IntArray) -> Mask:
-    """Return which triangles (m, 3) do not face outwards, with a margin for what later steps round: (m,)."""
+    """Return the mask (m,) of triangles (m, 3) that do not face outwards, with a margin for later rounding errors."""
     return np.asarray(orientation(places, faces)[0] <= _FLAT)
 
 
 def new_flips(before: Array, after: Array, faces: IntArray) -> Mask:
-    """Return which points (n,) must stay so that no further triangle flips when the others go to `after`."""
+    """Return the mask (n,) of points that must stay so that no further triangle flips when the others go to `after`."""
     stay, allowed = np.zeros(len(before), dtype=bool), flipped(before, faces)
     for _ in range(_HOLDING_ROUNDS):
         bad = flipped(np.where(stay[:, None], before, after), faces) & ~allowed
@@ -51,9 +51,9 @@ def new_flips(before: Array, after: Array, faces: IntArray) -> Mask:
 
 
 def unflip(parameters: Array, faces: IntArray) -> Array:
-    """Push the corners of flipped triangles by as little as turns each outwards, sweep by sweep; some may be left.
+    """Turn flipped triangles outwards by the least moves of their corners, sweep by sweep; some may stay flipped.
 
-    For a few flips in a layout whose points should stay where they are: `untangle` flattens whole neighbourhoods. Seen
+    It suits a few flips in a layout whose points should stay: `untangle` flattens whole neighbourhoods. Seen
     from the centre, the volume under a triangle is linear in each corner, so one Newton step a triangle is taken, and
     the mean of these at every corner.
     """
@@ -79,11 +79,11 @@ def unflip(parameters: Array, faces: IntArray) -> Array:
 
 
 def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
-    """Relax the vertices around flipped triangles until none is left, moving as few and as little as possible.
+    """Return the parameters (n, 3) after relaxation of the vertices around flipped triangles, until none is left.
 
     A relaxed vertex goes half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
-    are flipped at the time move; where they stay so, rings of neighbours join, one after every _PATIENCE sweeps. After
-    all `sweeps` some may be left.
+    are flipped at the time move; where triangles stay flipped, one more ring of neighbours joins after every _PATIENCE
+    sweeps. After all `sweeps` some flips may be left.
     """
     i, j = faces.ravel(), faces[:, [1, 2, 0]].ravel()  # closed surface: both directions appear
     direction = _directions(parameters)
@@ -103,9 +103,9 @@ def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array
 
 
 def untangle_whole(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
-    """Untangle, or return the parameters as they are where flips would be left.
+    """Return the untangled parameters (n, 3), or the given ones where flips would be left.
 
-    Rings of neighbours that join round after round spread what cannot be untangled over a whole limb of the surface.
+    Ring after ring of neighbours joins, so a flip that cannot be undone would disturb a whole limb of the surface.
     """
     untangled = untangle(parameters, faces, sweeps)
     return parameters if flipped(untangled, faces).any() else untangled

@@ -2,8 +2,8 @@
 
 The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
 sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
-one-to-one but badly squeezed: a long arm shrinks exponentially with its length. Where it does, the mesh edges along it
-get more weight: those of a cone, on which such a layout is even, up to its tip. From there Newton's method lowers the
+one-to-one but badly squeezed: a long arm shrinks exponentially with its length. There the mesh edges along the arm get
+the larger weights of a cone's edges, whose layout is even up to the tip. From there Newton's method lowers the
 symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has no
 area left: no step turns a triangle over.
 """
@@ -27,8 +27,8 @@ from .layout import CubeLayout
 _Weigh = Callable[[Array, Array, Mask], Array]
 
 _SHIFT = -1e-6  # below all eigenvalues of the Laplacian, so that it can be factorised
-_THIN = 1e-6  # area of a triangle, and length of an edge, that counts at least, as a share of the mean
-_LEAST_ROOM = 1e-40  # of a triangle on the sphere, as a share of its area: powers of less leave the numbers' range
+_THIN = 1e-6  # least area of a triangle and least length of an edge, as shares of the means
+_LEAST_ROOM = 1e-40  # least area of a triangle on the sphere, as a share of its own: powers of less would overflow
 _LEAST_SHARE = 0.25  # of a divided edge's length, from its new vertex to either end
 _SQUEEZED = 1e8  # energy of the first layout above which others are tried; that of a relaxed layout is some 50
 _AWAY = 10.0  # extra weight of edges pointing away from the rim, in the second layout
@@ -45,8 +45,8 @@ _ARMIJO = 1e-4  # share of the decrease that the slope promises which a step mus
 def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback = ignore) -> CubeLayout:
     """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
 
-    Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh. `progress` is told of each
-    Newton step: the stage is "layout", the loss the energy.
+    Every mesh edge that the line between the two discs crosses gets a vertex, after those of the mesh. `progress` is
+    called after each Newton step, with the stage "layout" and the energy as the loss.
     """
     points, faces, upper = _halves(vertices, faces)
     triangles = _Triangles(points, faces)
@@ -59,9 +59,9 @@ def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback =
 
 
 def _halves(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Mask]:
-    """Split edges where the lowest vibration vanishes; return points, triangles, and which of these lie above.
+    """Split edges where the lowest vibration vanishes; return points, triangles and the mask of the upper triangles.
 
-    Only how the mesh hangs together counts: new vertices keep _LEAST_SHARE of an edge from its ends.
+    The exact places of the new vertices do not matter: they keep _LEAST_SHARE of an edge from its ends.
     """
     edges, _ = edge_table(faces)
     links = _links(edges, 1.0 / _lengths(vertices, edges), len(vertices))
@@ -77,12 +77,12 @@ def _halves(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Mask]:
 
 
 def _for_long_arms() -> Iterator[_Weigh]:
-    """Yield weights of mesh edges, see `_hemispheres`, that shrink a long arm less; which suits depends on the mesh.
+    """Yield weights of mesh edges, see `_hemispheres`, that shrink a long arm less; the best ones depend on the mesh.
 
-    Where each ring of points around an arm is to be nearer to the middle than the last by the same amount, the edges
-    along it weigh as much as on a cone: as the square of how far away its tip is, in lengths of the edge. Edges that
-    lead aside would mix what lies on different sides of the arm, so these count the less, the higher the power. Mixed
-    least is what follows the points nearer to the rim alone.
+    Rings of points around an arm come out evenly spaced where the edges along it weigh as on a cone: the square of the
+    distance to its tip, in lengths of the edge. Edges that lead aside would mix points from different sides of the arm;
+    the higher the power, the less they count. The last weights mix least: each point follows only neighbours nearer to
+    the rim.
     """
     yield lambda straight, *_: 1.0 + _AWAY * straight
     for power in _POWERS:
@@ -94,9 +94,10 @@ def _for_long_arms() -> Iterator[_Weigh]:
 def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -> Array:
     """Return directions (n, 3) of points (n, 3) whose triangles above and below go to the two hemispheres.
 
-    The common rim goes to the equator by its length. Every other point is a mean of its neighbours in the disc. `weigh`
-    is told of each mesh edge how straight it leads towards the rim, or away from it, 0 to 1; how far the point farthest
-    from the rim is, in lengths of the edge; and whether the neighbour is nearer to the rim than the point it pulls.
+    The common rim goes to the equator by arc length; every other point is a weighted mean of its neighbours in the
+    disc. `weigh` returns the weights of mesh edges from three arrays (e,): the squared cosine of the edge's angle to
+    the way to the rim; the distance to the point farthest from the rim, in lengths of the edge; and whether the pulling
+    neighbour is nearer to the rim than the pulled point.
     """
     rim = np.asarray(igl.boundary_loop(faces[upper]), dtype=np.int64)
     length = np.linalg.norm(vertices[np.roll(rim, -1)] - vertices[rim], axis=1)
@@ -122,7 +123,7 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -
 
 
 def _lengths(vertices: Array, edges: IntArray) -> Array:
-    """Return the lengths (e,) of edges (e, 2), none of them too short to divide by."""
+    """Return the lengths (e,) of edges (e, 2), at least the share _THIN of their mean."""
     length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
     return np.asarray(np.maximum(length, _THIN * length.mean()))
 
@@ -130,7 +131,8 @@ def _lengths(vertices: Array, edges: IntArray) -> Array:
 def _links(edges: IntArray, weights: Array, count: int) -> csr_array:
     """Return the weights of edges (e, 2) between `count` points as a matrix.
 
-    weights: (e,) for a symmetric one; else (2 e,), those of the second ends for the first ones and then the others.
+    weights: (e,) for a symmetric one; else (2 e,), the pulls of second ends on first ends, then those of first ends on
+    second ends.
     """
     i, j = np.concatenate([edges, edges[:, ::-1]]).T
     return csr_array(coo_array((np.resize(weights, len(i)), (i, j)), shape=(count, count)))
@@ -170,15 +172,16 @@ class _Triangles:
     def energies(self, directions: Array) -> Array:
         """Return the energy of each triangle (m,).
 
-        It is infinite where a triangle is turned over, seen from the sphere's centre, or too small for the numbers.
+        It is infinite where a triangle is turned over, seen from the sphere's centre, or too small for double
+        precision.
         """
         corners = directions[self.faces]
         area = 0.5 * _volumes(corners)
-        sides = corners - corners[:, :1]  # tiny triangles would be lost in the rounding of their corners
+        sides = corners - corners[:, :1]  # else tiny triangles are lost in the rounding of their corners
         dirichlet = np.einsum("mij,mic,mjc->m", self._stiffness, sides, sides)
-        told_apart = area > _LEAST_ROOM * self._area
-        squeezed = np.divide(self._area, area, out=np.ones(len(area)), where=told_apart)
-        return np.where(told_apart, dirichlet * (1.0 + squeezed**2), np.inf)
+        regular = area > _LEAST_ROOM * self._area
+        squeezed = np.divide(self._area, area, out=np.ones(len(area)), where=regular)
+        return np.where(regular, dirichlet * (1.0 + squeezed**2), np.inf)
 
     def energy(self, directions: Array) -> float:
         """Return the energy of all triangles."""
@@ -189,9 +192,9 @@ class _Triangles:
         corners, count = directions[self.faces], len(self.faces)
         area = 0.5 * _volumes(corners)[:, None, None]
         sides = corners - corners[:, :1]
-        towards = 2.0 * self._stiffness @ sides  # of the Dirichlet energy (m, 3, 3)
+        towards = 2.0 * self._stiffness @ sides  # derivative of the Dirichlet energy (m, 3, 3)
         dirichlet = 0.5 * (towards * sides).sum(axis=(1, 2))[:, None, None]
-        wider = 0.5 * np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])  # of the area (m, 3, 3)
+        wider = 0.5 * np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])  # derivative of the area (m, 3, 3)
         square = self._area[:, None, None] ** 2
         factor, slope, bend = 1.0 + square / area**2, -2.0 * square / area**3, 6.0 * square / area**4
         gradient = factor * towards + slope * dirichlet * wider
@@ -225,7 +228,7 @@ def _area_bends(corners: Array) -> Array:
 def _relaxed(directions: Array, triangles: _Triangles, progress: ProgressCallback = ignore) -> Array:
     """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls.
 
-    Where the hemispheres squeeze triangles to less than the numbers can tell, the directions are returned as they are.
+    Directions with triangles too small for double precision are returned unchanged.
     """
     energy = triangles.energy(directions)
     unknowns = (2 * triangles.faces[:, :, None] + np.arange(2)).reshape(-1, 6)

@@ -25,10 +25,11 @@ _HOLLOW = 1.0  # extra weight of a piece in a hollow
 
 
 def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 0) -> Array:
-    """Return the rotation (3, 3) of a layout by which the cube's edges lie least in hollows; 1 is the next best, ...
+    """Return the rotation (3, 3) of a layout on the sphere that keeps the cube's edges best out of hollows.
 
-    The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
-    nearly are the same count as one. Where that leaves too few, the next best rotations that differ from all follow.
+    number: 0 for the best rotation, 1 for the next best, and so on. The best of some random rotations are turned
+    further by the simplex method of Nelder and Mead; results that nearly agree count as one. Where too few are left,
+    the next best random rotations that differ from all of them follow.
     """
     middles, along, bends = _bends(layout)
     simplex = _FIRST_TURN * np.vstack([np.zeros(3), np.eye(3)])
@@ -62,7 +63,7 @@ def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 
 
 
 def hollowness(layout: CubeLayout) -> float:
-    """Return how much the cube's edges lie in hollows of a layout, which `best_turn` makes small: below 0 on ridges."""
+    """Return the hollowness of a layout along the cube's edges, which `best_turn` minimises: negative on ridges."""
     return _hollowness(*_bends(layout))
 
 
@@ -71,14 +72,14 @@ def _is_other(rotation: Rotation, turns: list[Rotation]) -> bool:
 
 
 def _angle_between(first: Rotation, second: Rotation) -> float:
-    """Return the angle by which two turns of the cube differ, which looks the same from 24 sides."""
+    """Return the angle between two turns of the cube, the least over its 24 symmetries."""
     return float((first * second.inv()).reduce(left=Rotation.create_group("O")).magnitude())
 
 
 def _bends(layout: CubeLayout) -> tuple[Array, Array, Array]:
-    """Return of each mesh edge middle and direction on the sphere (e, 3), and how much the surface bends there (e,).
+    """Return the mesh edges' middles and directions on the sphere, (e, 3) each, and the surface's bends there (e,).
 
-    That is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
+    A bend is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """
     points, faces, places = layout.points, layout.faces, layout.places
     edges, owners = edge_triangles(faces)
@@ -97,7 +98,7 @@ def _bends(layout: CubeLayout) -> tuple[Array, Array, Array]:
 def _hollowness(middles: Array, along: Array, bends: Array) -> float:
     """Return the sum of the bends (e,) near the cube's edges, weighed by nearness and direction.
 
-    Along a cube edge they are summed piece by piece; what is above zero counts more.
+    The bends are summed over pieces of each cube edge; a positive sum, a hollow, counts more.
     """
     pieces = _bends_of_pieces(middles, along, bends, _EDGE_WIDTH, _PIECES)
     return float(pieces.sum() + _HOLLOW * np.maximum(pieces, 0.0).sum())

@@ -17,7 +17,7 @@ _CONVERGED = 1e-3  # a step that gains less than this share of the distance is t
 
 @dataclass(frozen=True)
 class Distances:
-    """Root mean square, mean and largest of some distances, one unit."""
+    """Root mean square, mean and maximum of distances, in one unit."""
 
     rms: float
     mean: float
@@ -40,11 +40,11 @@ class Distances:
 
 
 def nearest_on_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> tuple[Array, Array]:
-    """Return for points (m, 3) the parameters (m, 3) of the spline's nearest boundary points, and the distances (m,).
+    """Return the parameters (m, 3) of the spline's boundary points nearest to points (m, 3), and the distances (m,).
 
     The nearest point of the sampled triangles gives a cube face and parameters on it; Gauss-Newton steps in that face
-    then lower the distance to the spline itself. The distances are to points of the spline's boundary, so never less
-    than the true ones.
+    then lower the distance to the spline itself. The distances are those of points on the spline's boundary, so never
+    less than the true ones.
     """
     _, triangle, weights = closest_triangles(points, boundary.points, boundary.triangles)
     corners = boundary.triangles[triangle]  # (m, 3)

@@ -15,7 +15,7 @@ PER_SPAN = 3  # samples a direction in every span, at least
 
 @dataclass(frozen=True, eq=False)
 class SampledBoundary:
-    """The spline's boundary sampled on a grid a cube face, and the triangles between the samples."""
+    """The spline's boundary, sampled on a grid on each face of the cube, and the triangles between the samples."""
 
     parameters: Array  # (n, 3), face after face in the order of FACE_NAMES
     points: Array  # (n, 3)
@@ -24,7 +24,10 @@ class SampledBoundary:
 
     @classmethod
     def of(cls, volume: BSplineVolume, samples: int = SAMPLES) -> "SampledBoundary":
-        """Sample all six faces, edges included: each span alike, `samples` a direction at least."""
+        """Sample all six faces with their edges, each span alike, and at least `samples` times a direction.
+
+        Raises ValueError for fewer than two samples.
+        """
         if samples < 2:
             raise ValueError(f"samples must be at least 2, got {samples}")
         spans = [len(breakpoints(row)) - 1 for row in volume.knots]

@@ -38,10 +38,10 @@ class EdgePaths:
 
 @dataclass(frozen=True, eq=False)
 class BoundarySamples:
-    """What a stage knows of the surface: vertices (n, 3) at volume 1, triangles (m, 3), and what draws these.
+    """The surface data of a stage: vertices (n, 3) at volume 1, triangles (m, 3), and the sampler of the triangles.
 
-    From the later stages on also: corners (8,), vertices that go to the cube's corners; labels (m,), the cube face of
-    each triangle; and the paths to the cube's edges.
+    Later stages also have corners (8,), the vertices that go to the cube's corners; labels (m,), the cube face of each
+    triangle; and the paths to the cube's edges.
     """
 
     vertices: Tensor
@@ -93,7 +93,7 @@ class Objective:
         return total, int((det <= 0.0).sum()), {name: float(term.detach()) for name, term in terms.items()}
 
     def _goal(self, stage: Stage, boundary: BoundarySamples, surface: Tensor, picks: Tensor) -> Tensor:
-        """Return what the corners (3 t, 3) of the mapped triangles `picks` (t,) are to reach.
+        """Return the goals (3 t, 3) of the corners of the mapped triangles `picks` (t,).
 
         Once the surface is cut, each triangle goes to its own face of the cube.
         """
@@ -103,7 +103,7 @@ class Objective:
             return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
 
     def _held_terms(self, boundary: BoundarySamples, held: list[Tensor]) -> dict[str, Tensor]:
-        """Return the terms of L_bound for what is held: the mapped corners (8, 3), then the path points (k, 3)."""
+        """Return the terms of L_bound for the held vertices: the mapped corners (8, 3), then the path points (k, 3)."""
         terms = {}
         if boundary.corners is not None:
             terms["cor"] = distance(held[0], torch.as_tensor(CORNERS).to(held[0]))
@@ -175,7 +175,8 @@ def triangle_normals(corners: Tensor) -> Tensor:
 def normal_difference(normals: Tensor, target: Tensor, wrong_side: float) -> Tensor:
     """Return L_norm of eq. (3), the mean squared difference of unit normals, plus a term that the paper does not have.
 
-    That is `wrong_side` times the mean of (-<n, n_target>)_+: opposite normals are a stationary point of the first.
+    The additional term is `wrong_side` times the mean of (-<n, n_target>)_+: at opposite normals the first term is
+    stationary.
     """
     opposed = (-(normals * target).sum(dim=1)).clamp_min(0.0).mean()
     return (normals - target).square().sum(dim=1).mean() + wrong_side * opposed
@@ -192,7 +193,7 @@ def star_shape(corners: Tensor, normals: Tensor) -> Tensor:
 
 
 def edge_path(mapped: Tensor, target: Tensor, following: Tensor) -> Tensor:
-    """Return L_edge of eq. (3): how far path points (k, 3) are from the cube's edges, and their directions.
+    """Return L_edge of eq. (3): the mean squared distances of path points (k, 3) and directions to those on the edges.
 
     following: (s, 2) pairs of consecutive path points.
     """
