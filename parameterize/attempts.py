@@ -15,7 +15,8 @@ from .coarse import coarse_knots, optimize_coarse_first
 from .config import Config, ExtensionConfig, GrowthConfig, SplineConfig
 from .cube.cutting import subdivide_finely
 from .cube.edge_paths import PathError, choose_corners, lay_out
-from .cube.flips import Layout, flipped, untangle
+from .cube.flips import flipped, untangle
+from .cube.layout import CubeLayout
 from .cube.sphere import lay_on_sphere
 from .extension import extended, extending
 from .growth import first_cube, growing, stiffened, surface_on_cube
@@ -62,10 +63,10 @@ class Task:
         )
 
     @cached_property
-    def sphere(self) -> Layout:
+    def sphere(self) -> CubeLayout:
         """The surface at volume 1, laid on the sphere."""
         surface = self.surface
-        return lay_on_sphere(surface.unit_vertices, surface.faces, self.config.layout, self.report["progress"])
+        return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +161,7 @@ def _grown(task: Task, growth: GrowthConfig, checkpoints: Checkpoints) -> Attemp
     with timed(task.seconds, "fit"), one_thread_an_operation():
         layout = _on_cube(task, growth.turn)
         fit = _surface_fit(layout, spline, task)
-        control = first_cube(layout, task.own, fit.places.knots, spline.degree)
+        control = first_cube(layout, fit.places.knots, spline.degree)
     attempt = _optimized(control, fit, spline, task, checkpoints, "growth")
     return replace(attempt, spline=stiffened(task.config.spline, growth))
 
@@ -175,9 +176,8 @@ def _extended(task: Task, extension: ExtensionConfig, checkpoints: Checkpoints) 
     return _optimized(control, fit, spline, task, checkpoints, "extension")
 
 
-def _on_cube(task: Task, turn: int) -> Layout:
-    config = task.config
-    return surface_on_cube(task.sphere, task.own, config.spline, config.layout, seed=task.seed, turn=turn)
+def _on_cube(task: Task, turn: int) -> CubeLayout:
+    return surface_on_cube(task.sphere, task.config.spline, seed=task.seed, turn=turn)
 
 
 def _optimized(
@@ -199,32 +199,32 @@ def _fault(found: Optimized) -> str:
     return "the boundary meets itself" if found.meets_itself else "not certified"
 
 
-def _surface_fit(layout: Layout, spline: SplineConfig, task: Task) -> SurfaceFit:
+def _surface_fit(layout: CubeLayout, spline: SplineConfig, task: Task) -> SurfaceFit:
     """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
     return SurfaceFit(
-        SlidingParameters(coarse_knots(spline), spline.degree, layout.places, layout.faces, task.config.layout),
-        layout.vertices,
-        vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
-        vertex_weights(layout.vertices, layout.faces, task.own),
+        SlidingParameters(coarse_knots(spline), spline.degree, layout.places, layout.faces),
+        layout.points,
+        vertex_quadrics(layout.points, layout.faces, spline.tangential),
+        vertex_weights(layout.points, layout.faces, layout.n_own),
         given_corners=None if task.given_corners is None else task.mesh[0][task.given_corners],
     )
 
 
-def _layout(mapped: Array, corners: IntArray | None, task: Task) -> Layout:
+def _layout(mapped: Array, corners: IntArray | None, task: Task) -> CubeLayout:
     """Return nearest points on the cube, untangled; where that leaves flips, patches between traced edges.
 
     The first stays closer to the network's map, the second always succeeds where the edges can be traced.
     """
-    vertices, faces = task.mesh
+    layout = CubeLayout(*task.mesh, mapped, task.own)
     nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
-    untangled = untangle(nearest, faces, task.config.layout)
-    if flipped(untangled, faces).mean() > task.config.spline.few_flips:
+    untangled = untangle(nearest, layout.faces)
+    if flipped(untangled, layout.faces).mean() > task.config.spline.few_flips:
         try:
             chosen = choose_corners(mapped) if corners is None else corners
-            return lay_out(mapped, vertices, faces, chosen, task.config.layout)
+            return lay_out(layout, chosen)
         except PathError as error:
             _log.warning("the first layout has flipped triangles: %s", error)
-    return Layout(vertices, faces, untangled)
+    return replace(layout, places=untangled)
 
 
 def _first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineConfig) -> torch.Tensor:

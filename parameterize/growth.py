@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from .arrays import Knots
-from .config import GrowthConfig, LayoutConfig, SplineConfig
+from .config import GrowthConfig, SplineConfig
 from .cube.cube import project_radially, snap
 from .cube.cutting import cut_along_rays, subdivide_finely
-from .cube.flips import Layout
+from .cube.layout import CubeLayout
 from .cube.turning import best_turn
 from .spline.bspline import greville
 from .surface.geometry import vertex_weights
@@ -46,25 +46,23 @@ def stiffened(spline: SplineConfig, growth: GrowthConfig) -> SplineConfig:
     return replace(spline, fairness=growth.stiffness * spline.fairness, least_floor=growth.least_floor)
 
 
-def surface_on_cube(
-    sphere: Layout, own: int, spline: SplineConfig, options: LayoutConfig, *, seed: int, turn: int
-) -> Layout:
+def surface_on_cube(sphere: CubeLayout, spline: SplineConfig, *, seed: int, turn: int) -> CubeLayout:
     """Lay a closed surface, laid on the sphere, on the cube without a flipped triangle, its long edges cut.
 
-    own: how many vertices are the mesh's; these stay first. seed: draws how the cube may be turned; turn: 0 takes the
+    seed: draws how the cube may be turned; turn: 0 takes the
     best of these ways, 1 the next, ...
     """
-    rotation = best_turn(sphere, options, np.random.default_rng(seed), turn)
-    columns = np.hstack([sphere.vertices, sphere.places @ rotation.T])
-    columns, faces = subdivide_finely(columns, sphere.faces, spline.longest_edge, own + spline.most_points)
+    rotation = best_turn(sphere, np.random.default_rng(seed), turn)
+    columns = np.hstack([sphere.points, sphere.places @ rotation.T])
+    columns, faces = subdivide_finely(columns, sphere.faces, spline.longest_edge, sphere.n_own + spline.most_points)
     points, places = columns[:, :3], 0.5 + project_radially(columns[:, 3:])
-    cut = cut_along_rays(places, faces, options.path_snap)
-    return Layout(cut.carry(points), cut.faces, snap(cut.carry(places)))
+    cut = cut_along_rays(places, faces).laid_out(CubeLayout(points, faces, places, sphere.n_own))
+    return replace(cut, places=snap(cut.places))
 
 
-def first_cube(layout: Layout, own: int, knots: Knots, degree: int) -> Tensor:
+def first_cube(layout: CubeLayout, knots: Knots, degree: int) -> Tensor:
     """Return control points (3, n_u, n_v, n_w) of the unit cube, turned so that it faces the surface as laid out."""
-    weights = vertex_weights(layout.vertices, layout.faces, own)
-    rotation, _ = Rotation.align_vectors(layout.vertices - 0.5, layout.places - 0.5, weights)
+    weights = vertex_weights(layout.points, layout.faces, layout.n_own)
+    rotation, _ = Rotation.align_vectors(layout.points - 0.5, layout.places - 0.5, weights)
     points = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1) - 0.5
     return torch.as_tensor(np.ascontiguousarray(np.moveaxis(0.5 + points @ rotation.as_matrix().T, -1, 0)))

@@ -8,7 +8,7 @@ from shapes import ball, is_closed
 from small_run import tiny_config
 
 from parameterize import parameterize
-from parameterize.config import LAYOUT, preset
+from parameterize.config import preset
 from parameterize.cube.flips import flipped
 from parameterize.cube.sphere import lay_on_sphere
 from parameterize.growth import first_cube, growing, surface_on_cube
@@ -29,8 +29,8 @@ def bent_rod(count=900):
 
 
 def on_cube(surface, spline, seed=0):
-    sphere = lay_on_sphere(surface.unit_vertices, surface.faces, LAYOUT)
-    return surface_on_cube(sphere, len(surface.vertices), spline, LAYOUT, seed=seed, turn=0)
+    sphere = lay_on_sphere(surface.unit_vertices, surface.faces)
+    return surface_on_cube(sphere, spline, seed=seed, turn=0)
 
 
 def test_a_bent_rod_lies_on_the_cube_without_a_flip():
@@ -39,7 +39,7 @@ def test_a_bent_rod_lies_on_the_cube_without_a_flip():
     assert not flipped(layout.places, layout.faces).any()
     assert is_closed(layout.faces)
     assert np.abs(layout.places - 0.5).max(axis=1) == pytest.approx(0.5)
-    assert np.array_equal(layout.vertices[: len(surface.vertices)], surface.unit_vertices)
+    assert np.array_equal(layout.points[: len(surface.vertices)], surface.unit_vertices)
     others = on_cube(surface, spline, seed=1)
     assert not np.allclose(others.places[:100], layout.places[:100])
 
@@ -48,15 +48,15 @@ def test_the_first_map_is_a_cube_that_faces_the_surface():
     surface, spline = bent_rod(), preset("fast").with_control_points(8).spline
     layout = on_cube(surface, spline)
     knots = (open_uniform_knots(8, 3),) * 3
-    control = first_cube(layout, len(surface.vertices), knots, 3)
+    control = first_cube(layout, knots, 3)
     found = Optimized.of(control, knots, spline)
     assert found.certificate.verdict == "certified"
     assert found.certificate.lower_bound == pytest.approx(1.0)
     flat = np.moveaxis(control.numpy(), 0, -1)
     axes = np.stack([flat[-1, 0, 0] - flat[0, 0, 0], flat[0, -1, 0] - flat[0, 0, 0], flat[0, 0, -1] - flat[0, 0, 0]])
     assert axes @ axes.T == pytest.approx(np.eye(3))
-    towards = ((layout.places - 0.5) @ axes * (layout.vertices - 0.5)).sum()
-    assert towards > ((layout.places - 0.5) @ (axes @ np.diag([-1.0, -1.0, 1.0])) * (layout.vertices - 0.5)).sum()
+    towards = ((layout.places - 0.5) @ axes * (layout.points - 0.5)).sum()
+    assert towards > ((layout.places - 0.5) @ (axes @ np.diag([-1.0, -1.0, 1.0])) * (layout.points - 0.5)).sum()
 
 
 def test_the_rounds_in_which_it_grows_come_first():

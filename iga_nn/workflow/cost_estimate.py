@@ -128,7 +128,7 @@ def forecast(
 def _training_steps(config: Config) -> tuple[float, float]:
     """Return the steps for an easy surface, and those that show one to be hard: the first stage's."""
     steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
-    steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.target == "cube"), 0))
+    steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.name == "cube"), 0))
     look = steps if limit is None or config.starts == 1 else config.stages[0].steps
     return look if limit == 0.0 else steps, look
 

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from ..arrays import Array, IntArray, Knots
-from ..quality.distances import SampledBoundary
+from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_normals
 from .operators import ControlRows, PiecewiseOperator

@@ -13,8 +13,8 @@ from torch import Tensor
 from ..arrays import Array, Knots
 from ..config import SplineConfig
 from ..cube.cube import CORNERS, EDGES
-from ..quality.distances import nearest_on_mesh
 from ..spline.bspline import divided_spans
+from ..surface.nearest import nearest_on_mesh
 from .sliding import SlidingParameters
 from .surface_distance import SurfaceFit
 
