@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-import torch
 
 from .arrays import Array, IntArray
 from .checkpoint import Checkpoints
@@ -20,14 +19,16 @@ from .cube.sphere import lay_on_sphere
 from .extension import extended, extending
 from .growth import first_cube, growing, stiffened, surface_on_cube
 from .optimization.least_squares import fit_pairs
-from .optimization.rounds import Optimized, one_thread_an_operation
+from .optimization.rounds import Optimized
 from .optimization.sliding import SlidingParameters
 from .optimization.surface_distance import SurfaceFit
 from .progress import timed
 from .surface.geometry import vertex_quadrics, vertex_weights
 from .surface.surface import Surface
+from .threads import one_blas_thread
+from .training.backend import one_thread_an_operation
 from .training.samples import interior_points
-from .training.target_shapes import nearest_on_cube
+from .training.target_shapes import nearest_places
 from .training.trainer import Trainer, map_points
 
 _log = logging.getLogger(__name__)
@@ -42,8 +43,8 @@ class Task:
     surface: Surface
     config: Config
     seed: int
-    device: torch.device
-    dtype: torch.dtype
+    device: str  # where the network is trained, "cpu" or "cuda"
+    dtype: str  # its precision, "float32" or "float64"
     given_corners: IntArray | None
     seconds: dict[str, float]  # which grow as the run goes on
     report: dict[str, Any]  # history and progress, as Trainer and optimize take them
@@ -145,11 +146,11 @@ def _trained(task: Task, checkpoints: Checkpoints, *, give_up: bool) -> Attempt 
         return None
     spline = task.config.spline
     vertices, faces = task.mesh
-    with timed(task.seconds, "fit"), one_thread_an_operation():
-        mapped = map_points(network, vertices, task.device, task.dtype)
+    with timed(task.seconds, "fit"), one_thread_an_operation(), one_blas_thread():
+        mapped = map_points(network, vertices)
         fit = _surface_fit(_layout(mapped, trainer.corners, task), spline, task)
         inside = interior_points(vertices, faces, spline.fit_cell)
-        places = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
+        places = map_points(network, inside).clip(0.0, 1.0)
         control = _first_spline(inside, places, fit, spline)
     return _optimized(control, fit, spline, task, checkpoints, "network")
 
@@ -157,7 +158,7 @@ def _trained(task: Task, checkpoints: Checkpoints, *, give_up: bool) -> Attempt 
 def _grown(task: Task, growth: GrowthConfig, checkpoints: Checkpoints) -> Attempt:
     """Lay the surface on the cube and let F grow towards it."""
     spline = growing(task.config.spline, growth)
-    with timed(task.seconds, "fit"), one_thread_an_operation():
+    with timed(task.seconds, "fit"), one_blas_thread():
         layout = _on_cube(task, growth.turn)
         fit = _surface_fit(layout, spline, task)
         control = first_cube(layout, task.own, fit.places.knots, spline.degree)
@@ -168,7 +169,7 @@ def _grown(task: Task, growth: GrowthConfig, checkpoints: Checkpoints) -> Attemp
 def _extended(task: Task, extension: ExtensionConfig, checkpoints: Checkpoints) -> Attempt:
     """Lay the surface on the cube and fit F to that layout, extended into the solid."""
     spline = extending(task.config.spline, extension)
-    with timed(task.seconds, "fit"), one_thread_an_operation():
+    with timed(task.seconds, "fit"), one_blas_thread():
         layout = _on_cube(task, 0)
         fit = _surface_fit(layout, spline, task)
         control = _first_spline(*extended(layout, extension), fit, spline)
@@ -181,7 +182,7 @@ def _on_cube(task: Task, turn: int) -> Layout:
 
 
 def _optimized(
-    control: torch.Tensor,
+    control: Array,
     fit: SurfaceFit,
     spline: SplineConfig,
     task: Task,
@@ -216,7 +217,7 @@ def _layout(mapped: Array, corners: IntArray | None, task: Task) -> Layout:
     The first stays closer to the network's map, the second always succeeds where the edges can be traced.
     """
     vertices, faces = task.mesh
-    nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
+    nearest = nearest_places(mapped)
     untangled = untangle(nearest, faces, task.config.layout)
     if flipped(untangled, faces).mean() > task.config.spline.few_flips:
         try:
@@ -227,7 +228,7 @@ def _layout(mapped: Array, corners: IntArray | None, task: Task) -> Layout:
     return Layout(vertices, faces, untangled)
 
 
-def _first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineConfig) -> torch.Tensor:
+def _first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineConfig) -> Array:
     """Fit by least squares to pairs (k, 3) of places and points inside, and the boundary's (section 4.3.2, step 2)."""
     weights = [
         np.full(len(inside), (1.0 - spline.boundary_share) / max(len(inside), 1)),

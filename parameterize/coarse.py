@@ -9,10 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from .arrays import Knots
+from .arrays import Array, Knots
 from .checkpoint import Checkpoints
 from .config import SplineConfig
 from .optimization.rounds import Optimized, optimize
@@ -28,7 +26,7 @@ def coarse_knots(config: SplineConfig) -> Knots:
 
 
 def optimize_coarse_first(
-    control: Tensor,
+    control: Array,
     fit: SurfaceFit,
     config: SplineConfig,
     *,
@@ -55,8 +53,8 @@ def optimize_coarse_first(
     return optimize(control, fine, fit, config, checkpoints=checkpoints, begun=begun, **report), fit
 
 
-def interpolated(control: Tensor, knots: Knots, finer: Knots, degree: int) -> Tensor:
+def interpolated(control: Array, knots: Knots, finer: Knots, degree: int) -> Array:
     """Return the control points (3, n_u, n_v, n_w) on other knots of the map that agrees at their Greville points."""
     places = [greville(row, degree) for row in finer]
-    values = evaluate_grid((degree,) * 3, knots, np.moveaxis(control.numpy(), 0, -1), places)
-    return torch.as_tensor(np.ascontiguousarray(np.moveaxis(interpolate_grid(finer, degree, values), -1, 0)))
+    values = evaluate_grid((degree,) * 3, knots, np.moveaxis(control, 0, -1), places)
+    return np.ascontiguousarray(np.moveaxis(interpolate_grid(finer, degree, values), -1, 0))

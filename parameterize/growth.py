@@ -9,11 +9,9 @@ Sorkine-Hornung, SGP 2013).
 from dataclasses import replace
 
 import numpy as np
-import torch
 from scipy.spatial.transform import Rotation
-from torch import Tensor
 
-from .arrays import Knots
+from .arrays import Array, Knots
 from .config import GrowthConfig, LayoutConfig, SplineConfig
 from .cube.cube import project_radially, snap
 from .cube.cutting import cut_along_rays, subdivide_finely
@@ -62,9 +60,9 @@ def surface_on_cube(
     return Layout(cut.carry(points), cut.faces, snap(cut.carry(places)))
 
 
-def first_cube(layout: Layout, own: int, knots: Knots, degree: int) -> Tensor:
+def first_cube(layout: Layout, own: int, knots: Knots, degree: int) -> Array:
     """Return control points (3, n_u, n_v, n_w) of the unit cube, turned so that it faces the surface as laid out."""
     weights = vertex_weights(layout.vertices, layout.faces, own)
     rotation, _ = Rotation.align_vectors(layout.vertices - 0.5, layout.places - 0.5, weights)
     points = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1) - 0.5
-    return torch.as_tensor(np.ascontiguousarray(np.moveaxis(0.5 + points @ rotation.as_matrix().T, -1, 0)))
+    return np.ascontiguousarray(np.moveaxis(0.5 + points @ rotation.as_matrix().T, -1, 0))

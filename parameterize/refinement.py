@@ -10,7 +10,6 @@ from itertools import count
 from typing import Any, Literal
 
 import numpy as np
-import torch
 
 from .arrays import Array, IntArray, Knots
 from .certificate.determinant import DeterminantForm
@@ -120,7 +119,7 @@ class _Spots:
     @classmethod
     def of(cls, found: Optimized, fit: SurfaceFit, config: SplineConfig) -> "_Spots":
         """Measure as the report will."""
-        volume = BSplineVolume((config.degree,) * 3, fit.places.knots, found.control.permute(1, 2, 3, 0).cpu().numpy())
+        volume = BSplineVolume((config.degree,) * 3, fit.places.knots, np.moveaxis(found.control, 0, -1))
         gaps = two_sided(volume, fit.points, fit.places.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
         unproved = found.certificate.unproved
@@ -156,12 +155,12 @@ def totals_along(places: Array, amounts: Array, knots: Knots) -> list[Array]:
 def _chosen_knots(spots: _Spots, config: SplineConfig, refinement: RefinementConfig, checkpoints: Checkpoints) -> Knots:
     """Return finer knots, those of the checkpoint where there is one, and keep them in a checkpoint."""
     if (saved := checkpoints.load(_CHECKPOINT)) is not None:
-        u, v, w = (saved[0][axis].numpy() for axis in "uvw")
+        u, v, w = (saved[0][axis] for axis in "uvw")
         return u, v, w
     narrowest = refinement.narrowest / (config.control_points - config.degree)
     amounts = spots.amounts(refinement.distortion)
     finer = halved_where_most(spots.volume.knots, amounts, np.array(spots.volume.shape), refinement, narrowest)
-    checkpoints.save(_CHECKPOINT, {axis: torch.as_tensor(row) for axis, row in zip("uvw", finer, strict=True)}, {})
+    checkpoints.save(_CHECKPOINT, dict(zip("uvw", finer, strict=True)), {})
     return finer
 
 
@@ -213,7 +212,7 @@ def _optimized_on(
     form = DeterminantForm(start)
     nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < config.min_coefficient)
     found = optimize(
-        torch.as_tensor(np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0))),
+        np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0)),
         finer,
         surface,
         later,

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray
@@ -25,6 +24,7 @@ from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
 from .spline.volume import BSplineVolume
 from .surface.surface import Surface
+from .training.backend import choose_device, choose_precision
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,7 +83,7 @@ def parameterize(
     *,
     seed: int = 0,
     device: str = "auto",
-    dtype: torch.dtype = torch.float32,
+    dtype: str = "float32",
     corners: ArrayLike | None = None,
     progress: ProgressCallback | None = None,
     checkpoint_dir: str | Path | None = None,
@@ -102,8 +102,8 @@ def parameterize(
         change the result on a CPU.
     device : str
         Where the network trains: "auto", "cpu" or "cuda".
-    dtype : torch.dtype
-        Of the network.
+    dtype : str
+        Precision of the network: "float32" or "float64".
     corners : (8, 3) array or (8,) array of int, optional
         The cube's corners on the surface: points in the surface's units, which take their nearest vertices, or vertex
         numbers; in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1). Chosen by the method where they are not given.
@@ -124,7 +124,7 @@ def parameterize(
     TypeError
         For a surface, config, seed or progress of another type.
     ValueError
-        For a negative seed, bad corners or a device that is not there.
+        For a negative seed, bad corners, another precision or a device that is not there.
     CheckpointError
         For a checkpoint of another run.
     PathError
@@ -141,7 +141,7 @@ def parameterize(
     config, seed = _checked(surface, config, seed)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
-    place = choose_device(device)
+    place, dtype = choose_device(device), choose_precision(dtype)
     given = None if corners is None else corner_vertices(surface, corners)
     identity = _identity(surface, config, seed, place, dtype, given)
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
@@ -167,7 +167,7 @@ def parameterize(
         quality=quality,
         history=history.arrays(),
         seconds=seconds,
-        device=place.type,
+        device=place,
         seed=seed,
         config=config,
         origin=attempt.origin,
@@ -183,24 +183,24 @@ def check_checkpoint(
     device: str,
     corners: ArrayLike | None,
     checkpoint_dir: Path,
-    dtype: torch.dtype = torch.float32,
+    dtype: str = "float32",
 ) -> None:
     """Raise CheckpointError where a run of these arguments of `parameterize` could not go on from that folder."""
     given = None if corners is None else corner_vertices(surface, corners)
-    identity = _identity(surface, config, seed, choose_device(device), dtype, given)
+    identity = _identity(surface, config, seed, choose_device(device), choose_precision(dtype), given)
     Checkpoints(checkpoint_dir, identity, resume=True).check()
 
 
 def _identity(
-    surface: Surface, config: Config, seed: int, device: torch.device, dtype: torch.dtype, corners: IntArray | None
+    surface: Surface, config: Config, seed: int, device: str, dtype: str, corners: IntArray | None
 ) -> dict[str, Any]:
     """Return what the checkpoints of a run are known by."""
     return {
         "surface": hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest(),
         "config": asdict(config),
         "seed": seed,
-        "device": device.type,
-        "dtype": str(dtype),
+        "device": device,
+        "dtype": dtype,
         "corners": None if corners is None else corners.tolist(),
     }
 
@@ -215,16 +215,6 @@ def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config
     if seed < 0:
         raise ValueError(f"seed must not be negative, got {seed}")
     return config or preset("fast"), int(seed)
-
-
-def choose_device(name: str) -> torch.device:
-    """Return the torch device for "auto", "cpu" or "cuda". Raises ValueError where it is not there."""
-    if name not in ("auto", "cpu", "cuda"):
-        raise ValueError(f"device {name!r}: choose auto, cpu or cuda")
-    available = torch.cuda.is_available()
-    if name == "cuda" and not available:
-        raise ValueError("device cuda: torch finds no CUDA device here; use --device cpu")
-    return torch.device("cuda" if available and name != "cpu" else "cpu")
 
 
 def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
@@ -253,7 +243,7 @@ def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSpl
     """Return the volume and its boundary map; parameters are first brought close to this volume's closest points."""
     surface, spline = task.surface, task.config.spline
     places = fit.places.settled(found.control, fit.points, spline.last_slides, spline.last_sweeps)
-    points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
+    points = surface.from_unit(np.moveaxis(found.control, 0, -1))
     volume = BSplineVolume((spline.degree,) * 3, places.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
     boundary = boundary_map(volume, own, places.triangles, places.parameters, task.config.layout)

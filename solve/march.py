@@ -13,6 +13,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.display import Brief, above
 from parameterize.spline.volume import BSplineVolume
+from parameterize.threads import one_blas_thread
 
 from .diagnostics import ConvergenceError
 from .discretization.operator import Operator, assemble
@@ -28,7 +29,7 @@ from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
 from .solver import prepared
-from .system import SolverOptions, System, assemble_data, build, one_blas_thread
+from .system import SolverOptions, System, assemble_data, build
 
 Equation = Poisson | Elasticity | Problem
 SCHEMES = ("bdf2", "trapezoidal")

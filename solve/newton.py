@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
+from parameterize.threads import one_blas_thread
 
 from .diagnostics import ConvergenceError, judge
 from .discretization.errors import error_norms
@@ -22,7 +23,7 @@ from .linear.krylov import INDEFINITE, conjugate_gradients, generalized_residual
 from .linear.preconditioner import fast_diagonalization
 from .solution import Solution, SolveReport
 from .solver import prepared
-from .system import SolverOptions, assemble_data, one_blas_thread
+from .system import SolverOptions, assemble_data
 
 ENOUGH = 0.8  # share of the forces along a step that may be left at its end
 SHORTEST = 2.0**-12  # of a step

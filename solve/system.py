@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
-from threadpoolctl import ThreadpoolController
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.threads import one_blas_thread
 
 from .diagnostics import ConvergenceError, failure, judge, map_notices
 from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
@@ -41,12 +41,6 @@ LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
 LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
 log = logging.getLogger(__name__)
-_controller = functools.cache(ThreadpoolController)  # looks for the libraries at its first use, when they are loaded
-
-
-def one_blas_thread() -> Any:
-    """Context in which each matrix product stays in the thread that calls it: the threads are ours to share out."""
-    return _controller().limit(limits=1, user_api="blas")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -52,7 +52,7 @@ def test_the_first_map_is_a_cube_that_faces_the_surface():
     found = Optimized.of(control, knots, spline)
     assert found.certificate.verdict == "certified"
     assert found.certificate.lower_bound == pytest.approx(1.0)
-    flat = np.moveaxis(control.numpy(), 0, -1)
+    flat = np.moveaxis(control, 0, -1)
     axes = np.stack([flat[-1, 0, 0] - flat[0, 0, 0], flat[0, -1, 0] - flat[0, 0, 0], flat[0, 0, -1] - flat[0, 0, 0]])
     assert axes @ axes.T == pytest.approx(np.eye(3))
     towards = ((layout.places - 0.5) @ axes * (layout.vertices - 0.5)).sum()

@@ -2,7 +2,6 @@ import tracemalloc
 
 import numpy as np
 import pytest
-import torch
 from bernstein import bernstein_coefficients
 
 from parameterize.optimization.determinant_penalty import SpanBarrier, edge_spans
@@ -15,7 +14,7 @@ def setting(degree, amplitude, seed=0, n=(6, 5, 7)):
     rows = [greville(k, degree) for k in knots]
     points = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1)
     points = points + amplitude * np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape)
-    return knots, torch.as_tensor(np.moveaxis(points, -1, 0).copy()), BSplineVolume((degree,) * 3, knots, points)
+    return knots, np.moveaxis(points, -1, 0).copy(), BSplineVolume((degree,) * 3, knots, points)
 
 
 def all_spans(volume):
@@ -55,7 +54,7 @@ def test_gradient_against_finite_differences():
     barrier.activate(all_spans(volume))
     _, gradient = barrier.energy_and_gradient(control)
     for seed in range(3):
-        direction = torch.randn(control.shape, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+        direction = np.random.default_rng(seed).normal(size=control.shape)
         h = 1e-6
         ahead, behind = (barrier.energy_and_gradient(control + s * h * direction)[0] for s in (1.0, -1.0))
         assert float((gradient * direction).sum()) == pytest.approx((ahead - behind) / (2.0 * h), rel=1e-5)
@@ -67,7 +66,7 @@ def test_nothing_to_pay_above_the_floor_or_without_spans():
     for spans in (np.zeros((0, 3), dtype=np.int64), all_spans(volume)):
         barrier.activate(spans)
         energy, gradient = barrier.energy_and_gradient(control)
-        assert energy == 0.0 and float(gradient.abs().max()) == 0.0
+        assert energy == 0.0 and not gradient.any()
 
 
 def test_activating_twice_counts_once():
@@ -111,15 +110,15 @@ def test_curvature_is_gauss_newton():
     barrier = SpanBarrier(knots, 3, 0.8)
     spans = all_spans(volume)
     barrier.activate(spans)
-    step = torch.randn(control.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    step = np.random.default_rng(1).normal(size=control.shape)
 
     def coefficients(x):
-        return bernstein_coefficients(BSplineVolume((3,) * 3, knots, np.moveaxis(x.numpy(), 0, -1)), spans)
+        return bernstein_coefficients(BSplineVolume((3,) * 3, knots, np.moveaxis(x, 0, -1)), spans)
 
     change = (coefficients(control + 1e-6 * step) - coefficients(control - 1e-6 * step)) / 2e-6
     change = np.where(coefficients(control) < 0.8, change, 0.0)
     expected = 2.0 * (change**2).mean(axis=(1, 2, 3)).sum() / len(spans)
-    found = float((step * barrier.curvature(control)(step.float())).sum())
+    found = float((step * barrier.curvature(control)(step.astype(np.float32))).sum())
     assert found == pytest.approx(expected, rel=3e-3)
 
 
@@ -127,7 +126,7 @@ def test_rows_that_are_not_kept_are_made_anew_with_the_same_result(monkeypatch):
     knots, control, volume = setting(3, 0.2, n=(8, 8, 8))
     barrier = SpanBarrier(knots, 3, 0.8)
     barrier.activate(all_spans(volume))
-    step = torch.randn(control.shape, generator=torch.Generator().manual_seed(0))
+    step = np.random.default_rng(0).normal(size=control.shape)
     products, held = [], []
     for most in (1e9, 1e6, 0.0):
         monkeypatch.setattr("parameterize.optimization.determinant_penalty._MOST_KEPT", most)
@@ -136,5 +135,5 @@ def test_rows_that_are_not_kept_are_made_anew_with_the_same_result(monkeypatch):
         held.append(tracemalloc.get_traced_memory()[0])
         tracemalloc.stop()
         products.append(curvature(step))
-    assert torch.equal(products[0], products[1]) and torch.equal(products[0], products[2])
+    assert np.array_equal(products[0], products[1]) and np.array_equal(products[0], products[2])
     assert held[0] > 5e6 and held[1] < held[0] - 3e6 and held[2] < 1e6

@@ -2,7 +2,6 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
-import torch
 from shapes import rounded_cube, turned
 
 from parameterize import refinement
@@ -38,7 +37,7 @@ def surface_fit():
 def first():
     """A certified map, and its surface data."""
     fit, row = surface_fit(), greville(KNOTS[0], 3)
-    control = torch.as_tensor(np.stack(np.meshgrid(row, row, row, indexing="ij")))
+    control = np.stack(np.meshgrid(row, row, row, indexing="ij"))
     found = optimize(control, KNOTS, fit, CONFIG, history=History())
     assert not any(found.faults)
     return found, fit
@@ -52,7 +51,7 @@ def refined(first, checkpoints=None, progress=ignore, **options):
 
 def distance(found, fit):
     """Between the surface and the boundary of F, both ways, over the diagonal."""
-    volume = BSplineVolume((3,) * 3, fit.places.knots, found.control.permute(1, 2, 3, 0).numpy())
+    volume = BSplineVolume((3,) * 3, fit.places.knots, np.moveaxis(found.control, 0, -1))
     return two_sided(volume, fit.points, fit.places.triangles).summary().rms / np.linalg.norm(
         np.ptp(fit.points, axis=0)
     )
@@ -93,7 +92,7 @@ def test_no_direction_gets_more_than_the_limit(first):
 
 def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypatch, caplog):
     def folded(control, knots, *args, **options):
-        pressed = control.clone()
+        pressed = control.copy()
         pressed[:, 0, 0, 0] += 0.5
         return Optimized.of(pressed, knots, CONFIG)
 
@@ -108,7 +107,7 @@ def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypa
 
 def test_spans_that_are_not_proved_are_halved_first(first, monkeypatch):
     """A fold is pressed into one corner: what lies there is halved, and nothing else."""
-    control, seen = first[0].control.clone(), []
+    control, seen = first[0].control.copy(), []
     control[:, 0, 0, 0] += 0.5
     found = Optimized.of(control, KNOTS, CONFIG)
     assert set(map(tuple, found.certificate.unproved)) == {(0, 0, 0)}
@@ -136,7 +135,7 @@ def test_interrupted_and_resumed_is_undisturbed(first, once, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         refined(first, Checkpoints(tmp_path, {}, resume=False), interrupt, **options)
     resumed, _, again = refined(first, Checkpoints(tmp_path, {}, resume=True), **options)
-    assert torch.equal(resumed.control, undisturbed.control) and again == told
+    assert np.array_equal(resumed.control, undisturbed.control) and again == told
 
 
 def test_knots_once_chosen_are_those_of_the_checkpoint(first, once):

@@ -16,7 +16,8 @@ from parameterize.config import NetworkConfig
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.cube.cube import CORNERS
 from parameterize.cube.cutting import subdivide_finely
-from parameterize.run import choose_device, corner_vertices, parameterize
+from parameterize.run import corner_vertices, parameterize
+from parameterize.training.backend import choose_device, choose_precision
 from parameterize.training.trainer import start_map
 
 NOT_FAR = replace(tiny_config().growth, far=1.0)  # a few steps lead nowhere near the surface
@@ -290,13 +291,19 @@ def test_long_edges_add_so_many_points_at_most(surface, most):
 def test_devices():
     with pytest.raises(ValueError, match="'tpu'.*auto, cpu or cuda"):
         choose_device("tpu")
-    assert choose_device("cpu").type == "cpu"
+    assert choose_device("cpu") == "cpu"
     if torch.cuda.is_available():
-        assert choose_device("auto").type == choose_device("cuda").type == "cuda"
+        assert choose_device("auto") == choose_device("cuda") == "cuda"
     else:
-        assert choose_device("auto").type == "cpu"
+        assert choose_device("auto") == "cpu"
         with pytest.raises(ValueError, match="no CUDA device"):
             choose_device("cuda")
+
+
+def test_precisions():
+    assert choose_precision("float64") == choose_precision(torch.float64) == "float64"
+    with pytest.raises(ValueError, match="'float16'.*float32 or float64"):
+        choose_precision(torch.float16)
 
 
 def test_too_few_control_points_are_refused_at_once(surface):
@@ -341,9 +348,9 @@ def test_a_map_not_certified_is_grown_from_a_cube_then_extended(surface, monkeyp
     result = parameterize(surface, config, seed=3, device="cpu", checkpoint_dir=tmp_path)
     assert [growth for _, growth, _ in seen] == [None, config.growth, None]
     assert seen[2][2].shape == seen[0][2].shape  # on as many control points as the trained one
-    assert not torch.equal(seen[0][2], seen[2][2])
+    assert not np.array_equal(seen[0][2], seen[2][2])
     assert result.origin == "growth"
-    kept = np.moveaxis(seen[1][0].control.numpy(), 0, -1)
+    kept = np.moveaxis(seen[1][0].control, 0, -1)
     assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
     assert (result.history["stage"] == "cube").sum() == STEPS[2]  # trained once
     names = sorted(path.name for path in tmp_path.glob("*.safetensors"))
@@ -369,7 +376,7 @@ def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monk
     monkeypatch.setattr(attempts, "optimize_coarse_first", certified)
     result = parameterize(surface, replace(tiny_config(), starts=2), seed=3, device="cpu")
     assert len(seen) == len(meets)
-    kept = np.moveaxis(seen[meets.index(False) if False in meets else 0].control.numpy(), 0, -1)
+    kept = np.moveaxis(seen[meets.index(False) if False in meets else 0].control, 0, -1)
     assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
 
 
@@ -415,7 +422,7 @@ def test_after_a_certified_growth_far_from_the_surface_a_stiffer_one_is_tried_an
         caplog.clear()
         result = parameterize(surface, replace(config, growth=growth), seed=3, device="cpu")
         assert len(seen) == tries
-        kept = np.moveaxis(min(seen, key=lambda one: one[0])[1].numpy(), 0, -1)
+        kept = np.moveaxis(min(seen, key=lambda one: one[0])[1], 0, -1)
         assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
         assert ("far from the surface; growing a stiffer map instead" in caplog.text) == (tries == 2)
 

@@ -89,7 +89,8 @@ def _prepare(
     The folder is cleared once all of them are accepted; where a run is resumed, only when its map is there: the
     checkpoint may be refused.
     """
-    from parameterize.run import choose_device, corner_vertices
+    from parameterize.run import corner_vertices
+    from parameterize.training.backend import choose_device
 
     with input_errors():
         config, device = options.config(), choose_device(options.device)

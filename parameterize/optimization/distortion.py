@@ -4,15 +4,14 @@ from collections.abc import Callable
 
 import numba
 import numpy as np
-import torch
 from scipy.ndimage import uniform_filter
-from torch import Tensor
 
-from ..arrays import Array, Knots
+from ..arrays import Array, Floats, Knots
 from ..config import SplineConfig
+from ..quality.rotations import closest_rotations
 from ..threads import in_parallel
+from .matrices import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
 from .operators import PiecewiseOperator
-from .polar import closest_rotation, cofactor_and_determinant, least_eigenvalue
 from .tensor_product import SYMMETRIC, GaussGrid
 
 _LEAST_DET = 0.03  # in the metric of the damping
@@ -31,16 +30,16 @@ class DistortionEnergy:
         self._limit = config.arap_limit
         self._shares = np.ones_like(self._grid.weights)  # of config.min_det, which det J shall have at the points
 
-    def set_limit(self, control: Tensor) -> None:
+    def set_limit(self, control: Array) -> None:
         """Put the limit l above which distortion costs more in proportion to 1 + the mean distortion at `control`."""
 
         def part(planes: slice) -> float:
             jacobian = self._grid.jacobian(control, planes)
-            return float(self._weights(planes) @ (jacobian - closest_rotation(jacobian)).square().sum(dim=(0, 1)))
+            return float(self._weights(planes) @ squared_norms(jacobian - closest_rotations(jacobian)))
 
         self._limit = self._config.arap_limit * (1.0 + sum(in_parallel(part, self._grid.planes())))
 
-    def lower_floors(self, control: Tensor) -> Array:
+    def lower_floors(self, control: Array) -> Array:
         """Ask for less where det J is small all around at `control`; return the shares (n_u, n_v, n_w) of the spans.
 
         In a stalk that is far thinner than the rest all of det J is small. A penalty that asks for the usual one would
@@ -48,7 +47,7 @@ class DistortionEnergy:
         """
 
         def part(planes: slice) -> Array:
-            return np.asarray(cofactor_and_determinant(self._grid.jacobian(control, planes))[1].numpy())
+            return np.asarray(cofactors_and_determinants(self._grid.jacobian(control, planes))[1])
 
         weights = self._grid.weights
         det = np.concatenate(in_parallel(part, self._grid.planes())).reshape(weights.shape)
@@ -59,20 +58,20 @@ class DistortionEnergy:
         self._shares = self._grid.at_points(shares)
         return np.asarray(shares)
 
-    def energy_and_gradient(self, control: Tensor, penalty: float) -> tuple[float, Tensor, int]:
+    def energy_and_gradient(self, control: Array, penalty: float) -> tuple[float, Array, int]:
         """Energy, gradient (3, n_u, n_v, n_w), and the number of quadrature points with det J <= 0."""
         config = self._config
 
-        def part(planes: slice) -> tuple[float, int, tuple[int, Array]]:
+        def part(planes: slice) -> tuple[float, int, tuple[int, Floats]]:
             jacobian, weights = self._grid.jacobian(control, planes), self._weights(planes)
-            cofactors, det = cofactor_and_determinant(jacobian)
+            cofactors, det = cofactors_and_determinants(jacobian)
             share = self._shares_on(planes)
-            short = (share * config.min_det - det).clamp_min(0.0)
-            shortfall = weights / share.square() * short
-            gap = jacobian - closest_rotation(jacobian)
-            density = gap.square().sum(dim=(0, 1))
-            excess = (density - self._limit).clamp_min(0.0)
-            energy = weights @ (density + config.stiffening * excess.square())
+            short = np.maximum(share * config.min_det - det, 0.0)
+            shortfall = weights / share**2 * short
+            gap = jacobian - closest_rotations(jacobian)
+            density = squared_norms(gap)
+            excess = np.maximum(density - self._limit, 0.0)
+            energy = weights @ (density + config.stiffening * excess**2)
             energy += penalty * (shortfall @ short)
             dual = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess) * gap
             dual -= 2.0 * penalty * shortfall * cofactors
@@ -81,7 +80,7 @@ class DistortionEnergy:
         energies, folded, pulled = zip(*in_parallel(part, self._grid.planes()), strict=True)
         return sum(energies), self._grid.collect(list(pulled), control), sum(folded)
 
-    def curvature(self, control: Tensor, penalty: float, damping: float = 0.0) -> PiecewiseOperator:
+    def curvature(self, control: Array, penalty: float, damping: float = 0.0) -> PiecewiseOperator:
         """Return a positive semidefinite second derivative at `control`, as an operator in single precision.
 
         damping: times the squared change of J relative to J, to be added: det J bends most where it is small.
@@ -90,48 +89,58 @@ class DistortionEnergy:
         rows k, so the Hessian of a is 2 (d - R [omega]). It is positive where all sums of two singular values, the
         eigenvalues of tr(S) I - S, are at least 2; elsewhere these are lifted. The penalty's part is Gauss-Newton.
         """
-        rough, config = control.float(), self._config
+        rough, config = control.astype(np.float32), self._config
 
-        def piece(planes: slice) -> Callable[[Tensor], tuple[int, Array]]:
-            jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).float()
-            rotation = closest_rotation(jacobian)
-            cofactors, det = cofactor_and_determinant(jacobian)
-            share = self._shares_on(planes).float()
-            push = (2.0 * penalty * weights * (det < share * config.min_det)).sqrt() / share * cofactors
+        def piece(planes: slice) -> Callable[[Floats], tuple[int, Floats]]:
+            jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).astype(np.float32)
+            rotation = closest_rotations(jacobian)
+            cofactors, det = cofactors_and_determinants(jacobian)
+            share = self._shares_on(planes).astype(np.float32)
+            push = np.sqrt(2.0 * penalty * weights * (det < share * config.min_det)) / share * cofactors
             gap = jacobian - rotation
-            excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
-            pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
+            excess = np.maximum(squared_norms(gap) - self._limit, 0.0)
+            pull = np.sqrt(8.0 * config.stiffening * weights * (excess > 0.0)) * gap
             scale = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess)
             # |J^-1|^2 / 3: 1 for the identity, and bounded where det J vanishes
-            inverse = cofactors.square().sum(dim=(0, 1)) / (3.0 * det.clamp_min(_LEAST_DET).square())
-            held = 2.0 * damping * weights * inverse.clamp(1.0, 1.0 / _LEAST_DET**2)
-            parts = rotation, _turning(rotation, jacobian), pull.flatten(0, 1), push.flatten(0, 1), scale, held
-            return self._grid.squared(_matrices(*(p.contiguous().numpy() for p in parts)), planes)
+            inverse = squared_norms(cofactors) / (3.0 * np.maximum(det, _LEAST_DET) ** 2)
+            held = 2.0 * damping * weights * np.clip(inverse, 1.0, 1.0 / _LEAST_DET**2)
+            parts = rotation, _turning(rotation, jacobian), pull.reshape(9, -1), push.reshape(9, -1), scale, held
+            return self._grid.squared(_matrices(*parts), planes)
 
         return PiecewiseOperator(in_parallel(piece, self._grid.planes()), self._grid.collect)
 
-    def _weights(self, planes: slice) -> Tensor:
-        return torch.from_numpy(self._grid.weights[planes].ravel())
+    def _weights(self, planes: slice) -> Array:
+        return self._grid.weights[planes].ravel()
 
-    def _shares_on(self, planes: slice) -> Tensor:
-        return torch.from_numpy(self._shares[planes].ravel())
+    def _shares_on(self, planes: slice) -> Array:
+        return self._shares[planes].ravel()
 
 
-def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
+def _turning(rotation: Floats, jacobian: Floats) -> Floats:
     """Return (tr(S) I - S)^-1 with S = R^T J, its eigenvalues lifted so that the least is 2: (3, 3, m)."""
-    stretch = torch.stack([rotation[k][:, None] * jacobian[k] for k in range(3)]).sum(0)  # S, symmetric
-    sums = -stretch
+    sums = -_stretches(rotation, jacobian)
+    trace = sums[0, 0] + sums[1, 1] + sums[2, 2]
     for i in range(3):
-        sums[i, i] += stretch[0, 0] + stretch[1, 1] + stretch[2, 2]
-    lift = (2.0 - least_eigenvalue(sums)).clamp_min(0.0)
+        sums[i, i] -= trace
+    lift = np.maximum(2.0 - least_eigenvalues(sums), 0.0)
     for i in range(3):
         sums[i, i] += lift
-    cofactors, det = cofactor_and_determinant(sums)  # of a symmetric matrix
-    return cofactors / det
+    cofactors, det = cofactors_and_determinants(sums)  # of a symmetric matrix
+    return np.asarray(cofactors / det)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale: Array, held: Array) -> Array:
+def _stretches(rotation: Floats, jacobian: Floats) -> Floats:
+    """Return the symmetric matrices R^T J: (3, 3, m)."""
+    out = np.zeros_like(jacobian)
+    for a in range(3):
+        for b in range(3):
+            out[a, b] = dots(rotation[:, a], jacobian[:, b])
+    return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _matrices(rotation: Floats, softness: Floats, pull: Floats, push: Floats, scale: Floats, held: Floats) -> Floats:
     """Return the symmetric matrices of the second derivative in the nine entries of J: (45, m), see SYMMETRIC.
 
     scale (I - B softness B^T) + pull pull^T + push push^T + held I; B^T d is the sum of R_k x d_k over the rows k.

@@ -8,7 +8,6 @@ crosses itself beside them.
 """
 
 import numpy as np
-from torch import Tensor
 
 from ..arrays import Array, Knots
 from ..config import SplineConfig
@@ -41,13 +40,13 @@ class EdgeAnchors:
         places = SlidingParameters(knots, degree, points)
         self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
-    def near(self, control: Tensor) -> bool:
+    def near(self, control: Array) -> bool:
         """Return whether F is so close to the surface along all edges that the nearest points are the right ones."""
         here, points, _ = self._nearest(control)
         longest = self._config.near_edge / (min(control.shape[1:]) - self.fit.places.degree)
         return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= self._config.near_share
 
-    def aim(self, control: Tensor, *, hold: bool) -> None:
+    def aim(self, control: Array, *, hold: bool) -> None:
         """Take the points of the surface nearest to F as it is, each with the normal of its triangle.
 
         hold: leave given corners at their places.
@@ -75,7 +74,7 @@ class EdgeAnchors:
         self.fit.aim(points, np.zeros((len(points), 3, 3)))
         self.fit.give_way(yielding)
 
-    def _nearest(self, control: Tensor) -> tuple[Array, Array, Array]:
+    def _nearest(self, control: Array) -> tuple[Array, Array, Array]:
         """Return F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""
         here = self.fit.residuals(control) + self.fit.points
         return here, *nearest_on_mesh(here, self._surface.points, self._surface.places.triangles)

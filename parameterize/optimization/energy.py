@@ -6,10 +6,8 @@ penalties. The boundary term is quadratic with its parameters held.
 """
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from ..arrays import IntArray, Knots
+from ..arrays import Array, IntArray, Knots
 from ..config import GrowthConfig, SplineConfig
 from .bending import bending_operator, grams
 from .contact import ContactPenalty, contact_penalty
@@ -20,8 +18,6 @@ from .normals import FacingPenalty, facing_penalty
 from .operators import conjugate_gradients, weighted_sum
 from .surface_distance import SurfaceFit
 from .tensor_product import FastDiagonalization
-
-_ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
 
 
 class SplineEnergy:
@@ -38,7 +34,7 @@ class SplineEnergy:
         self._distortion = DistortionEnergy(knots, config)
         self._grams = grams(knots, (config.degree,) * 3)
         self._bending, self._rough_bending = (
-            bending_operator(self._grams, 2.0 * config.fairness, dtype) for dtype in (torch.float64, _ROUGH)
+            bending_operator(self._grams, 2.0 * config.fairness, dtype) for dtype in (np.float64, np.float32)
         )
         self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient)
         self._precondition = self._preconditioner()
@@ -48,9 +44,9 @@ class SplineEnergy:
         rough = tuple(2.0 * k + 2.0 * config.fairness * h for k, h in zip(slope, curve, strict=True))
         for matrix in rough:
             matrix[[0, -1], [0, -1]] += config.pull * self.vertex / 6.0  # the points spread over six faces
-        return FastDiagonalization(rough, mass).to(_ROUGH)
+        return FastDiagonalization(rough, mass).in_single()
 
-    def start_round(self, control: Tensor, penalty: float, share: float | None = None) -> None:
+    def start_round(self, control: Array, penalty: float, share: float | None = None) -> None:
         """Take a penalty weight, and the limit of the distortion and the floors of det J that suit the control points.
 
         share: while F grows into the solid, that of the weight of the surface's data.
@@ -67,22 +63,22 @@ class SplineEnergy:
         reach = np.inf if self._grows is None else self._grows.reach
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
-    def watch_facing(self, control: Tensor) -> None:
+    def watch_facing(self, control: Array) -> None:
         """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
         if self._grows is not None:  # F is too far away for that to mean something
             self._facing = None
             return
         self._facing = facing_penalty(self.surface, control, self.config.min_facing, self.config.facing_margin)
 
-    def watch_contact(self, control: Tensor) -> IntArray:
+    def watch_contact(self, control: Array) -> IntArray:
         """Push apart, from now on, the sheets of F's boundary that hardly are at `control`; return their spans."""
         self._contact = self._contact_at(control)
         return self._contact.spans
 
-    def _contact_at(self, control: Tensor, near: IntArray | None = None) -> ContactPenalty:
+    def _contact_at(self, control: Array, near: IntArray | None = None) -> ContactPenalty:
         return contact_penalty(self._knots, self.config.degree, control, self.config.gap, near)
 
-    def slide(self, control: Tensor) -> None:
+    def slide(self, control: Array) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
         places, points, longest = self.surface.places, self.surface.points, 0.5 / max(control.shape[1:])
         if self._grows is None:
@@ -111,15 +107,15 @@ class SplineEnergy:
         for fit in (self.surface, self.anchors.fit):
             fit.give_way(np.minimum(fit.yielding / factor, 1.0))
 
-    def volume_part(self, control: Tensor) -> tuple[float, Tensor, int]:
+    def volume_part(self, control: Array) -> tuple[float, Array, int]:
         """Distortion, fairness and barrier: energy, gradient, folded quadrature points."""
         arap, gradient, folded = self._distortion.energy_and_gradient(control, self.penalty)
         shortfall, push = self.barrier.energy_and_gradient(control)
         bent = self._bending(control)
-        energy = arap + 0.5 * float((bent * control).sum()) + self.penalty * shortfall
+        energy = arap + 0.5 * float(np.vdot(bent, control)) + self.penalty * shortfall
         return energy, gradient + bent + self.penalty * push, folded
 
-    def surface_part(self, control: Tensor) -> tuple[float, Tensor]:
+    def surface_part(self, control: Array) -> tuple[float, Array]:
         """Return the boundary terms at the present parameters: energy and gradient."""
         config = self.config
         off, pull = self.surface.energy_and_gradient(control)
@@ -135,26 +131,26 @@ class SplineEnergy:
         turned, push = self._facing.energy_and_gradient(control)
         return energy + self.penalty * turned, gradient + self.penalty * push
 
-    def smoothed(self, control: Tensor, spans: IntArray) -> Tensor:
+    def smoothed(self, control: Array, spans: IntArray) -> Array:
         """Bend F as little as possible in and next to spans (k, 3): return the control points, the others held.
 
         Which side is folded over which plays no part in this, as it does where det J is penalised.
         """
         near = with_neighbours(spans, self.barrier.weights.shape)
-        free = torch.from_numpy(acting_on(near, self.config.degree)).to(control.dtype)
+        free = acting_on(near, self.config.degree)
         moved, _ = conjugate_gradients(
-            lambda x: free * self._bending(x),
-            -free * self._bending(control),
+            lambda x: self._bending(x) * free,
+            -(self._bending(control) * free),
             lambda x: x,
             tolerance=self.config.smoothing_tolerance,
             max_iterations=self.config.smoothing_iterations,
         )
         return control + moved
 
-    def newton_direction(self, control: Tensor, right: Tensor, damping: float = 0.0) -> Tensor:
+    def newton_direction(self, control: Array, right: Array, damping: float = 0.0) -> Array:
         """Solve roughly (Hessian + damping) x = right at `control`, the parameters of the surface held."""
         config = self.config
-        surface, anchors = self.surface.hessian(_ROUGH), self.anchors.fit.hessian(_ROUGH)
+        surface, anchors = self.surface.hessian(), self.anchors.fit.hessian()
         distortion = self._distortion.curvature(control, self.penalty, damping)
         barrier = self.barrier.curvature(control)
         terms = [
@@ -165,14 +161,14 @@ class SplineEnergy:
             (self.vertex * config.anchors, anchors),
         ]
         if self._facing is not None:
-            terms.append((self.penalty, self._facing.curvature(control, _ROUGH)))
+            terms.append((self.penalty, self._facing.curvature(control)))
         if self._contact is not None:
-            terms.append((config.vertex * config.contact, self._contact.curvature(control, _ROUGH)))
+            terms.append((config.vertex * config.contact, self._contact.curvature(control)))
         direction, _ = conjugate_gradients(
             weighted_sum(terms),
-            right.to(_ROUGH),
+            right.astype(np.float32),
             self._precondition,
             tolerance=config.tolerance,
             max_iterations=config.iterations,
         )
-        return direction.to(right.dtype)
+        return direction.astype(np.float64)

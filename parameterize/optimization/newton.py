@@ -9,8 +9,7 @@ import math
 import time
 from dataclasses import dataclass, replace
 
-from torch import Tensor
-
+from ..arrays import Array
 from ..config import SplineConfig
 from ..progress import History, Progress, ProgressCallback
 from .acceleration import Acceleration
@@ -24,9 +23,9 @@ _SHORTEST_STEP = 1e-6
 class _Point:
     """Control points with energy and gradient, the boundary's part apart: it alone changes when parameters slide."""
 
-    control: Tensor
-    inner: tuple[float, Tensor]
-    outer: tuple[float, Tensor]
+    control: Array
+    inner: tuple[float, Array]
+    outer: tuple[float, Array]
     folded: int
 
     @property
@@ -34,16 +33,16 @@ class _Point:
         return self.inner[0] + self.outer[0]
 
     @property
-    def gradient(self) -> Tensor:
+    def gradient(self) -> Array:
         return self.inner[1] + self.outer[1]
 
 
-def _evaluate(control: Tensor, energy: SplineEnergy) -> _Point:
+def _evaluate(control: Array, energy: SplineEnergy) -> _Point:
     value, gradient, folded = energy.volume_part(control)
     return _Point(control, (value, gradient), energy.surface_part(control), folded)
 
 
-def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> tuple[_Point, float] | None:
+def _line_search(point: _Point, direction: Array, energy: SplineEnergy) -> tuple[_Point, float] | None:
     """Shorten the step until the energy falls enough (Armijo); return where it leads, and its length, at most 1.
 
     The next length is where the parabola through the values and the slope at 0 has its minimum, between a tenth and a
@@ -96,13 +95,13 @@ def _expected_steps(config: SplineConfig, number: int, step: int) -> int:
 
 def descend(
     energy: SplineEnergy,
-    control: Tensor,
+    control: Array,
     number: int,
     *,
     growing: bool,
     history: History,
     progress: ProgressCallback,
-) -> Tensor:
+) -> Array:
     """Return the control points (3, n_u, n_v, n_w) after one round of steps; the surface's parameters slide with them.
 
     number: of the round. growing: whether F still grows into the solid in it, which then has fewer steps.

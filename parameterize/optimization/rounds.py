@@ -6,14 +6,11 @@ The energy of energy.py is lowered in rounds (newton.py). After each the map is 
 import logging
 import math
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
+from numpy.typing import NDArray
 
 from ..arrays import Array, IntArray, Knots
 from ..certificate.boundary import check_boundary
@@ -23,6 +20,7 @@ from ..config import SplineConfig
 from ..progress import History, ProgressCallback, ignore
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
+from ..threads import one_blas_thread
 from .determinant_penalty import acting_on, edge_spans, with_neighbours
 from .energy import SplineEnergy
 from .newton import descend
@@ -41,14 +39,14 @@ class Optimized:
     decided; it is asked of certified maps alone.
     """
 
-    control: Tensor
+    control: Array
     certificate: Certificate
     injective: bool | None
 
     @classmethod
-    def of(cls, control: Tensor, knots: Knots, config: SplineConfig) -> "Optimized":
+    def of(cls, control: Array, knots: Knots, config: SplineConfig) -> "Optimized":
         """Certify control points and, where that succeeds, check their boundary."""
-        volume = BSplineVolume((config.degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy())
+        volume = BSplineVolume((config.degree,) * 3, knots, np.moveaxis(control, 0, -1))
         certificate = certify(volume)
         injective = check_boundary(volume).injective if certificate.verdict == "certified" else None
         return cls(control, certificate, injective)
@@ -70,7 +68,7 @@ class Optimized:
 
 
 def optimize(
-    control: Tensor,
+    control: Array,
     knots: Knots,
     surface: SurfaceFit,
     config: SplineConfig,
@@ -103,7 +101,7 @@ def optimize(
     A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
-    with one_thread_an_operation():
+    with one_blas_thread():
         energy = SplineEnergy(config, knots, surface)
         energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
         if watched is not None:
@@ -125,28 +123,13 @@ def optimize(
     return rounds.best
 
 
-@contextmanager
-def one_thread_an_operation() -> Iterator[None]:
-    """Most tensors here are small: handing them to a second thread costs more than it saves (up to 4 times).
-
-    A thread of `in_parallel` begins with torch's setting at its first operation and keeps it. All torch work in pieces
-    belongs under this: else such a thread splits its sums, and bits depend on which thread takes a piece.
-    """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
-
-
 @dataclass
 class _Rounds:
     """Where the optimisation stands between two rounds; number, parting and polished count those done."""
 
     energy: SplineEnergy
     knots: Knots
-    control: Tensor
+    control: Array
     best: Optimized
     best_places: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their cube faces (N,)
     near: bool  # whether F was close to the surface all along the cube's edges to begin with
@@ -181,7 +164,7 @@ class _Rounds:
     @property
     def settled(self) -> bool:
         """Whether the last round has ended with the best map, not with one that folds again."""
-        return torch.equal(self.control, self.best.control)
+        return np.array_equal(self.control, self.best.control)
 
     def begin(self) -> None:
         """Weigh penalties, surface data and anchors for the next round."""
@@ -202,7 +185,7 @@ class _Rounds:
         penalty = config.penalties[min(self.number, len(config.penalties) - 1)]
         energy.start_round(self.control, penalty, self.shares[self.number] if self.growing else None)
 
-    def conclude(self, control: Tensor) -> None:
+    def conclude(self, control: Array) -> None:
         """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
         config = self.energy.config
         found, distance = Optimized.of(control, self.knots, config), self.energy.surface.mean_square(control)
@@ -266,8 +249,8 @@ class _Rounds:
             if not 0 < len(unproved) <= config.most_watched:
                 break
             held |= with_neighbours(unproved, held.shape)
-            back = torch.from_numpy(acting_on(held, config.degree))
-            mended = Optimized.of(torch.where(back, self.best.control, found.control), self.knots, config)
+            back = acting_on(held, config.degree)
+            mended = Optimized.of(np.where(back, self.best.control, found.control), self.knots, config)
         if mended is found or mended.rank > self.best.rank:
             return found
         places = self.energy.surface.places
@@ -284,32 +267,32 @@ class _Rounds:
     def save(self, checkpoints: Checkpoints, history: History) -> None:
         """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
         surface, anchors = self.energy.surface, self.energy.anchors.fit
-        tensors = {
+        arrays = {
             "control": self.control,
             "best": self.best.control,
-            "best_parameters": torch.as_tensor(self.best_places[0]),
-            "best_cube_faces": torch.as_tensor(self.best_places[1]),
-            "parameters": torch.as_tensor(surface.places.parameters),
-            "cube_faces": torch.as_tensor(surface.places.cube_faces),
-            "yielding": torch.as_tensor(surface.yielding),
-            "anchors": torch.as_tensor(anchors.points),
-            "anchors_yielding": torch.as_tensor(anchors.yielding),
-            "span_weights": torch.as_tensor(self.energy.barrier.weights),
+            "best_parameters": self.best_places[0],
+            "best_cube_faces": self.best_places[1],
+            "parameters": surface.places.parameters,
+            "cube_faces": surface.places.cube_faces,
+            "yielding": surface.yielding,
+            "anchors": anchors.points,
+            "anchors_yielding": anchors.yielding,
+            "span_weights": self.energy.barrier.weights,
         }
         counts = {name: getattr(self, name) for name in _COUNTS}
         state = counts | {"certified": self.certified, "lost": self.lost, "off": self.off, "history": history.rows}
-        checkpoints.save(_CHECKPOINT, tensors, state)
+        checkpoints.save(_CHECKPOINT, arrays, state)
 
-    def restore(self, tensors: dict[str, Tensor], state: dict[str, Any], history: History) -> None:
+    def restore(self, arrays: dict[str, NDArray[Any]], state: dict[str, Any], history: History) -> None:
         """Continue from a checkpoint that `save` has kept."""
         energy = self.energy
-        energy.surface.places.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
-        energy.surface.give_way(tensors["yielding"].numpy())
-        energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
-        energy.barrier.weigh(tensors["span_weights"].numpy())
-        self.control = tensors["control"]
-        self.best = Optimized.of(tensors["best"], self.knots, energy.config)
-        self.best_places = tensors["best_parameters"].numpy(), tensors["best_cube_faces"].numpy()
+        energy.surface.places.place(arrays["parameters"], arrays["cube_faces"])
+        energy.surface.give_way(arrays["yielding"])
+        energy.anchors.restore(arrays["anchors"], arrays["anchors_yielding"])
+        energy.barrier.weigh(arrays["span_weights"])
+        self.control = arrays["control"]
+        self.best = Optimized.of(arrays["best"], self.knots, energy.config)
+        self.best_places = arrays["best_parameters"], arrays["best_cube_faces"]
         for name in _COUNTS:
             setattr(self, name, int(state[name]))
         self.certified, self.lost, self.off = bool(state["certified"]), bool(state["lost"]), float(state["off"])

@@ -21,6 +21,7 @@ from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targe
 from ..cube.flips import Layout
 from ..cube.turning import best_turn, hollowness
 from ..progress import History, Progress, ProgressCallback
+from .backend import PRECISIONS
 from .losses import BoundarySamples, EdgePaths, Objective
 from .network import InverseMap
 from .optimizer import TrainingOptimizer
@@ -56,23 +57,24 @@ class Trainer:
         config: Config,
         *,
         seed: int,
-        device: torch.device,
-        dtype: torch.dtype,
+        device: str,
+        dtype: str,
         given_corners: IntArray | None,
         history: History,
         progress: ProgressCallback,
         checkpoints: Checkpoints,
     ) -> None:
-        self.config, self.seed, self.device, self.dtype = config, seed, device, dtype
+        self.config, self.seed = config, seed
+        self.device, self.dtype = torch.device(device), PRECISIONS[dtype]
         self.vertices, self.faces, self.corners = vertices, faces, given_corners
         self.history, self.progress, self.checkpoints = history, progress, checkpoints
         self.generator = torch.Generator()
         first_weights = torch.Generator().manual_seed(seed % 2**63)
-        self.network = InverseMap(config.network, first_weights).to(device=device, dtype=dtype)
+        self.network = InverseMap(config.network, first_weights).to(device=self.device, dtype=self.dtype)
         if config.train.whiten:
             first = start_map(interior_points(vertices, faces, config.train.cell))
             self.network.affine.copy_(self._tensor(first))
-        inside = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
+        inside = stencils(vertices, faces, config.train.cell, device=self.device, dtype=self.dtype)
         self.objective = Objective(self.network, inside, config.train)
 
     def run(self, *, give_up: bool = False) -> InverseMap | None:
@@ -84,7 +86,7 @@ class Trainer:
         corners.
         """
         given, limit = self.corners is not None, self.config.train.easy_loss
-        saved = self.checkpoints.load(_CHECKPOINT)
+        saved = self._saved()
         first = int(saved[1]["number"]) if saved else 0
         for number, stage in list(enumerate(self.config.stages))[first:]:
             run = self._load_run(*saved) if saved else _Run(number, 0, self._state(), self._state())
@@ -108,7 +110,7 @@ class Trainer:
 
     def map(self, points: Array) -> Array:
         """Return G at points (m, 3), as float64."""
-        return map_points(self.network, points, self.device, self.dtype)
+        return map_points(self.network, points)
 
     def mapped(self) -> Array:
         """Return G at the surface's vertices (n, 3), as the network is now."""
@@ -239,7 +241,16 @@ class Trainer:
             "corners": None if self.corners is None else self.corners.tolist(),
             "history": self.history.rows,
         }
-        self.checkpoints.save(_CHECKPOINT, tensors, state)
+        self.checkpoints.save(_CHECKPOINT, {name: t.detach().cpu().numpy() for name, t in tensors.items()}, state)
+
+    def _saved(self) -> tuple[State, dict[str, Any]] | None:
+        """Return the tensors and the state of the checkpoint; None where there is none.
+
+        The tensors are copies: sums over memory that lies otherwise than in the first run round differently.
+        """
+        if (saved := self.checkpoints.load(_CHECKPOINT)) is None:
+            return None
+        return {name: torch.tensor(array) for name, array in saved[0].items()}, saved[1]
 
     def _load_run(self, tensors: State, state: dict[str, Any]) -> _Run:
         """Restore everything but the optimiser; leave the network as it was at the start of the stage."""
@@ -272,9 +283,7 @@ def _part(tensors: State, prefix: str) -> State:
 
 
 @torch.no_grad()
-def map_points(
-    network: InverseMap, points: Array, device: torch.device, dtype: torch.dtype, block: int = 65_536
-) -> Array:
-    """Return G at points (m, 3) as float64, computed in blocks."""
-    pieces = torch.as_tensor(points, dtype=dtype, device=device)
+def map_points(network: InverseMap, points: Array, block: int = 65_536) -> Array:
+    """Return G at points (m, 3) as float64, computed in blocks, where the network is and in its precision."""
+    pieces = torch.as_tensor(points).to(network.affine)
     return np.asarray(torch.cat([network(piece) for piece in torch.split(pieces, block)]).double().cpu())
