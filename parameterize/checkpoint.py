@@ -17,7 +17,7 @@ from torch import Tensor
 
 from .files import save_bytes
 
-FORMAT = 7
+FORMAT = 8
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
 _DAMAGED = "remove this file to go on from what was kept before it, or start anew with --force"
