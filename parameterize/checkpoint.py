@@ -17,7 +17,7 @@ from safetensors.numpy import save as to_bytes
 
 from .files import save_bytes
 
-FORMAT = 8  # a file of another one is refused by name
+FORMAT = 9  # a file of another one is refused by name
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
 _DAMAGED = "remove this file to go on from what was kept before it, or start anew with --force"

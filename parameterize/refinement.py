@@ -15,7 +15,10 @@ from .arrays import Array, IntArray, Knots
 from .certificate.determinant import DeterminantForm
 from .checkpoint import Checkpoints
 from .config import RefinementConfig, SplineConfig
-from .optimization.rounds import Optimized, optimize
+from .optimization.newton import LEAST_STEPS
+from .optimization.optimized import Optimized
+from .optimization.phases import FIRM_ROUNDS, Polish, Schedule, Separate, Unfold
+from .optimization.rounds import optimize
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback
 from .quality.quality import arap_grid
@@ -25,6 +28,14 @@ from .spline.volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "knots"
+SHARE = 0.7  # of all that is found lies on the spans that are halved together: fewer would take more refinements
+GROWTH = 2.0  # factor of the number of control points in one refinement, at most: the next one knows better where
+DISTORTION = 0.25  # what the distortion above its limit counts, all squared distances together counting 1
+_NARROWEST = 0.2  # of the first spline's spans: none gets narrower than this share of their length
+_VERTEX = 3.0  # factor of the spline stage's `vertex`: the boundary counts more once the map is in shape
+_GAIN = 3e-4  # in place of the spline stage's: the first steps on new knots gain little, the later ones more
+ROUNDS = 8  # after a refinement, at most
+POLISH = 3  # of them, while the map is certified, at most
 
 Stop = Literal["tolerance met", "limit reached", "no better map"]
 
@@ -85,11 +96,11 @@ def refine(
         if not any(found.faults) and levels[-1].distance <= refinement.tolerance:
             break
         kept = checkpoints.of_part(f"refined{number}")
-        finer = _chosen_knots(spots, config, refinement, kept)
+        finer = _chosen_knots(spots, config, refinement.max_control_points, kept)
         if tuple(len(row) - config.degree - 1 for row in finer) == levels[-1].control_points:
             stopped = "limit reached"
             break
-        other = _optimized_on(finer, spots.volume, fit, config, refinement, kept, report)
+        other = _optimized_on(finer, spots.volume, fit, config, kept, report)
         spots = _Spots.of(*other, config)
         if (other[0].faults, spots.level.distance) >= (found.faults, levels[-1].distance):
             stopped, dropped = "no better map", spots.level
@@ -152,38 +163,39 @@ def totals_along(places: Array, amounts: Array, knots: Knots) -> list[Array]:
     return [np.histogram(places[:, axis], breakpoints(row), weights=amounts)[0] for axis, row in enumerate(knots)]
 
 
-def _chosen_knots(spots: _Spots, config: SplineConfig, refinement: RefinementConfig, checkpoints: Checkpoints) -> Knots:
-    """Return finer knots, those of the checkpoint where there is one, and keep them in a checkpoint."""
+def _chosen_knots(spots: _Spots, config: SplineConfig, most: int, checkpoints: Checkpoints) -> Knots:
+    """Return finer knots, those of the checkpoint where there is one, and keep them in a checkpoint.
+
+    most: control points a direction.
+    """
     if (saved := checkpoints.load(_CHECKPOINT)) is not None:
         u, v, w = (saved[0][axis] for axis in "uvw")
         return u, v, w
-    narrowest = refinement.narrowest / (config.control_points - config.degree)
-    amounts = spots.amounts(refinement.distortion)
-    finer = halved_where_most(spots.volume.knots, amounts, np.array(spots.volume.shape), refinement, narrowest)
+    narrowest = _NARROWEST / (config.control_points - config.degree)
+    amounts = spots.amounts(DISTORTION)
+    finer = halved_where_most(spots.volume.knots, amounts, np.array(spots.volume.shape), most, narrowest)
     checkpoints.save(_CHECKPOINT, dict(zip("uvw", finer, strict=True)), {})
     return finer
 
 
-def halved_where_most(
-    knots: Knots, amounts: list[Array], counts: IntArray, refinement: RefinementConfig, narrowest: float
-) -> Knots:
+def halved_where_most(knots: Knots, amounts: list[Array], counts: IntArray, most: int, narrowest: float) -> Knots:
     """Return the knots with those spans halved on which most is found, the largest amounts of all directions first.
 
-    amounts: of each span, a direction. counts (3,): control points a direction. No span is halved any more once
-    `share` of all amounts is on those that are, or the control points are `growth` times as many; none into halves
-    below `narrowest`.
+    amounts: of each span, a direction. counts (3,): control points a direction, `most` at most. No span is halved any
+    more once `SHARE` of all amounts is on those that are, or the control points are `GROWTH` times as many; none into
+    halves below `narrowest`.
     """
     counts, total = counts.copy(), np.prod(counts)
     halves = np.concatenate([np.diff(breakpoints(row)) / 2.0 for row in knots])
     ranked = np.concatenate([np.stack([np.full(len(a), d), np.arange(len(a))], axis=1) for d, a in enumerate(amounts)])
     values = np.concatenate(amounts)
     chosen: tuple[list[int], ...] = ([], [], [])
-    reached, wanted = 0.0, refinement.share * values.sum()
+    reached, wanted = 0.0, SHARE * values.sum()
     for place in np.argsort(-values, kind="stable"):
         axis, span = ranked[place]
-        if reached >= wanted or np.prod(counts + (np.arange(3) == axis)) > refinement.growth * total:
+        if reached >= wanted or np.prod(counts + (np.arange(3) == axis)) > GROWTH * total:
             break
-        if counts[axis] < refinement.max_control_points and halves[place] >= narrowest:
+        if counts[axis] < most and halves[place] >= narrowest:
             chosen[axis].append(span)
             counts[axis] += 1
         reached += values[place]
@@ -196,28 +208,23 @@ def _optimized_on(
     volume: BSplineVolume,
     fit: SurfaceFit,
     config: SplineConfig,
-    refinement: RefinementConfig,
     checkpoints: Checkpoints,
     report: dict[str, Any],
 ) -> tuple[Optimized, SurfaceFit]:
     """Insert the knots and go on with the rounds that follow those of a certified map."""
-    later = replace(
-        config,
-        vertex=refinement.vertex * config.vertex,
-        gain=refinement.gain,
-        rounds=config.firm_rounds + refinement.rounds,
-        polish=refinement.polish,
-    )
+    phases = (Unfold(), Separate(), Polish(rounds=POLISH))
+    schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, (LEAST_STEPS,) * (FIRM_ROUNDS + 2), gain=_GAIN)
     start, surface = volume.on_knots(finer), fit.on_knots(finer)
     form = DeterminantForm(start)
     nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < config.min_coefficient)
-    found = optimize(
+    found, _ = optimize(
         np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0)),
         finer,
         surface,
-        later,
+        replace(config, vertex=_VERTEX * config.vertex),
+        schedule,
         checkpoints=checkpoints,
-        begun=config.firm_rounds,
+        begun=FIRM_ROUNDS,
         watched=form.numbers(nearly),
         **report,
     )

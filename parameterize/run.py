@@ -10,21 +10,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray
-from .attempts import Origin, Task, best_attempt
+from .attempts import attempts
 from .certificate.boundary import check_boundary
 from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
 from .display import Brief
-from .optimization.rounds import Optimized
+from .optimization.optimized import Optimized
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback, ignore, timed
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
 from .spline.volume import BSplineVolume
+from .starts.start import Origin, Task
+from .starts.tried import AttemptReport, best_of
 from .surface.surface import Surface
 from .training.backend import choose_device, choose_precision
+
+_LAST_SLIDES = 20  # of the boundary parameters before the boundary map is made, and again after `_LAST_SWEEPS`
+_LAST_SWEEPS = 600  # over the triangles that the last slides flipped, at most: nothing moves after them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,6 +57,8 @@ class Parameterization(Brief):
     config : Config
     origin : "network", "growth" or "extension"
         Where the map comes from: the trained network, a cube that grew, or an extended layout of the surface.
+    attempts : tuple of AttemptReport
+        The starts that were tried, in their order: what each has led to, with rounds and seconds by phase.
     refinement : Refinement or None
         With config.refinement, how many control points each direction got, and why no more.
 
@@ -74,6 +81,7 @@ class Parameterization(Brief):
     seed: int
     config: Config
     origin: Origin
+    attempts: tuple[AttemptReport, ...]
     refinement: Refinement | None = None
 
 
@@ -148,7 +156,10 @@ def parameterize(
     history, seconds = History(), dict[str, float]()
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
     task = Task(surface, config, seed, place, dtype, given, seconds, report)
-    attempt = best_attempt(task, checkpoints)
+    tried = attempts(task, checkpoints)
+    best = best_of(tried)
+    assert best is not None  # the last start that is tried makes a map of any shape
+    start, attempt = best
     found, fit, told = attempt.found, attempt.fit, None
     if config.refinement is not None:
         with timed(seconds, "refine"):
@@ -170,7 +181,8 @@ def parameterize(
         device=place,
         seed=seed,
         config=config,
-        origin=attempt.origin,
+        origin=start.origin,
+        attempts=tuple(one.report() for one in tried),
         refinement=told,
     )
 
@@ -242,7 +254,7 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
 def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSplineVolume, BoundaryMap]:
     """Return the volume and its boundary map; parameters are first brought close to this volume's closest points."""
     surface, spline = task.surface, task.config.spline
-    places = fit.places.settled(found.control, fit.points, spline.last_slides, spline.last_sweeps)
+    places = fit.places.settled(found.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
     points = surface.from_unit(np.moveaxis(found.control, 0, -1))
     volume = BSplineVolume((spline.degree,) * 3, places.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])

@@ -7,7 +7,6 @@ import pytest
 
 from parameterize.coarse import coarse_knots, interpolated
 from parameterize.config import preset
-from parameterize.growth import growing
 from parameterize.spline.bspline import evaluate_grid, greville, open_uniform_knots
 
 FAST = preset("fast")
@@ -19,8 +18,8 @@ FAST = preset("fast")
 )
 def test_the_first_rounds_have_a_share_of_the_spans(control_points, degree, shaping, growth):
     spline = replace(FAST.spline, control_points=control_points, degree=degree)
-    for config, count in ((spline, shaping), (growing(spline, FAST.growth), growth)):
-        for knots in coarse_knots(config):
+    for share, count in ((5 / 9, shaping), (1 / 3, growth)):
+        for knots in coarse_knots(spline, share):
             assert np.array_equal(knots, open_uniform_knots(count, degree))
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from parameterize.config import Config, RefinementConfig, SplineConfig
+from parameterize.config import Config, SplineConfig
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
 from solve.discretization.errors import POINTS
@@ -114,7 +114,7 @@ def forecast(
     if config.refinement is not None:  # it may end with the first spline, or go on to its limit
         most = config.refinement.max_control_points
         rounds, steps = HARD_AFTER
-        growths = _growths(config.refinement, spline.control_points)
+        growths = _growths(config.refinement.max_control_points, spline.control_points)
         high += sum(growths) * rounds * (min(steps, spline.steps) * step + CERTIFICATE * product)
     activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
     mapped = PER_CONTROL_POINT * most**3 + PER_VERTEX * vertices
@@ -123,18 +123,21 @@ def forecast(
 
 
 def _training_steps(config: Config) -> tuple[float, float]:
-    """Return the steps for an easy surface, and those that show one to be hard: the first stage's."""
+    """Return the steps for an easy surface, and those that show one to be hard: the first stage's, or none."""
     steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
     steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.target == "cube"), 0))
-    look = steps if limit is None or config.starts == 1 else config.stages[0].steps
-    return look if limit == 0.0 else steps, look
+    if limit is None or config.starts == 1:
+        return steps, steps
+    return (0, 0) if limit == 0.0 else (steps, config.stages[0].steps)
 
 
-def _growths(refinement: RefinementConfig, control_points: int) -> list[float]:
-    """Return the factors by which the control points are more after each refinement, up to the limit."""
-    whole = (refinement.max_control_points / control_points) ** 3
-    count = math.ceil(math.log(whole) / math.log(refinement.growth))
-    return [min(refinement.growth**number, whole) for number in range(1, count + 1)]
+def _growths(most: int, control_points: int) -> list[float]:
+    """Return the factors by which the control points are more after each refinement, up to `most` a direction."""
+    from parameterize.refinement import GROWTH
+
+    whole = (most / control_points) ** 3
+    count = math.ceil(math.log(whole) / math.log(GROWTH))
+    return [min(GROWTH**number, whole) for number in range(1, count + 1)]
 
 
 def _pass_seconds(config: Config, device: str, clock: Clock) -> float:

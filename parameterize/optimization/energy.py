@@ -8,7 +8,7 @@ penalties. The boundary term is quadratic with its parameters held.
 import numpy as np
 
 from ..arrays import Array, IntArray, Knots
-from ..config import GrowthConfig, SplineConfig
+from ..config import SplineConfig
 from .bending import bending_operator, grams
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import SpanBarrier, acting_on, with_neighbours
@@ -18,6 +18,8 @@ from .normals import FacingPenalty, facing_penalty
 from .operators import conjugate_gradients, weighted_sum
 from .surface_distance import SurfaceFit
 from .tensor_product import FastDiagonalization
+
+_REACH = 0.03  # while F grows, surface points farther from F than this do not slide, and draw F in all directions
 
 
 class SplineEnergy:
@@ -29,8 +31,8 @@ class SplineEnergy:
         self._facing: FacingPenalty | None = None
         self._contact: ContactPenalty | None = None
         self._knots = knots
-        self.penalty, self.vertex = config.penalties[0], config.vertex
-        self._grows: GrowthConfig | None = None
+        self.penalty, self.vertex = 0.0, config.vertex
+        self._grows = False
         self._distortion = DistortionEnergy(knots, config)
         self._grams = grams(knots, (config.degree,) * 3)
         self._bending, self._rough_bending = (
@@ -55,17 +57,17 @@ class SplineEnergy:
         self._distortion.set_limit(control)
         if self.config.least_floor < 1.0:
             self.barrier.lower_floors(self._distortion.lower_floors(control))
-        if share is None and self._grows is None:
+        if share is None and not self._grows:
             return
-        self._grows = None if share is None else self.config.growth
+        self._grows = share is not None
         self.vertex = self.config.vertex * (1.0 if share is None else share)
         self._precondition = self._preconditioner()
-        reach = np.inf if self._grows is None else self._grows.reach
+        reach = _REACH if self._grows else np.inf
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
     def watch_facing(self, control: Array) -> None:
         """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
-        if self._grows is not None:  # F is too far away for that to mean something
+        if self._grows:  # F is too far away for that to mean something
             self._facing = None
             return
         self._facing = facing_penalty(self.surface, control, self.config.min_facing, self.config.facing_margin)
@@ -81,13 +83,12 @@ class SplineEnergy:
     def slide(self, control: Array) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
         places, points, longest = self.surface.places, self.surface.points, 0.5 / max(control.shape[1:])
-        if self._grows is None:
+        if self._grows:
+            places.slide(control, points, longest, keep_layout=True, reach=_REACH)
+        else:
             for _ in range(self.config.slides):
                 places.slide(control, points, longest)
             places.relax(self.config.relaxations)
-        else:
-            for _ in range(self._grows.slides):
-                places.slide(control, points, longest, keep_layout=True, reach=self._grows.reach)
         self.watch_facing(control)
         if self._contact is not None:
             self._contact = self._contact_at(control, self._contact.near)

@@ -103,8 +103,10 @@ class Trainer:
             elif number == self._race_stage:
                 run, optimizer = self._race(number, boundary)
             self._train(run, boundary, optimizer)
-            if give_up and number == 0 and limit is not None and self._misfit(stage) > limit:
-                return None
+            if number == 0 and limit is not None and self._misfit(stage) > limit:
+                if give_up:
+                    return None
+                _log.warning("the shape is hard for the network, and trained to the end: no other start may follow")
             saved = None
         return self.network
 
