@@ -18,6 +18,7 @@ from .optimization.optimized import Optimized
 from .optimization.phases import PATIENT_ROUNDS, Schedule
 from .optimization.rounds import optimize
 from .optimization.surface_distance import SurfaceFit
+from .optimization.term import Weights
 from .progress import History, ProgressCallback
 from .spline.bspline import evaluate_grid, greville, interpolate_grid, open_uniform_knots
 
@@ -33,6 +34,7 @@ def optimize_coarse_first(
     fit: SurfaceFit,
     config: SplineConfig,
     schedule: Schedule,
+    weights: Weights,
     *,
     history: History,
     progress: ProgressCallback,
@@ -46,16 +48,18 @@ def optimize_coarse_first(
     report: dict[str, Any] = {"history": history, "progress": progress}
     knots, fine = fit.places.knots, (open_uniform_knots(config.control_points, config.degree),) * 3
     if len(fine[0]) == len(knots[0]):
-        return *optimize(control, fine, fit, config, schedule, checkpoints=checkpoints, **report), fit
+        return *optimize(control, fine, fit, config, schedule, weights, checkpoints=checkpoints, **report), fit
     longer = (len(fine[0]) / len(knots[0])) ** 1.5  # that a step takes on all of them, about
     begun = min(schedule.grown or PATIENT_ROUNDS, schedule.rounds - 1)  # at least one round is on all
     usual = schedule.usual_steps[:begun]
     usual += tuple(math.ceil(longer * steps) for steps in schedule.usual_steps[begun:])
     first = replace(schedule, rounds=begun, usual_steps=usual)
     kept = checkpoints.of_part("coarse")
-    found, earlier = optimize(control, knots, fit, config, first, checkpoints=kept, **report)
+    found, earlier = optimize(control, knots, fit, config, first, weights, checkpoints=kept, **report)
     control, fit = interpolated(found.control, knots, fine, config.degree), fit.on_knots(fine)
-    found, course = optimize(control, fine, fit, config, schedule, checkpoints=checkpoints, begun=begun, **report)
+    found, course = optimize(
+        control, fine, fit, config, schedule, weights, checkpoints=checkpoints, begun=begun, **report
+    )
     return found, course.after(earlier), fit
 
 

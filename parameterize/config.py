@@ -80,33 +80,8 @@ class SplineConfig:
     control_points: int = 30
     degree: int = 3
     fit_cell: float = 0.035  # lattice of inverse samples
-    gauss: int = 3  # Gauss points a direction in the distortion term, on the first and last span
-    inner_gauss: int = 1  # likewise on the others
-    fairness: float = 1e-3
-    vertex: float = 1.2e5  # squared distance along the surface normal
-    arap_limit: float = 6.0  # distortion above this costs `stiffening` times its squared excess, too
-    stiffening: float = 3.0
-    anchors: float = 0.03  # share of `vertex` for the distance along the cube's edges, from F to the surface
-    near_edge: float = 0.5  # anchors closer to the surface than this share of a span's length count as near
-    near_share: float = 0.99  # the anchors act from the first round on if at least this share of them is near
-    given_corner: float = 0.5  # share of `anchors` that holds a corner given by the user, in all directions
-    tangential: float = 2e-4  # share of `vertex` for the distance within the tangent plane
-    min_det: float = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
-    min_coefficient: float = 0.1  # likewise its Bernstein coefficients, on spans at cube edges or not proved
-    least_floor: float = 1.0  # share to which these two are lowered, at most, where det J is small all around
-    min_facing: float = 0.1  # likewise (t_a x t_b) . n of the boundary's tangents and the mesh's normals
-    facing_margin: float = 3.0  # times `min_facing`: points below may fall under it in the next step and are watched
-    gap: float = 1e-3  # sheets of a boundary that meets itself are pushed so far apart
-    contact: float = 10.0  # share of `vertex` for the squared depth by which they miss that
     rounds: int = 16  # at most
-    smoothing_tolerance: float = 1e-8  # of the solve for this, relative
-    smoothing_iterations: int = 5000  # of it, at most
     steps: int = 60  # a round, at most
-    slides: int = 3  # of the boundary parameters after each step
-    relaxations: int = 1  # sweeps over the triangles that these flipped
-    tolerance: float = 0.1  # of the inner solves, relative
-    iterations: int = 20  # of an inner solve, at most
-    pull: float = 3e-4  # share of `vertex` in the preconditioner: more would hold back what slides along the surface
 
     @property
     def longest_edge(self) -> float:

@@ -15,11 +15,14 @@ from .arrays import Array, IntArray, Knots
 from .certificate.determinant import DeterminantForm
 from .checkpoint import Checkpoints
 from .config import RefinementConfig, SplineConfig
+from .optimization.determinant_penalty import MIN_COEFFICIENT
+from .optimization.distortion import ARAP_LIMIT
 from .optimization.newton import LEAST_STEPS
 from .optimization.optimized import Optimized
 from .optimization.phases import FIRM_ROUNDS, Polish, Schedule, Separate, Unfold
 from .optimization.rounds import optimize
 from .optimization.surface_distance import SurfaceFit
+from .optimization.term import Weights
 from .progress import History, ProgressCallback
 from .quality.quality import arap_grid
 from .quality.two_sided import two_sided
@@ -32,7 +35,7 @@ SHARE = 0.7  # of all that is found lies on the spans that are halved together: 
 GROWTH = 2.0  # factor of the number of control points in one refinement, at most: the next one knows better where
 DISTORTION = 0.25  # what the distortion above its limit counts, all squared distances together counting 1
 _NARROWEST = 0.2  # of the first spline's spans: none gets narrower than this share of their length
-_VERTEX = 3.0  # factor of the spline stage's `vertex`: the boundary counts more once the map is in shape
+_CLOSER = 3.0  # factor of the surface's weight: the boundary counts more once the map is in shape
 _GAIN = 3e-4  # in place of the spline stage's: the first steps on new knots gain little, the later ones more
 ROUNDS = 8  # after a refinement, at most
 POLISH = 3  # of them, while the map is certified, at most
@@ -78,6 +81,7 @@ def refine(
     fit: SurfaceFit,
     config: SplineConfig,
     refinement: RefinementConfig,
+    weights: Weights,
     *,
     history: History,
     progress: ProgressCallback,
@@ -88,7 +92,7 @@ def refine(
     Each refinement has checkpoints of its own: the chosen knots, and those of its spline stage.
     """
     report: dict[str, Any] = {"history": history, "progress": progress}
-    spots = _Spots.of(found, fit, config)
+    spots = _Spots.of(found, fit)
     levels, dropped = [spots.level], None
     stopped: Stop = "tolerance met"
     for number in count(1):
@@ -100,8 +104,8 @@ def refine(
         if tuple(len(row) - config.degree - 1 for row in finer) == levels[-1].control_points:
             stopped = "limit reached"
             break
-        other = _optimized_on(finer, spots.volume, fit, config, kept, report)
-        spots = _Spots.of(*other, config)
+        other = _optimized_on(finer, spots.volume, fit, config, weights, kept, report)
+        spots = _Spots.of(*other)
         if (other[0].faults, spots.level.distance) >= (found.faults, levels[-1].distance):
             stopped, dropped = "no better map", spots.level
             _log.warning("no better map with %s, %d spans unproved: the one before is kept", dropped, dropped.unproved)
@@ -125,12 +129,11 @@ class _Spots:
     squares: Array
     unproved: IntArray
     level: Level
-    arap_limit: float
 
     @classmethod
-    def of(cls, found: Optimized, fit: SurfaceFit, config: SplineConfig) -> "_Spots":
+    def of(cls, found: Optimized, fit: SurfaceFit) -> "_Spots":
         """Measure as the report will."""
-        volume = BSplineVolume((config.degree,) * 3, fit.places.knots, np.moveaxis(found.control, 0, -1))
+        volume = BSplineVolume((fit.places.degree,) * 3, fit.places.knots, np.moveaxis(found.control, 0, -1))
         gaps = two_sided(volume, fit.points, fit.places.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
         unproved = found.certificate.unproved
@@ -138,7 +141,7 @@ class _Spots:
         ways = (gaps.mesh_to_spline, gaps.spline_to_mesh)
         places = np.concatenate([way.parameters for way in ways])
         squares = np.concatenate([way.shares * way.distances**2 for way in ways])
-        return cls(volume, places, squares, unproved, level, config.arap_limit)
+        return cls(volume, places, squares, unproved, level)
 
     def amounts(self, distortion_share: float) -> list[Array]:
         """Return for each direction what is found on each of its spans.
@@ -151,7 +154,7 @@ class _Spots:
             return [np.bincount(self.unproved[:, d], minlength=n).astype(float) for d, n in enumerate(n_spans)]
         boundary = totals_along(self.places, self.squares / self.squares.sum(), knots)
         points, (density,), weights = arap_grid(self.volume, n_gauss=2)
-        limit = self.arap_limit * (1.0 + float(np.sum(weights * density)))
+        limit = ARAP_LIMIT * (1.0 + float(np.sum(weights * density)))
         excess = weights * np.maximum(density - limit, 0.0) ** 2
         grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
         stretched = totals_along(grid, distortion_share * excess.ravel() / max(float(excess.sum()), 1e-300), knots)
@@ -208,6 +211,7 @@ def _optimized_on(
     volume: BSplineVolume,
     fit: SurfaceFit,
     config: SplineConfig,
+    weights: Weights,
     checkpoints: Checkpoints,
     report: dict[str, Any],
 ) -> tuple[Optimized, SurfaceFit]:
@@ -216,13 +220,14 @@ def _optimized_on(
     schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, (LEAST_STEPS,) * (FIRM_ROUNDS + 2), gain=_GAIN)
     start, surface = volume.on_knots(finer), fit.on_knots(finer)
     form = DeterminantForm(start)
-    nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < config.min_coefficient)
+    nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < MIN_COEFFICIENT)
     found, _ = optimize(
         np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0)),
         finer,
         surface,
-        replace(config, vertex=_VERTEX * config.vertex),
+        config,
         schedule,
+        replace(weights, surface=_CLOSER * weights.surface),
         checkpoints=checkpoints,
         begun=FIRM_ROUNDS,
         watched=form.numbers(nearly),

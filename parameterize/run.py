@@ -163,7 +163,7 @@ def parameterize(
     found, fit, told = attempt.found, attempt.fit, None
     if config.refinement is not None:
         with timed(seconds, "refine"):
-            options = attempt.spline, config.refinement
+            options = config.spline, config.refinement, attempt.weights
             found, fit, told = refine(found, fit, *options, checkpoints=checkpoints, **report)
     with timed(seconds, "optimize"):
         volume, boundary = _in_users_units(found, fit, task)

@@ -11,6 +11,7 @@ from parameterize import parameterize
 from parameterize.config import preset
 from parameterize.cube.flips import flipped
 from parameterize.optimization.optimized import Optimized
+from parameterize.optimization.term import Weights
 from parameterize.progress import History, Progress, ignore
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.starts.growth import GROWTH, LAST, SHARES, STEPS, STIFF, first_cube
@@ -72,11 +73,9 @@ def test_the_rounds_in_which_it_grows_come_first():
 
 
 def test_a_stiff_growth_keeps_its_fairness_and_the_last_one_may_end_farther_away():
-    spline = preset("fast").spline
     for growth in (STIFF, LAST):
-        stiff = growth.stiffened(spline)
-        assert (stiff.fairness, stiff.least_floor) == (pytest.approx(10.0 * spline.fairness), 0.05)
-    assert GROWTH.stiffened(spline) == spline
+        assert growth.weights == Weights(pytest.approx(10.0 * Weights.fairness), least_floor=0.05)
+    assert GROWTH.weights == Weights()
     _, unfold, separate, _ = LAST.schedule(preset("fast")).phases
     assert unfold.far == unfold.far_first == separate.far == 0.05
 

@@ -61,11 +61,11 @@ def test_gradient_and_curvature_are_those_of_the_energy():
 
 def test_looking_near_the_last_contact_finds_what_looking_everywhere_does():
     before, control, everywhere = contact(spring(-1e-2)), control_of(spring(-8e-3)), contact(spring(-8e-3))
-    near = contact_penalty(spring(-8e-3).knots, 3, control, GAP, before.near)
+    near = contact_penalty(spring(-8e-3).knots, 3, control, GAP, near=before.near)
     assert 0 < len(before.near) < 0.9 * 6 * 110**2
     assert np.array_equal(near.spans, everywhere.spans)
     assert near.energy_and_gradient(control)[0] == everywhere.energy_and_gradient(control)[0] > 0.0
-    nothing = contact_penalty(spring(-8e-3).knots, 3, control, GAP, before.near[:0])
+    nothing = contact_penalty(spring(-8e-3).knots, 3, control, GAP, near=before.near[:0])
     assert nothing.energy_and_gradient(control)[0] == 0.0
 
 

@@ -2,16 +2,14 @@ import numpy as np
 import pytest
 from shapes import ball
 
-from parameterize.config import SplineConfig
 from parameterize.cube.cube import CORNERS, snap
 from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 KNOTS = (open_uniform_knots(6, 3),) * 3  # three spans a direction
-TANGENTIAL = 1e-3
 
 
 def anchors_on_a_ball(radius=0.5, given_corners=None):
@@ -24,7 +22,7 @@ def anchors_on_a_ball(radius=0.5, given_corners=None):
         vertex_weights(points, faces, len(points)),
         given_corners=given_corners,
     )
-    return EdgeAnchors(fit, SplineConfig(tangential=TANGENTIAL))
+    return EdgeAnchors(fit)
 
 
 def unit_cube():

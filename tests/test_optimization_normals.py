@@ -69,7 +69,7 @@ def test_only_a_boundary_that_faces_the_other_way_is_penalised(mirrored):
     fit, control = box_fit(np.array([[0.2, 0.2], [0.7, 0.3], [0.4, 0.8]]))
     if mirrored:  # all faces now look into the solid, seen with the mesh's normals
         control[2] = 1.0 - control[2]
-    energy, _ = facing_penalty(fit, control, FLOOR, margin=3.0).energy_and_gradient(control)
+    energy, _ = facing_penalty(fit, control, FLOOR).energy_and_gradient(control)
     # a unit face has (t_a x t_b) . n = 1, mirrored -1 on the faces across the mirror's plane; n turns with the faces
     expected = (FLOOR + 1.0) ** 2 if mirrored else 0.0
     assert energy == pytest.approx(expected * (2.0 / 3.0 if mirrored else 1.0))

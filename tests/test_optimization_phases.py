@@ -5,13 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_optimization_rounds import CONFIG, surface_fit
+from test_optimization_rounds import surface_fit
 
 from parameterize.optimization.endings import Course, Reason
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.optimized import Optimized
 from parameterize.optimization.phases import Grow, Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.state import State
+from parameterize.optimization.term import Weights
 from parameterize.spline.bspline import greville, open_uniform_knots
 
 KNOTS = (open_uniform_knots(14, 3),) * 3
@@ -100,7 +101,9 @@ def state_of(control, fit=None, number=4):
     fit = (fit or surface_fit()).on_knots(KNOTS)
     places = fit.places.parameters, fit.places.cube_faces
     best = Optimized.of(control, KNOTS, 3)
-    state = State(SplineEnergy(CONFIG, KNOTS, fit), KNOTS, control, best, places, near=False, number=number, halved=2)
+    state = State(
+        SplineEnergy(KNOTS, fit, Weights()), KNOTS, control, best, places, near=False, number=number, halved=2
+    )
     state.best_square = fit.mean_square(control)
     return state
 

@@ -53,7 +53,7 @@ def test_energy_is_quadratic_with_the_given_gradient_and_hessian():
     direction = np.random.default_rng(0).normal(size=control.shape)
     energy, gradient = fit.energy_and_gradient(control)
     slope = float((gradient * direction).sum())
-    curvature = float((direction * fit.hessian()(direction.astype(np.float32))).sum())
+    curvature = float((direction * fit.curvature(control)(direction.astype(np.float32))).sum())
     for h in (0.5, -0.3):  # the curvature is in single precision
         moved, _ = fit.energy_and_gradient(control + h * direction)
         assert moved == pytest.approx(energy + h * slope + 0.5 * h**2 * curvature, rel=1e-6)

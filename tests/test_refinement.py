@@ -13,7 +13,8 @@ from parameterize.optimization.optimized import Optimized
 from parameterize.optimization.phases import FIRM_ROUNDS, RAMP, Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
+from parameterize.optimization.term import Weights
 from parameterize.progress import History, ignore
 from parameterize.quality.two_sided import two_sided
 from parameterize.refinement import refine
@@ -32,7 +33,7 @@ def surface_fit():
     points, faces = subdivide_finely(*rounded_cube(OWN, power=4.0), CONFIG.longest_edge / 4.0, 9 * OWN)
     vertices = turned(points)
     places = SlidingParameters(KNOTS, 3, 0.5 + project_radially(points - 0.5), faces)
-    quadrics = vertex_quadrics(vertices, faces, CONFIG.tangential)
+    quadrics = vertex_quadrics(vertices, faces, TANGENTIAL)
     return SurfaceFit(places, vertices, quadrics, vertex_weights(vertices, faces, OWN))
 
 
@@ -57,7 +58,7 @@ def first():
 def refined(first, checkpoints=None, progress=ignore, **options):
     limits = RefinementConfig(**options)
     kept = checkpoints or Checkpoints(None, {}, resume=False)
-    return refine(*first, CONFIG, limits, history=History(), progress=progress, checkpoints=kept)
+    return refine(*first, CONFIG, limits, Weights(), history=History(), progress=progress, checkpoints=kept)
 
 
 def distance(found, fit):

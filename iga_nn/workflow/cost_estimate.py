@@ -147,14 +147,14 @@ def _pass_seconds(config: Config, device: str, clock: Clock) -> float:
 
 
 def _product_seconds(spline: SplineConfig, clock: Clock) -> float:
-    from parameterize.optimization.distortion import DistortionEnergy
+    from parameterize.optimization.distortion import Distortion
     from parameterize.spline.bspline import greville, open_uniform_knots
 
     count = min(spline.control_points, LARGEST)
     knots = open_uniform_knots(count, spline.degree)
     rows = greville(knots, spline.degree)
     control = np.stack(np.meshgrid(rows, rows, rows, indexing="ij"))
-    product = DistortionEnergy((knots, knots, knots), spline).curvature(control, 1.0)
+    product = Distortion((knots, knots, knots), spline.degree).curvature(control)
     single = control.astype(np.float32)
     seconds = _fastest(lambda: float(product(single).sum()), clock)
     return seconds * (spline.control_points / count) ** 3

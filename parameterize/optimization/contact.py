@@ -18,7 +18,10 @@ from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_normals
 from .operators import ControlRows, PiecewiseOperator
 from .sliding import SlidingParameters
+from .term import RoundWeights
 
+_GAP = 1e-3  # between sheets, in a domain of volume 1: the check of the boundary proves such a gap
+_WEIGHT = 10.0  # times that of the distance from the surface, whose data hold the sheets where they are
 _SAMPLES = 110  # a direction and cube face
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
 _CHUNK = 4096  # samples at a time, which take some 40 MB
@@ -41,6 +44,10 @@ class ContactPenalty:
     gap: float
     spans: IntArray
     near: IntArray
+
+    def weight(self, weights: RoundWeights) -> float:
+        """Return a multiple of that of the distance from the surface."""
+        return _WEIGHT * weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
@@ -68,7 +75,7 @@ class ContactPenalty:
 
 
 def contact_penalty(
-    knots: Knots, degree: int, control: Array, gap: float, near: IntArray | None = None
+    knots: Knots, degree: int, control: Array, gap: float = _GAP, near: IntArray | None = None
 ) -> ContactPenalty:
     """Return the penalty for the boundary of F at these control points; it is empty where no two sheets are near.
 

@@ -13,14 +13,16 @@ from dataclasses import dataclass, fields
 
 import numba
 import numpy as np
-from scipy.ndimage import binary_dilation
 
 from ..arrays import Array, Floats, IntArray, Knots, Mask
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
 from ..threads import in_parallel
 from .operators import PiecewiseOperator
+from .spans import with_neighbours
+from .term import RoundWeights
 
+MIN_COEFFICIENT = 0.1  # a Bernstein coefficient of det J below this is penalised on active spans; mean det J is 1
 _BLOCK = 32  # spans at a time: what they need fits into the cache
 _MOST_KEPT = 300e6  # bytes of rows that are kept from product to product; those of further spans are made anew
 
@@ -60,7 +62,7 @@ class _Rows:
     starts: IntArray
 
 
-class SpanBarrier:
+class DeterminantPenalty:
     """Mean over all spans of weight * (floor - coefficient)_+^2; coefficients of det J in Bernstein form.
 
     weights (n_u, n_v, n_w): of the spans, 0 to begin with; a span of positive weight is active.
@@ -68,7 +70,7 @@ class SpanBarrier:
     weight grows by the inverse of its square.
     """
 
-    def __init__(self, knots: Knots, degree: int, floor: float) -> None:
+    def __init__(self, knots: Knots, degree: int, floor: float = MIN_COEFFICIENT) -> None:
         self.floor = floor
         self._extractions = [extraction(k, degree) for k in knots]
         self._widths = [np.diff(breakpoints(k)) for k in knots]
@@ -112,6 +114,10 @@ class SpanBarrier:
         blocks = [slice(start, start + _BLOCK) for start in range(0, len(first), _BLOCK)]
         back = np.ascontiguousarray(np.swapaxes(bezier, 2, 3))
         self._pieces = [_Spans(first[b], volumes[b], floors[b], shares[b], bezier[b], back[b]) for b in blocks]
+
+    def weight(self, weights: RoundWeights) -> float:
+        """Return that of the penalties on what is folded."""
+        return weights.penalty
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
@@ -283,23 +289,3 @@ def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
                 for j in range(n):
                     for k in range(n):
                         total[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k] += windows[s, c, i, j, k]
-
-
-def with_neighbours(spans: IntArray, n_spans: tuple[int, ...]) -> Mask:
-    """Mark spans (k, 3) and all that touch them: (n_u, n_v, n_w)."""
-    marked = np.zeros(n_spans, dtype=bool)
-    marked[tuple(spans.T)] = True
-    return np.asarray(binary_dilation(marked, np.ones((3, 3, 3), dtype=bool)))
-
-
-def acting_on(spans: Mask, degree: int) -> Mask:
-    """Mark the control points that act on marked spans: (n_u, n_v, n_w), `degree` fewer spans a direction."""
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(spans, degree), (degree + 1,) * 3)
-    return np.asarray(windows.any(axis=(3, 4, 5)))
-
-
-def edge_spans(n_spans: tuple[int, int, int]) -> IntArray:
-    """Return the spans (k, 3) that touch one of the cube's 12 edges."""
-    index = np.indices(n_spans).reshape(3, -1).T
-    at_side = (index == 0) | (index == np.array(n_spans) - 1)
-    return index[at_side.sum(axis=1) >= 2]

@@ -14,6 +14,10 @@ from ..cube.cube import axis_and_side
 from .matrices import cross, dots
 from .operators import ControlRows, PiecewiseOperator
 from .surface_distance import SurfaceFit
+from .term import RoundWeights
+
+_FLOOR = 0.1  # (t_a x t_b) . n below this is penalised; its mean over the boundary is near 1
+_MARGIN = 3.0  # times that: points below may fall under it in the next step and are watched
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +32,10 @@ class FacingPenalty:
     normals: Floats
     weights: Floats
     floor: float
+
+    def weight(self, weights: RoundWeights) -> float:
+        """Return that of the penalties on what is folded."""
+        return weights.penalty
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
@@ -63,16 +71,16 @@ class FacingPenalty:
         return along_a.adjoint((factor * by_a).T, like) + along_b.adjoint((factor * by_b).T, like)
 
 
-def facing_penalty(fit: SurfaceFit, control: Array, floor: float, margin: float) -> FacingPenalty:
-    """Return the penalty at the points of the surface where (t_a x t_b) . n < margin * floor at these control points.
+def facing_penalty(fit: SurfaceFit, control: Array, floor: float = _FLOOR) -> FacingPenalty:
+    """Return the penalty at the points of the surface where (t_a x t_b) . n is near the floor at these control points.
 
-    With a margin above 1 it also holds points that could fall below the floor in the next step.
+    It also holds points that could fall below the floor in the next step.
     """
     window = fit.places.window
     _, tangent_a, tangent_b = window.derivatives(control)
     outward = axis_and_side(fit.places.cube_faces)[1] == 1
     normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
-    low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < margin * floor
+    low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < _MARGIN * floor
     along_a, along_b = window.weights(1, 0), window.weights(0, 1)
     return FacingPenalty(
         (ControlRows(window.indices[low], along_a[low]), ControlRows(window.indices[low], along_b[low])),

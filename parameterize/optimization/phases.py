@@ -12,10 +12,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from .determinant_penalty import acting_on, with_neighbours
 from .endings import Reason
 from .newton import GAIN
 from .optimized import Optimized
+from .spans import acting_on, with_neighbours
 from .state import MOST_WATCHED, State
 
 _log = logging.getLogger(__name__)
@@ -119,7 +119,7 @@ class Unfold(Phase):
         if state.number < patience or not 0 < len(unproved) <= _MOST_SMOOTHED:
             return found
         control = state.energy.smoothed(found.control, unproved)
-        smoothed = Optimized.of(control, state.knots, state.energy.config.degree)
+        smoothed = Optimized.of(control, state.knots, state.energy.degree)
         _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.certificate.unproved))
         return smoothed if smoothed.faults < found.faults else found
 
@@ -182,7 +182,7 @@ class Polish(Phase):
     def amended(self, state: State, found: Optimized) -> Optimized:
         """Move what folds again back to where it was certified; return the map found where that brings nothing."""
         energy, folded, mended = state.energy, found.certificate.unproved, found
-        degree, held = energy.config.degree, np.zeros(energy.barrier.weights.shape, dtype=bool)
+        degree, held = energy.degree, np.zeros(energy.determinants.weights.shape, dtype=bool)
         for _ in range(_MENDINGS):
             unproved = mended.certificate.unproved
             if not 0 < len(unproved) <= MOST_WATCHED:
@@ -198,7 +198,7 @@ class Polish(Phase):
         if energy.surface.mean_square(mended.control) >= state.best_square:
             places.place(*before)
             return found
-        energy.barrier.activate(folded)
+        energy.determinants.activate(folded)
         energy.give_way(folded, GIVING_WAY)
         _log.info("moved back near %d spans", len(folded))
         return mended

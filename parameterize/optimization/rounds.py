@@ -15,14 +15,15 @@ from ..config import SplineConfig
 from ..progress import History, Progress, ProgressCallback, ignore, timed
 from ..spline.bspline import breakpoints
 from ..threads import one_blas_thread
-from .determinant_penalty import edge_spans
 from .endings import Course, Reason
 from .energy import SplineEnergy
 from .newton import FIRST_GAIN, LEAST_STEPS, Point, StoppingRule, descend
 from .optimized import Optimized
 from .phases import GIVING_WAY, PATIENT_ROUNDS, Grow, Phase, Schedule
+from .spans import edge_spans
 from .state import State
 from .surface_distance import SurfaceFit
+from .term import Weights
 
 _log = logging.getLogger(__name__)
 _SPAN_GROWTH = 5.0  # factor of the penalty's weight at unproved spans, each round
@@ -35,6 +36,7 @@ def optimize(
     surface: SurfaceFit,
     config: SplineConfig,
     schedule: Schedule,
+    weights: Weights = Weights(),  # noqa: B008 - frozen
     *,
     history: History,
     progress: ProgressCallback = ignore,
@@ -53,10 +55,10 @@ def optimize(
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with one_blas_thread():
-        energy = SplineEnergy(config, knots, surface)
-        energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
+        energy = SplineEnergy(knots, surface, weights)
+        energy.determinants.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))
         if watched is not None:
-            energy.barrier.activate(watched)
+            energy.determinants.activate(watched)
         first = Optimized.of(control, knots, config.degree)
         places = surface.places.parameters, surface.places.cube_faces
         state = State(energy, knots, control, first, places, energy.anchors.near(control), number=begun, halved=begun)
@@ -88,12 +90,12 @@ def _run(state: State, schedule: Schedule, one_round: Callable[[Phase], None]) -
 def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport") -> None:
     """Weigh, descend, certify; then watch the spans not proved and let the surface give way near them."""
     energy, number, grows = state.energy, state.number, isinstance(phase, Grow)
-    share, steps = (phase.shares[number], phase.steps) if isinstance(phase, Grow) else (None, energy.config.steps)
+    share, steps = (phase.shares[number], phase.steps) if isinstance(phase, Grow) else (None, report.most)
     phase.begin(state)
     energy.start_round(state.control, phase.penalty(number), share)
     rule = StoppingRule(steps, schedule.gain if number else FIRST_GAIN)
     control = descend(energy, state.control, rule, report)
-    found = Optimized.of(control, state.knots, energy.config.degree)
+    found = Optimized.of(control, state.knots, energy.degree)
     state.last_square = energy.surface.mean_square(control)
     found = phase.amended(state, found)
     verdict, unproved = found.certificate.verdict, found.certificate.unproved
@@ -104,9 +106,9 @@ def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport"
     if number == 0 or grows or found.rank <= state.best.rank:
         state.keep(found)
     if not state.many:
-        energy.barrier.activate(unproved)
+        energy.determinants.activate(unproved)
     if number >= PATIENT_ROUNDS and len(unproved):
-        energy.barrier.stiffen(unproved, _SPAN_GROWTH, _SPAN_MOST)
+        energy.determinants.stiffen(unproved, _SPAN_GROWTH, _SPAN_MOST)
     if number >= phase.firm and len(unproved):
         energy.give_way(unproved, GIVING_WAY)
     if 2 * len(unproved) <= state.fewest or number <= schedule.grown:

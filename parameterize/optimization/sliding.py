@@ -18,9 +18,9 @@ from ..cube.cube import damped_solution, nearest_faces
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints
 from ..threads import in_parallel
-from .determinant_penalty import with_neighbours
 from .face_window import FaceWindow, Polynomials, fill_tangents, fill_window, polynomials_of
 from .operators import ControlRows, pieces
+from .spans import with_neighbours
 
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3

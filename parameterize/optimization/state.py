@@ -70,7 +70,7 @@ class State:
             "yielding": surface.yielding,
             "anchors": anchors.points,
             "anchors_yielding": anchors.yielding,
-            "span_weights": self.energy.barrier.weights,
+            "span_weights": self.energy.determinants.weights,
         }
         numbers = {name: getattr(self, name) for name in _NUMBERS}
         phases = {"rounds": self.rounds, "seconds": self.seconds}
@@ -86,9 +86,9 @@ class State:
         energy.surface.places.place(arrays["parameters"], arrays["cube_faces"])
         energy.surface.give_way(arrays["yielding"])
         energy.anchors.restore(arrays["anchors"], arrays["anchors_yielding"])
-        energy.barrier.weigh(arrays["span_weights"])
+        energy.determinants.weigh(arrays["span_weights"])
         self.control = arrays["control"]
-        self.best = Optimized.of(arrays["best"], self.knots, energy.config.degree)
+        self.best = Optimized.of(arrays["best"], self.knots, energy.degree)
         self.best_places = arrays["best_parameters"], arrays["best_cube_faces"]
         for name in _NUMBERS:
             setattr(self, name, state[name])

@@ -11,6 +11,9 @@ from ..arrays import Array, Knots, Mask
 from ..surface.geometry import vertex_normals
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
+from .term import RoundWeights
+
+TANGENTIAL = 2e-4  # share of the distance within the tangent plane: holds what slides, and hardly draws F
 
 
 class SurfaceFit:
@@ -60,13 +63,17 @@ class SurfaceFit:
         self._held = held
         self.give_way(self.yielding)
 
+    def weight(self, weights: RoundWeights) -> float:
+        """Return that of the distance from the surface."""
+        return weights.surface
+
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the sum of r^T Q r at the present parameters and its gradient (3, n_u, n_v, n_w)."""
         residual = self.places.rows(control) - self.points  # (N, 3)
         pulled = np.einsum("nij,nj->ni", self._metric, residual)
         return float(np.vdot(residual, pulled)), 2.0 * self.places.rows.adjoint(pulled, control)
 
-    def hessian(self) -> PiecewiseOperator:
+    def curvature(self, control: Array) -> PiecewiseOperator:
         """Return the second derivative of the energy, parameters held, as an operator in single precision."""
         return self.places.rows.in_single().squared(2.0 * self._metric.astype(np.float32))
 

@@ -3,7 +3,6 @@
 import numpy as np
 
 from ..arrays import Array
-from ..config import SplineConfig
 from ..optimization.least_squares import fit_pairs
 from ..optimization.surface_distance import SurfaceFit
 
@@ -12,7 +11,7 @@ _BOUNDARY_SHARE = 0.2  # weight of the surface's samples; those inside have the 
 _FAIRNESS = 1e-7  # of the fit: holds what no sample determines, and hardly moves the rest
 
 
-def first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineConfig) -> Array:
+def first_spline(inside: Array, places: Array, fit: SurfaceFit) -> Array:
     """Fit by least squares to pairs (k, 3) of places and points inside, and the boundary's (section 4.3.2, step 2)."""
     weights = [
         np.full(len(inside), (1.0 - _BOUNDARY_SHARE) / max(len(inside), 1)),
@@ -23,6 +22,6 @@ def first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineCo
         np.concatenate([inside, fit.points]),
         np.concatenate(weights),
         fit.places.knots,
-        spline.degree,
+        fit.places.degree,
         fairness=_FAIRNESS,
     )

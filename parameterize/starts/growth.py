@@ -13,9 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import Array, Knots
 from ..checkpoint import Checkpoints
-from ..config import Config, SplineConfig, scaled_steps
+from ..config import Config, scaled_steps
 from ..cube.flips import Layout
 from ..optimization.phases import FAR, PARTED, Grow, Polish, Schedule, Separate, Unfold
+from ..optimization.term import Weights
 from ..progress import timed
 from ..spline.bspline import greville
 from ..surface.geometry import vertex_weights
@@ -47,16 +48,16 @@ class Growth(Start):
 
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt:
         """Lay the surface on the cube and let F grow towards it."""
-        spline = self.stiffened(task.config.spline)
         with timed(task.seconds, "fit"), one_blas_thread():
             layout = surface_on_cube(task, self.turn)
             fit = task.fit(layout, _COARSE)
-            control = first_cube(layout, task.own, fit.places.knots, spline.degree)
-        return optimized(control, fit, spline, self.schedule(task.config), task, checkpoints)
+            control = first_cube(layout, task.own, fit.places.knots, fit.places.degree)
+        return optimized(control, fit, self.schedule(task.config), task, checkpoints, self.weights)
 
-    def stiffened(self, spline: SplineConfig) -> SplineConfig:
-        """Return the options of a spline stage with what this growth keeps to the end."""
-        return replace(spline, fairness=self.stiffness * spline.fairness, least_floor=self.least_floor)
+    @property
+    def weights(self) -> Weights:
+        """The weights that this growth keeps to the end."""
+        return Weights(self.stiffness * Weights.fairness, least_floor=self.least_floor)
 
     def schedule(self, config: Config) -> Schedule:
         """Return the rounds: those in which F grows come first, with the full penalty on det J."""

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
-from ..config import Config, SplineConfig
+from ..config import Config
 from ..cube.cutting import subdivide_finely
 from ..cube.flips import Layout
 from ..cube.sphere import lay_on_sphere
@@ -17,7 +17,8 @@ from ..optimization.endings import Course
 from ..optimization.optimized import Optimized
 from ..optimization.phases import Schedule
 from ..optimization.sliding import SlidingParameters
-from ..optimization.surface_distance import SurfaceFit
+from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
+from ..optimization.term import Weights
 from ..progress import timed
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
@@ -74,7 +75,7 @@ class Task:
                 coarse_knots(spline, coarse), spline.degree, layout.places, layout.faces, self.config.layout
             ),
             layout.vertices,
-            vertex_quadrics(layout.vertices, layout.faces, spline.tangential),
+            vertex_quadrics(layout.vertices, layout.faces, TANGENTIAL),
             vertex_weights(layout.vertices, layout.faces, self.own),
             given_corners=None if self.given_corners is None else self.mesh[0][self.given_corners],
         )
@@ -82,12 +83,12 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A map, how its rounds went, the surface data that belong to it, and the options by which it may be refined."""
+    """A map, how its rounds went, the surface data that belong to it, and the weights by which it may be refined."""
 
     found: Optimized
     course: Course
     fit: SurfaceFit
-    spline: SplineConfig
+    weights: Weights
 
     @cached_property
     def distance(self) -> float:
@@ -119,12 +120,13 @@ class Start(ABC):
 def optimized(
     control: Array,
     fit: SurfaceFit,
-    spline: SplineConfig,
     schedule: Schedule,
     task: Task,
     checkpoints: Checkpoints,
+    weights: Weights = Weights(),  # noqa: B008 - frozen
 ) -> Attempt:
     """Optimise a first map `control` (3, n_u, n_v, n_w) on the knots of `fit`."""
+    spline = task.config.spline
     with timed(task.seconds, "optimize"):
-        made = optimize_coarse_first(control, fit, spline, schedule, checkpoints=checkpoints, **task.report)
-    return Attempt(*made, spline)
+        made = optimize_coarse_first(control, fit, spline, schedule, weights, checkpoints=checkpoints, **task.report)
+    return Attempt(*made, weights)
