@@ -237,7 +237,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
         device=result.device,
         versions=reports.versions(),
         parameterization=result.quality.as_dict()
-        | {"origin": result.origin}
+        | {"origin": result.origin, "attempts": [asdict(attempt) for attempt in result.attempts]}
         | ({"refinement": asdict(result.refinement)} if result.refinement else {})
         | advice.unproved(result.volume, result.certificate),
     )
