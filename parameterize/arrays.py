@@ -1,6 +1,7 @@
 """The kinds of arrays that most functions take and return, and how a point is written."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Floats = NDArray[Any]  # numbers in single or double precision
 Knots = tuple[Array, Array, Array]  # the knot vectors of u, v, w
 
 

@@ -1,243 +1,52 @@
-"""The ways to a map, one after the other: the trained network, a cube that grows, a layout extended into the solid."""
+"""The starts, one after the other, until a map has no faults: the network, a cube that grows, an extended layout."""
 
 import logging
-import math
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, Literal
 
-import numpy as np
-import torch
-
-from .arrays import Array, IntArray
 from .checkpoint import Checkpoints
-from .coarse import coarse_knots, optimize_coarse_first
-from .config import Config, ExtensionConfig, GrowthConfig, SplineConfig
-from .cube.cutting import subdivide_finely
-from .cube.edge_paths import PathError, choose_corners, lay_out
-from .cube.flips import flipped, untangle
-from .cube.layout import CubeLayout
-from .cube.sphere import lay_on_sphere
-from .extension import extended, extending
-from .growth import first_cube, growing, stiffened, surface_on_cube
-from .optimization.least_squares import fit_pairs
-from .optimization.rounds import Optimized, one_thread_an_operation
-from .optimization.sliding import SlidingParameters
-from .optimization.surface_distance import SurfaceFit
-from .progress import timed
-from .surface.geometry import vertex_quadrics, vertex_weights
-from .surface.surface import Surface
-from .training.samples import interior_points
-from .training.target_shapes import nearest_on_cube
-from .training.trainer import Trainer, map_points
+from .starts.extension import EXTENSION
+from .starts.growth import GROWTH, LAST, STIFF
+from .starts.network import NETWORK
+from .starts.start import Start, Task
+from .starts.tried import Tried, best_of
 
 _log = logging.getLogger(__name__)
 
-Origin = Literal["network", "growth", "extension"]
+STARTS: tuple[Start, ...] = (NETWORK, GROWTH, EXTENSION, STIFF, LAST)
 
 
-@dataclass(frozen=True, eq=False)
-class Task:
-    """What all attempts share: the surface, options, the place, and what is computed of the surface once."""
+def next_start(tried: tuple[Tried, ...]) -> Start | None:
+    """Return the start that follows those that were tried; None where a map has no faults or no start is left.
 
-    surface: Surface
-    config: Config
-    seed: int
-    device: torch.device
-    dtype: torch.dtype
-    given_corners: IntArray | None
-    seconds: dict[str, float]  # which grow as the run goes on
-    report: dict[str, Any]  # history and progress, as Trainer and optimize take them
-
-    @property
-    def own(self) -> int:
-        """Number of the surface's own vertices, which stay the first ones where edges are cut."""
-        return len(self.surface.vertices)
-
-    @cached_property
-    def mesh(self) -> tuple[Array, IntArray]:
-        """Vertices (n, 3) and faces (m, 3) at volume 1, long edges cut."""
-        spline = self.config.spline
-        return subdivide_finely(
-            self.surface.unit_vertices, self.surface.faces, spline.longest_edge, self.own + spline.most_points
-        )
-
-    @cached_property
-    def sphere(self) -> CubeLayout:
-        """The surface at volume 1, laid on the sphere."""
-        surface = self.surface
-        return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"])
-
-
-@dataclass(frozen=True, eq=False)
-class Attempt:
-    """A map, the surface data that belong to it, where it comes from, and the options by which it may be refined."""
-
-    found: Optimized
-    fit: SurfaceFit
-    origin: Origin
-    spline: SplineConfig
-
-    @cached_property
-    def distance(self) -> float:
-        """Root mean square distance of the surface's points from the map, at volume 1."""
-        return math.sqrt(self.fit.mean_square(self.found.control))
-
-    @property
-    def rank(self) -> tuple[int, bool, bool, float]:
-        """What is not proved, then the distance: of two attempts the one with the lower rank is better."""
-        return *self.found.rank, self.distance
-
-
-def best_attempt(task: Task, checkpoints: Checkpoints) -> Attempt:
-    """Train a map; where that is hard or not certified, grow and extend others. Return the first without faults.
-
-    Where the first growth is far from the surface, a stiffer one follows, and the nearer of the two is kept. Where all
-    have faults, return the best.
+    A stiffer growth follows a growth that ends far from the surface, certified or not, and one that meets itself.
     """
-    config = task.config
-    ways: list[tuple[str, GrowthConfig | ExtensionConfig]] = [
-        ("growing a map from a cube", config.growth),
-        ("extending the surface's layout into the solid", config.extension),
-        ("growing a stiffer map", config.stiff_growth),
-        ("growing a stiffer map, farther from the surface,", config.last_growth),
-    ]
-    tries = min(config.starts - 1, len(ways)) if task.given_corners is None else 0
-    best = _trained(task, checkpoints, give_up=tries > 0)
-    far = False
-    for i in range(tries):
-        if best is not None and not any(best.found.faults) and not far:
-            break
-        told, options = ways[i]
-        _tell(best, told)
-        kept = checkpoints.of_part(i + 1)
-        other = _grown(task, options, kept) if isinstance(options, GrowthConfig) else _extended(task, options, kept)
-        far = i == 0 and other.distance > config.growth.far
-        if i == 0 and (other.found.meets_itself or far):
-            ways[1], ways[2] = ways[2], ways[1]
-        if best is None or other.rank < best.rank:
-            best = other
-    assert best is not None
-    return best
-
-
-def _tell(best: Attempt | None, way: str) -> None:
-    if best is None:
-        _log.info("the shape is hard for the network: %s instead", way)
-    else:
-        _log.warning("%s; %s instead", _fault(best.found), way)
-
-
-def _trained(task: Task, checkpoints: Checkpoints, *, give_up: bool) -> Attempt | None:
-    """Train the network, fit F to it and optimise F. With `give_up`, return None where the shape is hard to train."""
-    with timed(task.seconds, "train"), one_thread_an_operation():
-        trainer = Trainer(
-            *task.mesh,
-            task.config,
-            seed=task.seed,
-            device=task.device,
-            dtype=task.dtype,
-            given_corners=task.given_corners,
-            checkpoints=checkpoints,
-            **task.report,
-        )
-        network = trainer.run(give_up=give_up)
-    if network is None:
+    begun = [one.start for one in tried]
+    left = [start for start in STARTS if start not in begun]
+    grown = tried[begun.index(GROWTH)].attempt if GROWTH in begun else None
+    if STIFF in left and grown is not None and grown.distance > GROWTH.far:
+        return STIFF
+    if not left or any(one.attempt is not None and not any(one.attempt.found.faults) for one in tried):
         return None
-    spline = task.config.spline
-    vertices, faces = task.mesh
-    with timed(task.seconds, "fit"), one_thread_an_operation():
-        mapped = map_points(network, vertices, task.device, task.dtype)
-        fit = _surface_fit(_layout(mapped, trainer.corners, task), spline, task)
-        inside = interior_points(vertices, faces, spline.fit_cell)
-        places = map_points(network, inside, task.device, task.dtype).clip(0.0, 1.0)
-        control = _first_spline(inside, places, fit, spline)
-    return _optimized(control, fit, spline, task, checkpoints, "network")
+    return STIFF if STIFF in left and grown is not None and grown.found.meets_itself else left[0]
 
 
-def _grown(task: Task, growth: GrowthConfig, checkpoints: Checkpoints) -> Attempt:
-    """Lay the surface on the cube and let F grow towards it."""
-    spline = growing(task.config.spline, growth)
-    with timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = _on_cube(task, growth.turn)
-        fit = _surface_fit(layout, spline, task)
-        control = first_cube(layout, fit.places.knots, spline.degree)
-    attempt = _optimized(control, fit, spline, task, checkpoints, "growth")
-    return replace(attempt, spline=stiffened(task.config.spline, growth))
+def attempts(task: Task, checkpoints: Checkpoints) -> tuple[Tried, ...]:
+    """Make maps until one has no faults, at most as many as the options say; return all, with at least one map."""
+    tried: tuple[Tried, ...] = ()
+    while len(tried) < task.most_starts and (start := next_start(tried)) is not None:
+        if tried:
+            _tell(tried, start)
+        before = dict(task.seconds)
+        attempt = start.make(task, checkpoints.of_part(len(tried)) if tried else checkpoints)
+        spent = {step: seconds - before.get(step, 0.0) for step, seconds in task.seconds.items()}
+        tried += (Tried(start, attempt, spent),)
+    return tried
 
 
-def _extended(task: Task, extension: ExtensionConfig, checkpoints: Checkpoints) -> Attempt:
-    """Lay the surface on the cube and fit F to that layout, extended into the solid."""
-    spline = extending(task.config.spline, extension)
-    with timed(task.seconds, "fit"), one_thread_an_operation():
-        layout = _on_cube(task, 0)
-        fit = _surface_fit(layout, spline, task)
-        control = _first_spline(*extended(layout, extension), fit, spline)
-    return _optimized(control, fit, spline, task, checkpoints, "extension")
-
-
-def _on_cube(task: Task, turn: int) -> CubeLayout:
-    return surface_on_cube(task.sphere, task.config.spline, seed=task.seed, turn=turn)
-
-
-def _optimized(
-    control: torch.Tensor,
-    fit: SurfaceFit,
-    spline: SplineConfig,
-    task: Task,
-    checkpoints: Checkpoints,
-    origin: Origin,
-) -> Attempt:
-    with timed(task.seconds, "optimize"):
-        found, fit = optimize_coarse_first(control, fit, spline, checkpoints=checkpoints, **task.report)
-    return Attempt(found, fit, origin, task.config.spline)
-
-
-def _fault(found: Optimized) -> str:
-    if not any(found.faults):
-        return "far from the surface"
-    return "the boundary meets itself" if found.meets_itself else "not certified"
-
-
-def _surface_fit(layout: CubeLayout, spline: SplineConfig, task: Task) -> SurfaceFit:
-    """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1)."""
-    return SurfaceFit(
-        SlidingParameters(coarse_knots(spline), spline.degree, layout.places, layout.faces),
-        layout.points,
-        vertex_quadrics(layout.points, layout.faces, spline.tangential),
-        vertex_weights(layout.points, layout.faces, layout.n_own),
-        given_corners=None if task.given_corners is None else task.mesh[0][task.given_corners],
-    )
-
-
-def _layout(mapped: Array, corners: IntArray | None, task: Task) -> CubeLayout:
-    """Return nearest points on the cube, untangled; where that leaves flips, patches between traced edges.
-
-    The first stays closer to the network's map, the second always succeeds where the edges can be traced.
-    """
-    layout = CubeLayout(*task.mesh, mapped, task.own)
-    nearest = nearest_on_cube(torch.as_tensor(mapped)).numpy()
-    untangled = untangle(nearest, layout.faces)
-    if flipped(untangled, layout.faces).mean() > task.config.spline.few_flips:
-        try:
-            chosen = choose_corners(mapped) if corners is None else corners
-            return lay_out(layout, chosen)
-        except PathError as error:
-            _log.warning("the first layout has flipped triangles: %s", error)
-    return replace(layout, places=untangled)
-
-
-def _first_spline(inside: Array, places: Array, fit: SurfaceFit, spline: SplineConfig) -> torch.Tensor:
-    """Fit by least squares to pairs (k, 3) of places and points inside, and the boundary's (section 4.3.2, step 2)."""
-    weights = [
-        np.full(len(inside), (1.0 - spline.boundary_share) / max(len(inside), 1)),
-        np.full(len(fit.points), spline.boundary_share / len(fit.points)),
-    ]
-    return fit_pairs(
-        np.concatenate([places, fit.places.parameters]),
-        np.concatenate([inside, fit.points]),
-        np.concatenate(weights),
-        fit.places.knots,
-        spline.degree,
-        fairness=spline.fit_fairness,
-    )
+def _tell(tried: tuple[Tried, ...], start: Start) -> None:
+    """Log why another start follows."""
+    if (best := best_of(tried)) is None:
+        _log.info("the shape is hard for the network: %s instead", start.doing)
+        return
+    found = best[1].found
+    fault = "the boundary meets itself" if found.meets_itself else "not certified"
+    _log.warning("%s; %s instead", fault if any(found.faults) else "far from the surface", start.doing)

@@ -1,4 +1,4 @@
-"""Checkpoints of a run: tensors and a JSON header in one safetensors file, replaced as a whole.
+"""Checkpoints of a run: arrays and a JSON header in one safetensors file, replaced as a whole.
 
 A checksum over both is kept with them: what is damaged is refused, not computed with.
 """
@@ -10,14 +10,14 @@ from copy import copy
 from pathlib import Path
 from typing import Any
 
-import torch
+import numpy as np
+from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save as to_bytes
-from torch import Tensor
+from safetensors.numpy import save as to_bytes
 
 from .files import save_bytes
 
-FORMAT = 7
+FORMAT = 9  # a file of another one is refused by name
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
 _DAMAGED = "remove this file to go on from what was kept before it, or start anew with --force"
@@ -54,7 +54,7 @@ class Checkpoints:
         """
         for path in sorted(self._folder.glob("*.safetensors")) if self._folder is not None else []:
             try:
-                with safe_open(path, framework="pt") as file:
+                with safe_open(path, framework="np") as file:
                     header = file.metadata() or {}
                 found = json.loads(header["identity"])
             except (SafetensorError, OSError, LookupError, ValueError):
@@ -67,36 +67,34 @@ class Checkpoints:
         if differing := _differing(json.loads(self._identity), found):
             raise CheckpointError(f"{path}: belongs to another run ({', '.join(differing)} differ); {_ANEW}")
 
-    def save(self, name: str, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:
+    def save(self, name: str, arrays: Mapping[str, NDArray[Any]], state: Mapping[str, Any]) -> None:
         """Write checkpoint `name`, replacing an older one. Raises OSError naming the file, say on a full disk."""
         if self._folder is None:
             return
         self._folder.mkdir(parents=True, exist_ok=True)
         header = {"format": str(FORMAT), "identity": self._identity, "state": json.dumps(state)}
-        # copies: the file format refuses tensors that share memory
-        copies = {k: v.detach().cpu().clone(memory_format=torch.contiguous_format) for k, v in tensors.items()}
+        copies = {key: np.array(array, order="C") for key, array in arrays.items()}  # the file format takes no views
         content = to_bytes(copies, metadata=header | {"sha256": _digest(copies, header)})
         save_bytes(self._folder / f"{name}{self._suffix}.safetensors", content)
 
-    def load(self, name: str) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
-        """Return tensors and state of checkpoint `name`; None where there is none or the run starts afresh."""
+    def load(self, name: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
+        """Return arrays and state of checkpoint `name`; None where there is none or the run starts afresh."""
         if self._folder is None or not self._resume:
             return None
         path = self._folder / f"{name}{self._suffix}.safetensors"
         if not path.exists():
             return None
         try:
-            with safe_open(path, framework="pt") as file:
+            with safe_open(path, framework="np") as file:
                 header = file.metadata() or {}
-                # copies lie aligned in memory as in the first run; sums over tensors within the file round differently
-                tensors = {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118 - not a mapping
+                arrays = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 - not a mapping
         except (SafetensorError, OSError, ValueError) as error:
             raise CheckpointError(f"{path}: not a readable checkpoint ({error}); {_DAMAGED}") from None
         _demand_format(path, header)
-        if header.pop("sha256", None) != _digest(tensors, header):
+        if header.pop("sha256", None) != _digest(arrays, header):
             raise CheckpointError(f"{path}: not a readable checkpoint (damaged); {_DAMAGED}")
         self._demand_own(path, json.loads(header["identity"]))
-        return tensors, json.loads(header["state"])
+        return arrays, json.loads(header["state"])
 
 
 def _demand_format(path: Path, header: Mapping[str, str]) -> None:
@@ -107,9 +105,9 @@ def _demand_format(path: Path, header: Mapping[str, str]) -> None:
         )
 
 
-def _digest(tensors: Mapping[str, Tensor], header: Mapping[str, str]) -> str:
+def _digest(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, str]) -> str:
     """Return the SHA-256 of everything that a checkpoint holds."""
-    return hashlib.sha256(to_bytes(dict(tensors)) + json.dumps(header, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(to_bytes(dict(arrays)) + json.dumps(header, sort_keys=True).encode()).hexdigest()
 
 
 def _differing(wanted: Any, found: Any) -> list[str]:

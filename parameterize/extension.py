@@ -1,11 +1,11 @@
-"""Another map that does not need the network: the surface's layout on the cube is extended into the solid.
+"""The surface's layout on the cube, extended into the solid.
 
 The extension is harmonic, that is each place is the mean of those around it. Sheets that are close in space stay apart,
 because no line through the gap between them is followed. Differences at the surface are as in Shortley and Weller,
 J. Appl. Phys. 9, 1938, with weights that keep the system symmetric.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -13,29 +13,23 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import cg
 
 from .arrays import Array, IntArray
-from .config import ExtensionConfig, SplineConfig
 from .cube.cube import VARYING_AXES
 from .cube.layout import CubeLayout
 
 _OFFSET = np.array([0.512345, 0.498765, 0.543211])  # in cells: no line of the lattice runs along faces of a model
+_TOLERANCE = 1e-6  # of the linear solves, relative: a fit to the places follows, and is far coarser
 _NEAREST = 1e-3  # in cells: the surface counts as no nearer to a lattice point
 
 
-def extending(spline: SplineConfig, extension: ExtensionConfig) -> SplineConfig:
-    """Return the options of the spline stage of such a map: it starts near its end, so folds cost much at once."""
-    return replace(spline, penalties=(extension.penalty,), rounds=extension.rounds, usual_steps=extension.usual_steps)
-
-
-def extended(layout: CubeLayout, options: ExtensionConfig) -> tuple[Array, Array]:
-    """Return the points (k, 3) of a lattice inside the surface, and their places (k, 3) in the cube."""
-    cell = options.cell
+def extended(layout: CubeLayout, cell: float) -> tuple[Array, Array]:
+    """Return the points (k, 3) of a lattice inside the surface, `cell` apart, and their places (k, 3) in the cube."""
     low = layout.points.min(axis=0) - cell * _OFFSET
     shape = np.ceil((layout.points.max(axis=0) - low) / cell).astype(np.int64) + 1
     lines = [_crossings(layout, axis, low, cell, shape) for axis in range(3)]
     inside = _inside(lines[0])
     matrix, right = _harmonic_system(lines, inside)
     precondition = diags_array(1.0 / matrix.diagonal())
-    places = [cg(matrix, column, rtol=options.tolerance, M=precondition)[0] for column in right.T]
+    places = [cg(matrix, column, rtol=_TOLERANCE, M=precondition)[0] for column in right.T]
     return low + cell * inside, np.clip(np.stack(places, axis=1), 0.0, 1.0)
 
 

@@ -10,14 +10,19 @@ from itertools import count
 from typing import Any, Literal
 
 import numpy as np
-import torch
 
 from .arrays import Array, IntArray, Knots
 from .certificate.determinant import DeterminantForm
 from .checkpoint import Checkpoints
 from .config import RefinementConfig, SplineConfig
-from .optimization.rounds import Optimized, optimize
+from .optimization.determinant_penalty import MIN_COEFFICIENT
+from .optimization.distortion import ARAP_LIMIT
+from .optimization.newton import LEAST_STEPS
+from .optimization.optimized import Optimized
+from .optimization.phases import FIRM_ROUNDS, Polish, Schedule, Separate, Unfold
+from .optimization.rounds import optimize
 from .optimization.surface_distance import SurfaceFit
+from .optimization.term import Weights
 from .progress import History, ProgressCallback
 from .quality.quality import arap_grid
 from .quality.two_sided import two_sided
@@ -26,6 +31,14 @@ from .spline.volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "knots"
+SHARE = 0.7  # of all that is found lies on the spans that are halved together: fewer would take more refinements
+GROWTH = 2.0  # factor of the number of control points in one refinement, at most: the next one knows better where
+DISTORTION = 0.25  # what the distortion above its limit counts, all squared distances together counting 1
+_NARROWEST = 0.2  # of the first spline's spans: none gets narrower than this share of their length
+_CLOSER = 3.0  # factor of the surface's weight: the boundary counts more once the map is in shape
+_GAIN = 3e-4  # in place of the spline stage's: the first steps on new knots gain little, the later ones more
+ROUNDS = 8  # after a refinement, at most
+POLISH = 3  # of them, while the map is certified, at most
 
 Stop = Literal["tolerance met", "limit reached", "no better map"]
 
@@ -68,6 +81,7 @@ def refine(
     fit: SurfaceFit,
     config: SplineConfig,
     refinement: RefinementConfig,
+    weights: Weights,
     *,
     history: History,
     progress: ProgressCallback,
@@ -78,7 +92,7 @@ def refine(
     Each refinement has checkpoints of its own: the chosen knots, and those of its spline stage.
     """
     report: dict[str, Any] = {"history": history, "progress": progress}
-    spots = _Spots.of(found, fit, config)
+    spots = _Spots.of(found, fit)
     levels, dropped = [spots.level], None
     stopped: Stop = "tolerance met"
     for number in count(1):
@@ -86,12 +100,12 @@ def refine(
         if not any(found.faults) and levels[-1].distance <= refinement.tolerance:
             break
         kept = checkpoints.of_part(f"refined{number}")
-        finer = _chosen_knots(spots, config, refinement, kept)
+        finer = _chosen_knots(spots, config, refinement.max_control_points, kept)
         if tuple(len(row) - config.degree - 1 for row in finer) == levels[-1].control_points:
             stopped = "limit reached"
             break
-        other = _optimized_on(finer, spots.volume, fit, config, refinement, kept, report)
-        spots = _Spots.of(*other, config)
+        other = _optimized_on(finer, spots.volume, fit, config, weights, kept, report)
+        spots = _Spots.of(*other)
         if (other[0].faults, spots.level.distance) >= (found.faults, levels[-1].distance):
             stopped, dropped = "no better map", spots.level
             _log.warning("no better map with %s, %d spans unproved: the one before is kept", dropped, dropped.unproved)
@@ -115,12 +129,11 @@ class _Spots:
     squares: Array
     unproved: IntArray
     level: Level
-    arap_limit: float
 
     @classmethod
-    def of(cls, found: Optimized, fit: SurfaceFit, config: SplineConfig) -> "_Spots":
+    def of(cls, found: Optimized, fit: SurfaceFit) -> "_Spots":
         """Measure as the report will."""
-        volume = BSplineVolume((config.degree,) * 3, fit.places.knots, found.control.permute(1, 2, 3, 0).cpu().numpy())
+        volume = BSplineVolume((fit.places.degree,) * 3, fit.places.knots, np.moveaxis(found.control, 0, -1))
         gaps = two_sided(volume, fit.points, fit.places.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
         unproved = found.certificate.unproved
@@ -128,7 +141,7 @@ class _Spots:
         ways = (gaps.mesh_to_spline, gaps.spline_to_mesh)
         places = np.concatenate([way.parameters for way in ways])
         squares = np.concatenate([way.shares * way.distances**2 for way in ways])
-        return cls(volume, places, squares, unproved, level, config.arap_limit)
+        return cls(volume, places, squares, unproved, level)
 
     def amounts(self, distortion_share: float) -> list[Array]:
         """Return for each direction what is found on each of its spans.
@@ -141,7 +154,7 @@ class _Spots:
             return [np.bincount(self.unproved[:, d], minlength=n).astype(float) for d, n in enumerate(n_spans)]
         boundary = totals_along(self.places, self.squares / self.squares.sum(), knots)
         points, (density,), weights = arap_grid(self.volume, n_gauss=2)
-        limit = self.arap_limit * (1.0 + float(np.sum(weights * density)))
+        limit = ARAP_LIMIT * (1.0 + float(np.sum(weights * density)))
         excess = weights * np.maximum(density - limit, 0.0) ** 2
         grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
         stretched = totals_along(grid, distortion_share * excess.ravel() / max(float(excess.sum()), 1e-300), knots)
@@ -153,38 +166,39 @@ def totals_along(places: Array, amounts: Array, knots: Knots) -> list[Array]:
     return [np.histogram(places[:, axis], breakpoints(row), weights=amounts)[0] for axis, row in enumerate(knots)]
 
 
-def _chosen_knots(spots: _Spots, config: SplineConfig, refinement: RefinementConfig, checkpoints: Checkpoints) -> Knots:
-    """Return finer knots, those of the checkpoint where there is one, and keep them in a checkpoint."""
+def _chosen_knots(spots: _Spots, config: SplineConfig, most: int, checkpoints: Checkpoints) -> Knots:
+    """Return finer knots, those of the checkpoint where there is one, and keep them in a checkpoint.
+
+    most: control points a direction.
+    """
     if (saved := checkpoints.load(_CHECKPOINT)) is not None:
-        u, v, w = (saved[0][axis].numpy() for axis in "uvw")
+        u, v, w = (saved[0][axis] for axis in "uvw")
         return u, v, w
-    narrowest = refinement.narrowest / (config.control_points - config.degree)
-    amounts = spots.amounts(refinement.distortion)
-    finer = halved_where_most(spots.volume.knots, amounts, np.array(spots.volume.shape), refinement, narrowest)
-    checkpoints.save(_CHECKPOINT, {axis: torch.as_tensor(row) for axis, row in zip("uvw", finer, strict=True)}, {})
+    narrowest = _NARROWEST / (config.control_points - config.degree)
+    amounts = spots.amounts(DISTORTION)
+    finer = halved_where_most(spots.volume.knots, amounts, np.array(spots.volume.shape), most, narrowest)
+    checkpoints.save(_CHECKPOINT, dict(zip("uvw", finer, strict=True)), {})
     return finer
 
 
-def halved_where_most(
-    knots: Knots, amounts: list[Array], counts: IntArray, refinement: RefinementConfig, narrowest: float
-) -> Knots:
+def halved_where_most(knots: Knots, amounts: list[Array], counts: IntArray, most: int, narrowest: float) -> Knots:
     """Return the knots with those spans halved on which most is found, the largest amounts of all directions first.
 
-    amounts: of each span, a direction. counts (3,): control points a direction. No span is halved any more once
-    `share` of all amounts is on those that are, or the control points are `growth` times as many; none into halves
-    below `narrowest`.
+    amounts: of each span, a direction. counts (3,): control points a direction, `most` at most. No span is halved any
+    more once `SHARE` of all amounts is on those that are, or the control points are `GROWTH` times as many; none into
+    halves below `narrowest`.
     """
     counts, total = counts.copy(), np.prod(counts)
     halves = np.concatenate([np.diff(breakpoints(row)) / 2.0 for row in knots])
     ranked = np.concatenate([np.stack([np.full(len(a), d), np.arange(len(a))], axis=1) for d, a in enumerate(amounts)])
     values = np.concatenate(amounts)
     chosen: tuple[list[int], ...] = ([], [], [])
-    reached, wanted = 0.0, refinement.share * values.sum()
+    reached, wanted = 0.0, SHARE * values.sum()
     for place in np.argsort(-values, kind="stable"):
         axis, span = ranked[place]
-        if reached >= wanted or np.prod(counts + (np.arange(3) == axis)) > refinement.growth * total:
+        if reached >= wanted or np.prod(counts + (np.arange(3) == axis)) > GROWTH * total:
             break
-        if counts[axis] < refinement.max_control_points and halves[place] >= narrowest:
+        if counts[axis] < most and halves[place] >= narrowest:
             chosen[axis].append(span)
             counts[axis] += 1
         reached += values[place]
@@ -197,28 +211,25 @@ def _optimized_on(
     volume: BSplineVolume,
     fit: SurfaceFit,
     config: SplineConfig,
-    refinement: RefinementConfig,
+    weights: Weights,
     checkpoints: Checkpoints,
     report: dict[str, Any],
 ) -> tuple[Optimized, SurfaceFit]:
     """Insert the knots and go on with the rounds that follow those of a certified map."""
-    later = replace(
-        config,
-        vertex=refinement.vertex * config.vertex,
-        gain=refinement.gain,
-        rounds=config.firm_rounds + refinement.rounds,
-        polish=refinement.polish,
-    )
+    phases = (Unfold(), Separate(), Polish(rounds=POLISH))
+    schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, (LEAST_STEPS,) * (FIRM_ROUNDS + 2), gain=_GAIN)
     start, surface = volume.on_knots(finer), fit.on_knots(finer)
     form = DeterminantForm(start)
-    nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < config.min_coefficient)
-    found = optimize(
-        torch.as_tensor(np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0))),
+    nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < MIN_COEFFICIENT)
+    found, _ = optimize(
+        np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0)),
         finer,
         surface,
-        later,
+        config,
+        schedule,
+        replace(weights, surface=_CLOSER * weights.surface),
         checkpoints=checkpoints,
-        begun=config.firm_rounds,
+        begun=FIRM_ROUNDS,
         watched=form.numbers(nearly),
         **report,
     )

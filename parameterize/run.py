@@ -7,24 +7,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray
-from .attempts import Origin, Task, best_attempt
+from .attempts import attempts
 from .certificate.boundary import check_boundary
 from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
 from .display import Brief
-from .optimization.rounds import Optimized
+from .optimization.optimized import Optimized
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback, ignore, timed
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
 from .spline.volume import BSplineVolume
+from .starts.start import Origin, Task
+from .starts.tried import AttemptReport, best_of
 from .surface.surface import Surface
+from .training.backend import choose_device, choose_precision
+
+_LAST_SLIDES = 20  # of the boundary parameters before the boundary map is made, and again after `_LAST_SWEEPS`
+_LAST_SWEEPS = 600  # over the triangles that the last slides flipped, at most: nothing moves after them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,6 +57,8 @@ class Parameterization(Brief):
     config : Config
     origin : "network", "growth" or "extension"
         Where the map comes from: the trained network, a cube that grew, or an extended layout of the surface.
+    attempts : tuple of AttemptReport
+        The starts that were tried, in their order: what each has led to, with rounds and seconds by phase.
     refinement : Refinement or None
         With config.refinement, how many control points each direction got, and why no more.
 
@@ -74,6 +81,7 @@ class Parameterization(Brief):
     seed: int
     config: Config
     origin: Origin
+    attempts: tuple[AttemptReport, ...]
     refinement: Refinement | None = None
 
 
@@ -83,7 +91,7 @@ def parameterize(
     *,
     seed: int = 0,
     device: str = "auto",
-    dtype: torch.dtype = torch.float32,
+    dtype: str = "float32",
     corners: ArrayLike | None = None,
     progress: ProgressCallback | None = None,
     checkpoint_dir: str | Path | None = None,
@@ -102,8 +110,8 @@ def parameterize(
         change the result on a CPU.
     device : str
         Where the network trains: "auto", "cpu" or "cuda".
-    dtype : torch.dtype
-        Of the network.
+    dtype : str
+        Precision of the network: "float32" or "float64".
     corners : (8, 3) array or (8,) array of int, optional
         The cube's corners on the surface: points in the surface's units, which take their nearest vertices, or vertex
         numbers; in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1). Chosen by the method where they are not given.
@@ -124,7 +132,7 @@ def parameterize(
     TypeError
         For a surface, config, seed or progress of another type.
     ValueError
-        For a negative seed, bad corners or a device that is not there.
+        For a negative seed, bad corners, another precision or a device that is not there.
     CheckpointError
         For a checkpoint of another run.
     PathError
@@ -141,18 +149,21 @@ def parameterize(
     config, seed = _checked(surface, config, seed)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
-    place = choose_device(device)
+    place, dtype = choose_device(device), choose_precision(dtype)
     given = None if corners is None else corner_vertices(surface, corners)
     identity = _identity(surface, config, seed, place, dtype, given)
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     history, seconds = History(), dict[str, float]()
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
     task = Task(surface, config, seed, place, dtype, given, seconds, report)
-    attempt = best_attempt(task, checkpoints)
+    tried = attempts(task, checkpoints)
+    best = best_of(tried)
+    assert best is not None  # the last start that is tried makes a map of any shape
+    start, attempt = best
     found, fit, told = attempt.found, attempt.fit, None
     if config.refinement is not None:
         with timed(seconds, "refine"):
-            options = attempt.spline, config.refinement
+            options = config.spline, config.refinement, attempt.weights
             found, fit, told = refine(found, fit, *options, checkpoints=checkpoints, **report)
     with timed(seconds, "optimize"):
         volume, boundary = _in_users_units(found, fit, task)
@@ -167,10 +178,11 @@ def parameterize(
         quality=quality,
         history=history.arrays(),
         seconds=seconds,
-        device=place.type,
+        device=place,
         seed=seed,
         config=config,
-        origin=attempt.origin,
+        origin=start.origin,
+        attempts=tuple(one.report() for one in tried),
         refinement=told,
     )
 
@@ -183,24 +195,24 @@ def check_checkpoint(
     device: str,
     corners: ArrayLike | None,
     checkpoint_dir: Path,
-    dtype: torch.dtype = torch.float32,
+    dtype: str = "float32",
 ) -> None:
     """Raise CheckpointError where a run of these arguments of `parameterize` could not go on from that folder."""
     given = None if corners is None else corner_vertices(surface, corners)
-    identity = _identity(surface, config, seed, choose_device(device), dtype, given)
+    identity = _identity(surface, config, seed, choose_device(device), choose_precision(dtype), given)
     Checkpoints(checkpoint_dir, identity, resume=True).check()
 
 
 def _identity(
-    surface: Surface, config: Config, seed: int, device: torch.device, dtype: torch.dtype, corners: IntArray | None
+    surface: Surface, config: Config, seed: int, device: str, dtype: str, corners: IntArray | None
 ) -> dict[str, Any]:
     """Return what the checkpoints of a run are known by."""
     return {
         "surface": hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest(),
         "config": asdict(config),
         "seed": seed,
-        "device": device.type,
-        "dtype": str(dtype),
+        "device": device,
+        "dtype": dtype,
         "corners": None if corners is None else corners.tolist(),
     }
 
@@ -215,16 +227,6 @@ def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config
     if seed < 0:
         raise ValueError(f"seed must not be negative, got {seed}")
     return config or preset("fast"), int(seed)
-
-
-def choose_device(name: str) -> torch.device:
-    """Return the torch device for "auto", "cpu" or "cuda". Raises ValueError where it is not there."""
-    if name not in ("auto", "cpu", "cuda"):
-        raise ValueError(f"device {name!r}: choose auto, cpu or cuda")
-    available = torch.cuda.is_available()
-    if name == "cuda" and not available:
-        raise ValueError("device cuda: torch finds no CUDA device here; use --device cpu")
-    return torch.device("cuda" if available and name != "cpu" else "cpu")
 
 
 def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
@@ -252,8 +254,8 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
 def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSplineVolume, BoundaryMap]:
     """Return the volume and its boundary map; parameters are first brought close to this volume's closest points."""
     surface, spline = task.surface, task.config.spline
-    places = fit.places.at_closest_points(found.control, fit.points, spline.last_slides, spline.last_sweeps)
-    points = surface.from_unit(found.control.permute(1, 2, 3, 0).cpu().numpy())
+    places = fit.places.at_closest_points(found.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
+    points = surface.from_unit(np.moveaxis(found.control, 0, -1))
     volume = BSplineVolume((spline.degree,) * 3, places.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
     boundary = boundary_map(volume, own, places.triangles, places.parameters)

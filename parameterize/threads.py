@@ -6,8 +6,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any, TypeVar
 
+from threadpoolctl import ThreadpoolController
+
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
+_controller = functools.cache(ThreadpoolController)  # looks for the libraries at its first use, when they are loaded
 
 
 def default_threads() -> int:
@@ -17,6 +20,14 @@ def default_threads() -> int:
         if text.isdigit() and int(text) > 0:
             return int(text)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def one_blas_thread() -> Any:
+    """Context in which each matrix product stays in the thread that calls it: the threads are ours to share out.
+
+    A product that is split among threads also rounds differently with their number.
+    """
+    return _controller().limit(limits=1, user_api="blas")
 
 
 def in_parallel(task: Callable[[Piece], Result], pieces: Sequence[Piece], threads: int | None = None) -> list[Result]:

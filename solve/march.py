@@ -13,6 +13,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.display import Brief, above
 from parameterize.spline.volume import BSplineVolume
+from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data
 from .diagnostics import ConvergenceError
@@ -28,7 +29,7 @@ from .forms.mass import Mass
 from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
 from .options import IterationOptions, SolveOptions
 from .solver import prepared
-from .system import System, build, one_blas_thread
+from .system import System, build
 
 SCHEMES = ("bdf2", "trapezoidal")
 EULER = 1.0  # the factors of capacity / dt that a step adds to the matrix

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
+from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data
 from .diagnostics import ConvergenceError, judge
@@ -25,7 +26,6 @@ from .linear.preconditioner import fast_diagonalization
 from .options import SolveOptions
 from .solution import Solution, SolveReport
 from .solver import prepared
-from .system import one_blas_thread
 
 ENOUGH = 0.8  # share of the forces along a step that may be left at its end
 SHORTEST = 2.0**-12  # of a step

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
-from threadpoolctl import ThreadpoolController
 
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
+from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data, balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
@@ -34,12 +34,6 @@ from .solution import Solution, SolveReport
 LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
 
 log = logging.getLogger(__name__)
-_controller = functools.cache(ThreadpoolController)  # looks for the libraries at its first use, when they are loaded
-
-
-def one_blas_thread() -> Any:
-    """Context in which each matrix product stays in the thread that calls it: the threads are ours to share out."""
-    return _controller().limit(limits=1, user_api="blas")
 
 
 @dataclass(frozen=True, eq=False)

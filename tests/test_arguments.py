@@ -69,7 +69,7 @@ def most(count):
 
 
 def test_a_progress_that_cannot_be_called_is_refused_before_anything_begins(in_folder, monkeypatch):
-    monkeypatch.setattr("parameterize.run.best_attempt", lambda *_: pytest.fail("training must not start"))
+    monkeypatch.setattr("parameterize.run.attempts", lambda *_: pytest.fail("training must not start"))
     cube = iga_nn.sample("cube")
     raises(TypeError, "progress must be a function of a Progress, or None, got 3", lambda: train(cube))
     raises(InputError, "progress: must be a function or None, got 3", lambda: iga_nn.run("poisson", "cube", progress=3))

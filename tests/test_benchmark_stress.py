@@ -31,6 +31,18 @@ ROW = stress.Row(
     distance_max=0.02,
     spline_to_mesh_max=0.01,
     seconds=100.0,
+    origin="growth",
+    attempts="network, growth",
+    rounds_grow=11,
+    rounds_shape=0,
+    rounds_unfold=3,
+    rounds_separate=0,
+    rounds_polish=2,
+    seconds_grow=20.0,
+    seconds_shape=0.0,
+    seconds_unfold=30.0,
+    seconds_separate=0.0,
+    seconds_polish=10.0,
 )
 
 
@@ -88,6 +100,7 @@ def test_the_table_gives_shares_by_kind_and_lists_what_failed(tmp_path):
     rows = [folded, ROW, replace(ROW, number=1, arap_mean=3.0), overlapping, lost]
     text = stress.as_text(rows, options(tmp_path, numbers=(1, 2, 7, 8, 13, 14)))
     assert cells(text, "bent")[0][2:] == ["3", "2", "67 %", "2.50", "0.00200", "0.00050", "100", "100"]
+    assert cells(text, "bent")[1][1:] == ["growth 2", "2.0", "11.0 / 20.0", "", "3.0 / 30.0", "", "2.0 / 10.0"]
     assert cells(text, "spiky")[0][2:5] == ["2", "0", "0 %"]
     assert cells(text, "008-spiky")[0][1:6] == ["folded", "12", "2000", "4.00", "100"]
     assert cells(text, "002-spiky")[0][1] == "certified, meets itself"
@@ -116,6 +129,7 @@ def test_a_surface_end_to_end_and_not_twice(formula, capsys):
     assert row["number"] == "0" and row["kind"] == "bumpy" and row["verdict"] == "certified" and row["error"] == ""
     assert int(row["faces"]) == len(stress_shape(0).faces)
     assert float(row["seconds"]) == pytest.approx(2.1)
+    assert (row["origin"], row["attempts"], row["rounds_shape"], row["rounds_grow"]) == ("network", "network", "2", "0")
     assert Path("out/surfaces/000-bumpy.obj").is_file() and Path("out/000-bumpy/report.html").is_file()
     written = Path("out/000-bumpy/volume.npz").stat().st_mtime_ns
     assert stress.main(formula) == 0 and rows() == [row]

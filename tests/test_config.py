@@ -33,8 +33,7 @@ def test_scaled_changes_the_number_of_steps_alone():
     assert [s.steps for s in half.stages] == [round(0.5 * s.steps) for s in config.stages]
     assert half.spline.steps == round(0.5 * config.spline.steps)
     assert half.train == replace(config.train, easy_loss=None)  # every shape looks hard then
-    assert half.growth == replace(config.growth, steps=config.growth.steps // 2)
-    assert half.spline.penalties == config.spline.penalties
+    assert half.steps_factor == 0.5 and half.scaled(0.5).steps_factor == 0.25
     shortest = config.scaled(1e-9)
     assert {s.steps for s in shortest.stages} == {1} and shortest.spline.steps == 1
     assert config.scaled(1.0) == config

@@ -9,13 +9,13 @@ import trimesh
 from shapes import ball, turned
 from small_run import tiny_config
 
-from parameterize import parameterize
-from parameterize.config import ExtensionConfig, preset
+from parameterize import attempts, parameterize
+from parameterize.config import preset
 from parameterize.cube.layout import CubeLayout
-from parameterize.extension import extended, extending
+from parameterize.extension import extended
 from parameterize.surface.surface import surface_from_arrays
 
-CELL = ExtensionConfig(cell=0.07)
+CELL = 0.07
 
 
 def box(low, high):
@@ -35,13 +35,13 @@ def test_the_lattice_fills_the_solid_and_nothing_else():
     inside, _ = extended(CubeLayout(points, faces, 0.5 + 0.1 * points, len(points)), CELL)
     assert np.linalg.norm(inside, axis=1).max() < 1.0
     volume = abs(trimesh.Trimesh(points, faces, process=False).volume)
-    assert len(inside) * CELL.cell**3 == pytest.approx(volume, rel=0.02)
+    assert len(inside) * CELL**3 == pytest.approx(volume, rel=0.02)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_two_sheets_do_not_feel_each_other_through_a_gap_narrower_than_a_cell(axis):
     near, far = np.ones(3), np.ones(3)
-    near[axis], far[axis] = 0.5, 0.5 + 0.3 * CELL.cell
+    near[axis], far[axis] = 0.5, 0.5 + 0.3 * CELL
     start = np.zeros(3)
     start[axis] = far[axis]
     (lower, faces), (upper, more) = box(np.zeros(3), near), box(start, np.ones(3))
@@ -58,7 +58,7 @@ def test_where_two_parts_overlap_is_inside():
     (first, faces), (second, more) = box(np.zeros(3), [0.6, 1.0, 1.0]), box([0.4, 0.0, 0.0], np.ones(3))
     points = np.vstack([first, second])
     inside, _ = extended(CubeLayout(points, np.vstack([faces, more + len(first)]), np.full((16, 3), 0.5), 16), CELL)
-    assert len(inside) * CELL.cell**3 == pytest.approx(1.0, rel=0.1)
+    assert len(inside) * CELL**3 == pytest.approx(1.0, rel=0.1)
     for low in (0.1, 0.45, 0.65):  # in one, in both, in the other
         assert ((inside[:, 0] > low) & (inside[:, 0] < low + 0.15)).any()
 
@@ -69,7 +69,7 @@ def test_a_needle_askew_takes_the_memory_of_what_is_in_it():
     points = turned(points * [35.0, 0.35, 0.35], (0.0, -0.62, 0.79))
     assert np.ptp(points, axis=0).min() > 35.0
     tracemalloc.start()
-    inside, places = extended(CubeLayout(points, faces, points / 100.0, len(points)), replace(CELL, cell=0.1))
+    inside, places = extended(CubeLayout(points, faces, points / 100.0, len(points)), 0.1)
     taken = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     volume = abs(trimesh.Trimesh(points, faces, process=False).volume)
@@ -77,13 +77,6 @@ def test_a_needle_askew_takes_the_memory_of_what_is_in_it():
     within = ((inside >= 0.0) & (inside <= 100.0)).all(axis=1)  # places are cut off at the cube's faces
     assert places[within] == pytest.approx(inside[within] / 100.0, abs=1e-4)
     assert taken < 250e6  # a number for each point of the box would take 500, and there were several
-
-
-def test_its_spline_stage_penalises_folds_from_the_first_round():
-    spline = extending(preset("fast").spline, ExtensionConfig(penalty=7.0, rounds=3))
-    assert spline.penalties == (7.0,)
-    assert spline.rounds == 3
-    assert spline.growth is None
 
 
 def sheet_folded_once(count=900):
@@ -94,23 +87,22 @@ def sheet_folded_once(count=900):
     return surface_from_arrays(bent, faces, "sheet")
 
 
-def test_where_growth_fails_the_layout_is_extended(caplog, few_distances):
-    """The growths get no round that counts, so their maps have faults; that of the extension is the result."""
-    config, spoiled = tiny_config(), replace(preset("fast").growth, shares=(1.0,), steps=1, rounds=0)
+def test_a_sheet_folded_once_is_certified_by_extension(caplog, few_distances, monkeypatch):
+    monkeypatch.setattr(attempts, "STARTS", (attempts.NETWORK, attempts.EXTENSION))
+    monkeypatch.setattr("parameterize.starts.extension.CELL", CELL)
+    config = tiny_config()
     config = replace(
         config,
-        starts=4,
+        starts=2,
         train=replace(config.train, easy_loss=0.0),
         spline=replace(preset("fast").spline, control_points=8),
-        growth=spoiled,
-        stiff_growth=spoiled,
-        extension=replace(preset("fast").extension, cell=0.07),
+        steps_factor=1.0,
     )
     with caplog.at_level("INFO"):
         result = parameterize(sheet_folded_once(), config, device="cpu")
-    assert "growing a map from a cube instead" in caplog.text
     assert "extending the surface's layout into the solid instead" in caplog.text
     assert result.origin == "extension"
+    assert [attempt.start for attempt in result.attempts] == ["network", "extension"]
     assert result.certificate.verdict == "certified"
     assert result.quality.boundary_check.injective is True
     assert result.quality.boundary.unit_volume.rms < 0.02

@@ -10,11 +10,13 @@ from small_run import tiny_config
 from parameterize import parameterize
 from parameterize.config import preset
 from parameterize.cube.flips import flipped
-from parameterize.cube.sphere import lay_on_sphere
-from parameterize.growth import first_cube, growing, surface_on_cube
-from parameterize.optimization.rounds import Optimized
-from parameterize.progress import Progress
+from parameterize.optimization.optimized import Optimized
+from parameterize.optimization.term import Weights
+from parameterize.progress import History, Progress, ignore
 from parameterize.spline.bspline import open_uniform_knots
+from parameterize.starts.growth import GROWTH, LAST, SHARES, STEPS, STIFF, first_cube
+from parameterize.starts.on_cube import surface_on_cube
+from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
 
 pytestmark = pytest.mark.usefixtures("few_distances")
@@ -28,31 +30,32 @@ def bent_rod(count=900):
     return surface_from_arrays(bent, faces, "rod")
 
 
-def on_cube(surface, spline, seed=0):
-    sphere = lay_on_sphere(surface.unit_vertices, surface.faces)
-    return surface_on_cube(sphere, spline, seed=seed, turn=0)
+def on_cube(surface, config, seed=0):
+    report = {"history": History(), "progress": ignore}
+    task = Task(surface, config, seed, "cpu", "float32", None, {}, report)
+    return surface_on_cube(task, turn=0)
 
 
 def test_a_bent_rod_lies_on_the_cube_without_a_flip():
-    surface, spline = bent_rod(), preset("fast").with_control_points(12).spline
-    layout = on_cube(surface, spline)
+    surface, config = bent_rod(), preset("fast").with_control_points(12)
+    layout = on_cube(surface, config)
     assert not flipped(layout.places, layout.faces).any()
     assert is_closed(layout.faces)
     assert np.abs(layout.places - 0.5).max(axis=1) == pytest.approx(0.5)
     assert np.array_equal(layout.points[: len(surface.vertices)], surface.unit_vertices)
-    others = on_cube(surface, spline, seed=1)
+    others = on_cube(surface, config, seed=1)
     assert not np.allclose(others.places[:100], layout.places[:100])
 
 
 def test_the_first_map_is_a_cube_that_faces_the_surface():
-    surface, spline = bent_rod(), preset("fast").with_control_points(8).spline
-    layout = on_cube(surface, spline)
+    surface = bent_rod()
+    layout = on_cube(surface, preset("fast").with_control_points(8))
     knots = (open_uniform_knots(8, 3),) * 3
     control = first_cube(layout, knots, 3)
-    found = Optimized.of(control, knots, spline)
+    found = Optimized.of(control, knots, 3)
     assert found.certificate.verdict == "certified"
     assert found.certificate.lower_bound == pytest.approx(1.0)
-    flat = np.moveaxis(control.numpy(), 0, -1)
+    flat = np.moveaxis(control, 0, -1)
     axes = np.stack([flat[-1, 0, 0] - flat[0, 0, 0], flat[0, -1, 0] - flat[0, 0, 0], flat[0, 0, -1] - flat[0, 0, 0]])
     assert axes @ axes.T == pytest.approx(np.eye(3))
     towards = ((layout.places - 0.5) @ axes * (layout.points - 0.5)).sum()
@@ -60,13 +63,21 @@ def test_the_first_map_is_a_cube_that_faces_the_surface():
 
 
 def test_the_rounds_in_which_it_grows_come_first():
-    config = preset("fast")
-    spline = growing(config.spline, config.growth)
-    grown = len(config.growth.shares)
-    assert spline.rounds == grown + config.growth.rounds
-    assert spline.coarse_rounds == grown
-    assert spline.usual_steps[:grown] == (config.growth.steps,) * grown
-    assert list(config.growth.shares) == sorted(config.growth.shares) and config.growth.shares[-1] == 1.0
+    schedule = GROWTH.schedule(preset("fast"))
+    assert [phase.name for phase in schedule.phases] == ["grow", "unfold", "separate", "polish"]
+    assert schedule.rounds == schedule.grown + 20
+    assert schedule.usual_steps[: schedule.grown] == (STEPS,) * schedule.grown
+    assert list(SHARES) == sorted(SHARES) and SHARES[-1] == 1.0
+    shorter = GROWTH.schedule(preset("fast").scaled(0.5))
+    assert (schedule.phases[0].steps, shorter.phases[0].steps) == (12, 6)
+
+
+def test_a_stiff_growth_keeps_its_fairness_and_the_last_one_may_end_farther_away():
+    for growth in (STIFF, LAST):
+        assert growth.weights == Weights(pytest.approx(10.0 * Weights.fairness), least_floor=0.05)
+    assert GROWTH.weights == Weights()
+    _, unfold, separate, _ = LAST.schedule(preset("fast")).phases
+    assert unfold.far == unfold.far_first == separate.far == 0.05
 
 
 def hard(config):
@@ -78,7 +89,7 @@ def test_a_bent_rod_is_certified_without_a_trained_network():
     config = replace(
         config,
         spline=replace(preset("fast").spline, control_points=12, fit_cell=0.1),
-        growth=preset("fast").growth,
+        steps_factor=1.0,
     )
     result = parameterize(bent_rod(), config, device="cpu")
     assert result.certificate.verdict == "certified"
@@ -87,7 +98,8 @@ def test_a_bent_rod_is_certified_without_a_trained_network():
 
 
 @pytest.mark.parametrize(("rounds", "kept"), [(1, "spline-1-coarse"), (3, "spline-1")])
-def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path, rounds, kept):
+def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path, monkeypatch, rounds, kept):
+    monkeypatch.setattr("parameterize.starts.growth.SHARES", (0.1, 1.0))
     surface, config = bent_rod(300), hard(tiny_config())
     whole = parameterize(surface, config, seed=1, device="cpu")
 

@@ -1,18 +1,15 @@
 import numpy as np
 import pytest
-import torch
 from shapes import ball
 
-from parameterize.config import SplineConfig
 from parameterize.cube.cube import CORNERS, snap
 from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 KNOTS = (open_uniform_knots(6, 3),) * 3  # three spans a direction
-TANGENTIAL = 1e-3
 
 
 def anchors_on_a_ball(radius=0.5, given_corners=None):
@@ -25,12 +22,12 @@ def anchors_on_a_ball(radius=0.5, given_corners=None):
         vertex_weights(points, faces, len(points)),
         given_corners=given_corners,
     )
-    return EdgeAnchors(fit, SplineConfig(tangential=TANGENTIAL))
+    return EdgeAnchors(fit)
 
 
 def unit_cube():
     row = greville(KNOTS[0], 3)
-    return torch.as_tensor(np.stack(np.meshgrid(row, row, row, indexing="ij")))
+    return np.stack(np.meshgrid(row, row, row, indexing="ij"))
 
 
 def test_edge_points_are_the_corners_and_two_a_span():
@@ -82,5 +79,5 @@ def test_given_corners_are_held_beside_the_others_and_alone():
     np.testing.assert_array_equal(aimed, wanted)
     anchors.release()
     _, gradient = anchors.fit.energy_and_gradient(control)
-    downhill = -gradient[:, [0, -1]][:, :, [0, -1]][:, :, :, [0, -1]].reshape(3, 8).T.numpy()
+    downhill = -gradient[:, [0, -1]][:, :, [0, -1]][:, :, :, [0, -1]].reshape(3, 8).T
     np.testing.assert_allclose(downhill / np.abs(downhill).max(), (wanted - CORNERS) / 0.23, atol=1e-12)

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-import torch
 from shapes import ball, rounded_cube
 from wavy import DEGREE, KNOTS, as_volume, on_the_cube, wavy_control
 
@@ -51,13 +50,13 @@ def test_energy_is_quadratic_with_the_given_gradient_and_hessian():
     parameters, _ = on_the_cube(200)
     fit, _ = make_fit(parameters + 0.1, parameters)
     control = wavy_control()
-    direction = torch.randn(control.shape, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    direction = np.random.default_rng(0).normal(size=control.shape)
     energy, gradient = fit.energy_and_gradient(control)
     slope = float((gradient * direction).sum())
-    curvature = float((direction * fit.hessian(torch.float64)(direction)).sum())
-    for h in (0.5, -0.3):
+    curvature = float((direction * fit.curvature(control)(direction.astype(np.float32))).sum())
+    for h in (0.5, -0.3):  # the curvature is in single precision
         moved, _ = fit.energy_and_gradient(control + h * direction)
-        assert moved == pytest.approx(energy + h * slope + 0.5 * h**2 * curvature, rel=1e-10)
+        assert moved == pytest.approx(energy + h * slope + 0.5 * h**2 * curvature, rel=1e-6)
 
 
 def test_quadrics_measure_along_the_normal_of_a_sphere():

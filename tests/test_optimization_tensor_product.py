@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-import torch
 
 from parameterize.optimization.bending import bending_operator, grams
 from parameterize.optimization.operators import ControlRows, conjugate_gradients
@@ -14,11 +13,11 @@ SHAPE = (3, 6, 4, 5)
 
 
 def random_field(seed, shape=SHAPE):
-    return torch.randn(shape, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+    return np.random.default_rng(seed).normal(size=shape)
 
 
 def as_volume(control):
-    return BSplineVolume(DEGREES, KNOTS, control.permute(1, 2, 3, 0).numpy())
+    return BSplineVolume(DEGREES, KNOTS, np.moveaxis(control, 0, -1))
 
 
 def points_and_weights(n_gauss):
@@ -29,9 +28,9 @@ def points_and_weights(n_gauss):
 @pytest.mark.parametrize("axis", [1, 2, 3])
 def test_along_is_a_matrix_product_on_one_axis(axis):
     field = random_field(0)
-    matrix = torch.randn(7, SHAPE[axis], dtype=torch.float64)
-    expected = torch.movedim(torch.tensordot(matrix, field, dims=([1], [axis])), 0, axis)
-    assert torch.allclose(along(matrix, field, axis), expected, atol=1e-13)
+    matrix = np.random.default_rng(1).normal(size=(7, SHAPE[axis]))
+    expected = np.moveaxis(np.tensordot(matrix, field, axes=([1], [axis])), 0, axis)
+    assert np.allclose(along(matrix, field, axis), expected, atol=1e-13)
 
 
 def test_rows_and_their_transpose_are_those_of_the_matrix():
@@ -40,10 +39,10 @@ def test_rows_and_their_transpose_are_those_of_the_matrix():
     dense = np.zeros((9000, 6))  # more than one piece of work
     np.put_along_axis(dense, columns, values, axis=1)
     rows, control = ControlRows(columns, values), random_field(8, (3, 1, 2, 3))
-    assert rows(control).numpy() == pytest.approx(dense @ control.reshape(3, -1).T.numpy())
+    assert rows(control) == pytest.approx(dense @ control.reshape(3, -1).T)
     dual = random_field(9, (9000, 3))
-    assert rows.adjoint(dual, control).reshape(3, -1).numpy() == pytest.approx(dual.T.numpy() @ dense)
-    assert rows.to(torch.float32)(control.float()).dtype == torch.float32
+    assert rows.adjoint(dual, control).reshape(3, -1) == pytest.approx(dual.T @ dense)
+    assert rows.in_single()(control.astype(np.float32)).dtype == np.float32
     nothing = ControlRows(np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)))
     assert nothing(control).shape == (0, 3) and not nothing.adjoint(random_field(9, (0, 3)), control).any()
 
@@ -53,7 +52,7 @@ def test_jacobian_agrees_with_the_volume():
     control = random_field(1)
     points, products = points_and_weights(2)
     expected = as_volume(control).grid_jacobian(*points)  # (m_u, m_v, m_w, 3, 3)
-    found = np.concatenate([grid.jacobian(control, planes).numpy() for planes in grid.planes()], axis=2)
+    found = np.concatenate([grid.jacobian(control, planes) for planes in grid.planes()], axis=2)
     assert found == pytest.approx(expected.transpose(3, 4, 0, 2, 1).reshape(3, 3, -1))
     assert grid.weights == pytest.approx(products.transpose(0, 2, 1).reshape(len(products), -1))
     assert grid.weights.sum() == pytest.approx(1.0)
@@ -95,14 +94,14 @@ def test_bending_operator_is_symmetric_and_leaves_affine_maps_unbent():
     x, y = random_field(5), random_field(6)
     assert float((x * operator(y)).sum()) == pytest.approx(float((y * operator(x)).sum()), rel=1e-12)
     rows = [greville(k, p) for k, p in zip(KNOTS, DEGREES, strict=True)]
-    identity = torch.as_tensor(np.stack(np.meshgrid(*rows, indexing="ij")))
-    assert float(operator(identity).abs().max()) < 1e-10
+    identity = np.stack(np.meshgrid(*rows, indexing="ij"))
+    assert np.abs(operator(identity)).max() < 1e-10
 
 
 def test_gram_integrates_exactly():
     mass, slope, _ = (matrices[0] for matrices in grams(KNOTS, DEGREES))
     assert float(mass.sum()) == pytest.approx(1.0)  # partition of unity
-    x = torch.as_tensor(greville(KNOTS[0], 3))
+    x = greville(KNOTS[0], 3)
     assert float(x @ mass @ x) == pytest.approx(1.0 / 3.0)
     assert float(x @ slope @ x) == pytest.approx(1.0)
 
@@ -110,7 +109,7 @@ def test_gram_integrates_exactly():
 @pytest.mark.parametrize("shift", [0.0, 1.5])
 def test_fast_diagonalization_is_the_inverse(shift):
     mass, slope, curve = grams(KNOTS, DEGREES)
-    ends = [torch.zeros_like(m) for m in mass]
+    ends = [np.zeros_like(m) for m in mass]
     for e in ends:
         e[0, 0] = e[-1, -1] = 2.0
     rough = tuple(k + 0.1 * h + e for k, h, e in zip(slope, curve, ends, strict=True))
@@ -123,40 +122,40 @@ def test_fast_diagonalization_is_the_inverse(shift):
         for other in range(3):
             term = along(rough[other] if other == axis else mass[other], term, other + 1)
         image = image + term
-    assert torch.allclose(solve(image), x, atol=1e-9)
+    assert np.allclose(solve(image), x, atol=1e-9)
 
 
 def spd(n, seed):
-    root = torch.randn(n, n, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
-    return root @ root.T + torch.eye(n)
+    root = np.random.default_rng(seed).normal(size=(n, n))
+    return root @ root.T + np.eye(n)
 
 
 def test_conjugate_gradients_solve_in_at_most_n_steps():
-    matrix, x = spd(8, 0), torch.arange(8.0, dtype=torch.float64)
+    matrix, x = spd(8, 0), np.arange(8.0)
     found, count = conjugate_gradients(
-        lambda v: matrix @ v, matrix @ x, lambda r: r.clone(), tolerance=1e-10, max_iterations=20
+        lambda v: matrix @ v, matrix @ x, lambda r: r.copy(), tolerance=1e-10, max_iterations=20
     )
-    assert torch.allclose(found, x, atol=1e-8)
+    assert np.allclose(found, x, atol=1e-8)
     assert count <= 10
 
 
 def test_an_exact_preconditioner_needs_one_step():
-    matrix, x = spd(8, 1), torch.ones(8, dtype=torch.float64)
+    matrix, x = spd(8, 1), np.ones(8)
     found, count = conjugate_gradients(
-        lambda v: matrix @ v, matrix @ x, lambda r: torch.linalg.solve(matrix, r), tolerance=1e-10, max_iterations=20
+        lambda v: matrix @ v, matrix @ x, lambda r: np.linalg.solve(matrix, r), tolerance=1e-10, max_iterations=20
     )
-    assert count == 1 and torch.allclose(found, x)
+    assert count == 1 and np.allclose(found, x)
 
 
 def test_conjugate_gradients_stop_where_told():
     matrix = spd(30, 2)
-    right = torch.ones(30, dtype=torch.float64)
+    right = np.ones(30)
     _, count = conjugate_gradients(lambda v: matrix @ v, right, lambda r: r, tolerance=0.0, max_iterations=3)
     assert count == 3
     zero, count = conjugate_gradients(lambda v: matrix @ v, 0.0 * right, lambda r: r, tolerance=1e-3, max_iterations=3)
-    assert count == 0 and float(zero.abs().max()) == 0.0
+    assert count == 0 and not zero.any()
     loose, _ = conjugate_gradients(lambda v: matrix @ v, right, lambda r: r, tolerance=1e-2, max_iterations=99)
-    assert float((matrix @ loose - right).norm()) <= 1e-2 * float(right.norm())
+    assert np.linalg.norm(matrix @ loose - right) <= 1e-2 * np.linalg.norm(right)
 
 
 def test_one_point_on_inner_spans():

@@ -2,7 +2,6 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
-import torch
 from shapes import rounded_cube, turned
 
 from parameterize import refinement
@@ -10,9 +9,12 @@ from parameterize.checkpoint import Checkpoints
 from parameterize.config import RefinementConfig, SplineConfig
 from parameterize.cube.cube import project_radially
 from parameterize.cube.cutting import subdivide_finely
-from parameterize.optimization.rounds import Optimized, optimize
+from parameterize.optimization.optimized import Optimized
+from parameterize.optimization.phases import FIRM_ROUNDS, RAMP, Polish, Schedule, Separate, Shape, Unfold
+from parameterize.optimization.rounds import optimize
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
+from parameterize.optimization.term import Weights
 from parameterize.progress import History, ignore
 from parameterize.quality.two_sided import two_sided
 from parameterize.refinement import refine
@@ -20,7 +22,8 @@ from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
-CONFIG = SplineConfig(control_points=6, steps=12, penalties=(20.0, 100.0, 500.0, 2500.0), rounds=7, polish=1)
+CONFIG = SplineConfig(control_points=6, steps=12)
+SCHEDULE = Schedule((Shape(RAMP), Unfold(RAMP), Separate(RAMP), Polish(RAMP, rounds=1)), rounds=7, usual_steps=())
 KNOTS = (open_uniform_knots(6, 3),) * 3
 OWN = 300
 
@@ -30,29 +33,37 @@ def surface_fit():
     points, faces = subdivide_finely(*rounded_cube(OWN, power=4.0), CONFIG.longest_edge / 4.0, 9 * OWN)
     vertices = turned(points)
     places = SlidingParameters(KNOTS, 3, 0.5 + project_radially(points - 0.5), faces)
-    quadrics = vertex_quadrics(vertices, faces, CONFIG.tangential)
+    quadrics = vertex_quadrics(vertices, faces, TANGENTIAL)
     return SurfaceFit(places, vertices, quadrics, vertex_weights(vertices, faces, OWN))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_rounds():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(refinement, "ROUNDS", 4)
+        patch.setattr(refinement, "POLISH", 1)
+        yield
 
 
 @pytest.fixture(scope="module")
 def first():
     """A certified map, and its surface data."""
     fit, row = surface_fit(), greville(KNOTS[0], 3)
-    control = torch.as_tensor(np.stack(np.meshgrid(row, row, row, indexing="ij")))
-    found = optimize(control, KNOTS, fit, CONFIG, history=History())
+    control = np.stack(np.meshgrid(row, row, row, indexing="ij"))
+    found, _ = optimize(control, KNOTS, fit, CONFIG, SCHEDULE, history=History())
     assert not any(found.faults)
     return found, fit
 
 
 def refined(first, checkpoints=None, progress=ignore, **options):
-    limits = RefinementConfig(**{"rounds": 4, "polish": 1} | options)
+    limits = RefinementConfig(**options)
     kept = checkpoints or Checkpoints(None, {}, resume=False)
-    return refine(*first, CONFIG, limits, history=History(), progress=progress, checkpoints=kept)
+    return refine(*first, CONFIG, limits, Weights(), history=History(), progress=progress, checkpoints=kept)
 
 
 def distance(found, fit):
     """Between the surface and the boundary of F, both ways, over the diagonal."""
-    volume = BSplineVolume((3,) * 3, fit.places.knots, found.control.permute(1, 2, 3, 0).numpy())
+    volume = BSplineVolume((3,) * 3, fit.places.knots, np.moveaxis(found.control, 0, -1))
     return two_sided(volume, fit.points, fit.places.triangles).summary().rms / np.linalg.norm(
         np.ptp(fit.points, axis=0)
     )
@@ -93,9 +104,9 @@ def test_no_direction_gets_more_than_the_limit(first):
 
 def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypatch, caplog):
     def folded(control, knots, *args, **options):
-        pressed = control.clone()
+        pressed = control.copy()
         pressed[:, 0, 0, 0] += 0.5
-        return Optimized.of(pressed, knots, CONFIG)
+        return Optimized.of(pressed, knots, 3), None
 
     monkeypatch.setattr(refinement, "optimize", folded)
     found, fit, told = refined(first, tolerance=1e-9)
@@ -108,9 +119,9 @@ def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypa
 
 def test_spans_that_are_not_proved_are_halved_first(first, monkeypatch):
     """A fold is pressed into one corner: what lies there is halved, and nothing else."""
-    control, seen = first[0].control.clone(), []
+    control, seen = first[0].control.copy(), []
     control[:, 0, 0, 0] += 0.5
-    found = Optimized.of(control, KNOTS, CONFIG)
+    found = Optimized.of(control, KNOTS, 3)
     assert set(map(tuple, found.certificate.unproved)) == {(0, 0, 0)}
 
     def caught(control, knots, *args, **options):
@@ -129,20 +140,21 @@ def test_interrupted_and_resumed_is_undisturbed(first, once, tmp_path):
 
     def interrupt(state):
         steps.append(state.step)
-        if steps[-1] > CONFIG.steps * (CONFIG.firm_rounds + 1):  # in the second round
+        if steps[-1] > CONFIG.steps * (FIRM_ROUNDS + 1):  # in the second round
             raise KeyboardInterrupt
 
     (undisturbed, _, told), options, _ = once
     with pytest.raises(KeyboardInterrupt):
         refined(first, Checkpoints(tmp_path, {}, resume=False), interrupt, **options)
     resumed, _, again = refined(first, Checkpoints(tmp_path, {}, resume=True), **options)
-    assert torch.equal(resumed.control, undisturbed.control) and again == told
+    assert np.array_equal(resumed.control, undisturbed.control) and again == told
 
 
-def test_knots_once_chosen_are_those_of_the_checkpoint(first, once):
+def test_knots_once_chosen_are_those_of_the_checkpoint(first, once, monkeypatch):
     """Another machine may round otherwise, and choose other ones, which the optimised map would not fit."""
     (_, fit, told), options, folder = once
-    _, other, again = refined(first, Checkpoints(folder, {}, resume=True), **options | {"share": 0.1})
+    monkeypatch.setattr(refinement, "SHARE", 0.1)
+    _, other, again = refined(first, Checkpoints(folder, {}, resume=True), **options)
     assert again == told
     assert all(np.array_equal(a, b) for a, b in zip(fit.places.knots, other.places.knots, strict=True))
 

@@ -9,7 +9,6 @@ import torch
 from shapes import turned
 from small_run import STEPS, small_surface, tiny_config
 
-from parameterize import attempts
 from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig
@@ -17,10 +16,11 @@ from parameterize.cube import boundary_map, edge_paths
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.cube.cube import CORNERS
 from parameterize.cube.cutting import subdivide_finely
-from parameterize.run import choose_device, corner_vertices, parameterize
+from parameterize.optimization.phases import FIRM_ROUNDS
+from parameterize.run import corner_vertices, parameterize
+from parameterize.starts.start import MOST_POINTS
+from parameterize.training.backend import choose_device, choose_precision
 from parameterize.training.trainer import start_map
-
-NOT_FAR = replace(tiny_config().growth, far=1.0)  # a few steps lead nowhere near the surface
 
 pytestmark = pytest.mark.usefixtures("few_distances")
 
@@ -67,9 +67,9 @@ def test_cut_vertices_are_fitted_to_the_volume_and_leave_it_as_it_is(surface, un
 
 def test_where_the_edges_cannot_be_traced_training_and_layout_say_so(surface, monkeypatch, caplog):
     monkeypatch.setattr(edge_paths, "_ORDERS", 0)
+    monkeypatch.setattr("parameterize.starts.network._FEW_FLIPS", -1.0)
     config = tiny_config()
-    spline = replace(config.spline, few_flips=-1.0, rounds=1)
-    parameterize(surface, replace(config, spline=spline), seed=3, device="cpu")
+    parameterize(surface, replace(config, spline=replace(config.spline, rounds=1)), seed=3, device="cpu")
     assert "training ends before stage edges: no path left" in caplog.text
     assert "the first layout has flipped triangles: no path left" in caplog.text
 
@@ -127,7 +127,7 @@ def test_a_refinement_interrupted_and_resumed_is_undisturbed(surface, tmp_path):
     told = undisturbed.refinement
     assert told.levels[-1].control_points == undisturbed.volume.shape == undisturbed.quality.control_points
     assert "refine" in undisturbed.seconds and undisturbed.config == config
-    options, rounds = {"seed": 3, "device": "cpu", "checkpoint_dir": tmp_path}, config.spline.firm_rounds + 1
+    options, rounds = {"seed": 3, "device": "cpu", "checkpoint_dir": tmp_path}, FIRM_ROUNDS + 1
 
     def interrupt(state):
         if state.stage == "spline" and state.step > config.spline.steps * rounds:  # in the second after the knots
@@ -189,7 +189,7 @@ def test_checkpoint_of_another_run_is_refused(surface, tmp_path):
         resume(replace(small_surface(3.0), sha256=surface.sha256))  # as another body of the same file
     with pytest.raises(
         CheckpointError,
-        match=r"\(config\.growth\.steps, config\.last_growth\.steps, config\.spline\.steps, config\.stages, ",
+        match=r"\(config\.spline\.steps, config\.stages, config\.steps_factor differ",
     ):
         resume(options=config.scaled(2.0))
     with pytest.raises(CheckpointError, match=r"\(seed differ"):
@@ -198,12 +198,19 @@ def test_checkpoint_of_another_run_is_refused(surface, tmp_path):
         resume(seed=1, corners=np.arange(8))
 
 
-def hard_config(starts=2):
+def hard_config(starts=2, easy_loss=1e-9):
     """The same options, with which every shape counts as hard to train."""
     config = tiny_config()
-    return replace(config, starts=starts, train=replace(config.train, easy_loss=0.0))
+    return replace(config, starts=starts, train=replace(config.train, easy_loss=easy_loss))
 
 
+@pytest.fixture
+def few_shares(monkeypatch):
+    """Two rounds in which F grows."""
+    monkeypatch.setattr("parameterize.starts.growth.SHARES", (0.1, 1.0))
+
+
+@pytest.mark.usefixtures("few_shares")
 def test_a_shape_that_is_hard_to_train_is_grown_after_the_first_stage(surface, undisturbed, caplog):
     with caplog.at_level(logging.INFO, "parameterize"):
         result = parameterize(surface, hard_config(), seed=3, device="cpu")
@@ -214,8 +221,26 @@ def test_a_shape_that_is_hard_to_train_is_grown_after_the_first_stage(surface, u
     alone = parameterize(surface, hard_config(starts=1), seed=3, device="cpu")  # no other try: all stages are trained
     same_result(undisturbed, alone)
     assert (result.origin, alone.origin) == ("growth", "network")
+    first, second = result.attempts
+    assert (first.start, first.ending, first.rounds) == ("network", "hard for the network", {})
+    assert (second.start, second.origin, second.rounds["grow"]) == ("growth", "growth", 2)
+    assert second.unproved == len(result.certificate.unproved) and second.seconds.keys() == {"fit", *second.rounds}
 
 
+@pytest.mark.usefixtures("few_shares")
+def test_where_every_shape_counts_as_hard_nothing_is_trained(surface):
+    result = parameterize(surface, hard_config(easy_loss=0.0), seed=3, device="cpu")
+    assert set(result.history["stage"]) == {"spline"}
+    assert "train" not in result.seconds and result.origin == "growth"
+
+
+def test_a_hard_shape_with_given_corners_is_trained_to_the_end_which_the_log_says(surface, caplog):
+    result = parameterize(surface, hard_config(), seed=3, device="cpu", corners=2.0 * turned(CORNERS) + [10.0, 0, -3.0])
+    assert "hard for the network, and trained to the end: no other start may follow" in caplog.text
+    assert [attempt.start for attempt in result.attempts] == ["network"]
+
+
+@pytest.mark.usefixtures("few_shares")
 def test_a_shape_is_judged_without_its_distortion(surface, undisturbed):
     first = undisturbed.history["stage"] == "S(2)"
     columns = [undisturbed.history[name][first] for name in ("folded", "loss", "arap")]
@@ -226,6 +251,7 @@ def test_a_shape_is_judged_without_its_distortion(surface, undisturbed):
         assert ("S(1)" in parameterize(surface, config, seed=3, device="cpu").history["stage"]) == trained
 
 
+@pytest.mark.usefixtures("few_shares")
 def test_a_run_killed_after_the_look_at_a_hard_shape_resumes(surface, tmp_path):
     def interrupt(state):
         if state.stage == "spline":
@@ -249,7 +275,7 @@ def test_given_corners_are_honoured(surface):
         network=NetworkConfig(width=32, modules=2, frequencies=4),
         train=replace(config.train, learning_rate=3e-3),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, steps, strict=True)),
-        spline=replace(config.spline, penalties=(20.0,), rounds=1),
+        spline=replace(config.spline, rounds=1),
     )
     result = parameterize(surface, config, device="cpu", corners=rolled)
     assert np.linalg.norm(result.boundary.parameters[chosen] - CORNERS, axis=1).max() < 0.2
@@ -287,20 +313,26 @@ def test_long_edges_add_so_many_points_at_most(surface, most):
     assert 0 < len(vertices) - len(surface.vertices) <= most
     edges = np.linalg.norm(vertices[faces] - vertices[faces[:, [1, 2, 0]]], axis=2)
     spans = 27 * edges.max()  # the length of the longest one
-    assert spans > 1.0 and len(subdivide_finely(*mesh, own + spline.most_points)[0]) > 2000
+    assert spans > 1.0 and len(subdivide_finely(*mesh, own + MOST_POINTS)[0]) > 2000
     assert np.array_equal(vertices[: len(surface.vertices)], surface.unit_vertices)
 
 
 def test_devices():
     with pytest.raises(ValueError, match="'tpu'.*auto, cpu or cuda"):
         choose_device("tpu")
-    assert choose_device("cpu").type == "cpu"
+    assert choose_device("cpu") == "cpu"
     if torch.cuda.is_available():
-        assert choose_device("auto").type == choose_device("cuda").type == "cuda"
+        assert choose_device("auto") == choose_device("cuda") == "cuda"
     else:
-        assert choose_device("auto").type == "cpu"
+        assert choose_device("auto") == "cpu"
         with pytest.raises(ValueError, match="no CUDA device"):
             choose_device("cuda")
+
+
+def test_precisions():
+    assert choose_precision("float64") == choose_precision(torch.float64) == "float64"
+    with pytest.raises(ValueError, match="'float16'.*float32 or float64"):
+        choose_precision(torch.float16)
 
 
 def test_too_few_control_points_are_refused_at_once(surface):
@@ -327,117 +359,6 @@ def test_a_seed_of_any_size_is_taken(surface):
     for seed in (0, 2**62):
         with pytest.raises(KeyboardInterrupt):
             parameterize(surface, tiny_config(), seed=seed, device="cpu", progress=interrupt)
-
-
-def test_a_map_not_certified_is_grown_from_a_cube_then_extended(surface, monkeypatch, tmp_path):
-    """Of three attempts the one with fewest unproved spans is kept; the second is grown, the third extended."""
-    optimize, seen = attempts.optimize_coarse_first, []
-
-    def spoiled(control, fit, config, **options):
-        found, fit = optimize(control, fit, config, **options)
-        unproved = np.zeros(((5, 2, 3)[len(seen) % 3], 3), dtype=np.int64)
-        found = replace(found, certificate=replace(found.certificate, verdict="undecided", unproved=unproved))
-        seen.append((found, config.growth, control))
-        return found, fit
-
-    monkeypatch.setattr(attempts, "optimize_coarse_first", spoiled)
-    config = replace(tiny_config(), starts=3, growth=NOT_FAR)
-    result = parameterize(surface, config, seed=3, device="cpu", checkpoint_dir=tmp_path)
-    assert [growth for _, growth, _ in seen] == [None, config.growth, None]
-    assert seen[2][2].shape == seen[0][2].shape  # on as many control points as the trained one
-    assert not torch.equal(seen[0][2], seen[2][2])
-    assert result.origin == "growth"
-    kept = np.moveaxis(seen[1][0].control.numpy(), 0, -1)
-    assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
-    assert (result.history["stage"] == "cube").sum() == STEPS[2]  # trained once
-    names = sorted(path.name for path in tmp_path.glob("*.safetensors"))
-    splines = [f"spline{start}{rounds}" for start in ("-1", "-2", "") for rounds in ("-coarse", "")]
-    assert names == sorted(f"{name}.safetensors" for name in [*splines, "training"])
-    parameterize(surface, tiny_config(), seed=3, device="cpu")
-    assert len(seen) == 4
-
-
-@pytest.mark.parametrize("meets", [[True, False], [False], [True, True]])
-def test_a_certified_map_whose_boundary_meets_itself_is_tried_anew(surface, monkeypatch, meets):
-    """The first start of several that does not meet itself is kept; where all do, the first."""
-    optimize, seen = attempts.optimize_coarse_first, []
-
-    def certified(control, *args, **options):
-        found, fit = optimize(control, *args, **options)
-        none = np.zeros((0, 3), dtype=np.int64)
-        proved = replace(found.certificate, verdict="certified", unproved=none)
-        seen.append(replace(found, certificate=proved, injective=not next(answers)))
-        return seen[-1], fit
-
-    answers = iter(meets)
-    monkeypatch.setattr(attempts, "optimize_coarse_first", certified)
-    result = parameterize(surface, replace(tiny_config(), starts=2), seed=3, device="cpu")
-    assert len(seen) == len(meets)
-    kept = np.moveaxis(seen[meets.index(False) if False in meets else 0].control.numpy(), 0, -1)
-    assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
-
-
-@pytest.mark.parametrize(("meets", "far"), [(True, False), (False, False), (False, True)])
-def test_after_a_growth_that_meets_itself_or_ends_far_away_the_stiffer_one_comes_first(
-    surface, monkeypatch, meets, far
-):
-    optimize, seen = attempts.optimize_coarse_first, []
-
-    def spoiled(control, fit, config, **options):
-        found, fit = optimize(control, fit, config, **options)
-        seen.append((config.growth, config.fairness, config.least_floor))
-        unproved = np.zeros((0 if meets else 1, 3), dtype=np.int64)
-        verdict = "certified" if meets else "undecided"
-        proved = replace(found.certificate, verdict=verdict, unproved=unproved)
-        return replace(found, certificate=proved, injective=not meets), fit
-
-    monkeypatch.setattr(attempts, "optimize_coarse_first", spoiled)
-    config = replace(tiny_config(), starts=5, growth=replace(NOT_FAR, far=1e-9) if far else NOT_FAR)
-    parameterize(surface, config, seed=3, device="cpu")
-    usual, growth = (config.spline.fairness, 1.0), config.growth
-    stiff = (config.stiff_growth, pytest.approx(10.0 * usual[0]), 0.05)
-    later = [stiff, (None, *usual)] if meets or far else [(None, *usual), stiff]
-    assert seen == [(None, *usual), (growth, *usual), *later, (config.last_growth, *stiff[1:])]
-
-
-def test_after_a_certified_growth_far_from_the_surface_a_stiffer_one_is_tried_and_the_nearer_kept(
-    surface, monkeypatch, caplog
-):
-    optimize, seen = attempts.optimize_coarse_first, []
-
-    def proved(control, *args, **options):
-        found, fit = optimize(control, *args, **options)
-        none = np.zeros((0, 3), dtype=np.int64)
-        certificate = replace(found.certificate, verdict="certified", unproved=none)
-        seen.append((fit.mean_square(found.control), found.control))
-        return replace(found, certificate=certificate, injective=True), fit
-
-    monkeypatch.setattr(attempts, "optimize_coarse_first", proved)
-    config = hard_config(starts=5)
-    for growth, tries in ((NOT_FAR, 1), (replace(NOT_FAR, far=1e-9), 2)):
-        seen.clear()
-        caplog.clear()
-        result = parameterize(surface, replace(config, growth=growth), seed=3, device="cpu")
-        assert len(seen) == tries
-        kept = np.moveaxis(min(seen, key=lambda one: one[0])[1].numpy(), 0, -1)
-        assert np.array_equal(result.volume.control_points, surface.from_unit(kept))
-        assert ("far from the surface; growing a stiffer map instead" in caplog.text) == (tries == 2)
-
-
-def test_a_map_grown_stiff_is_refined_stiff(surface, monkeypatch):
-    told = []
-
-    def refine(found, fit, spline, *args, **options):
-        told.append((spline.fairness, spline.least_floor, spline.growth))
-        return found, fit, None
-
-    monkeypatch.setattr("parameterize.run.refine", refine)
-    config = replace(tiny_config(), starts=2).refined(1e-3, 20)
-    config = replace(config, train=replace(config.train, easy_loss=0.0))
-    for growth in (config.growth, config.stiff_growth):
-        parameterize(surface, replace(config, growth=growth), seed=3, device="cpu")
-    usual = config.spline.fairness
-    assert told == [(usual, 1.0, None), (pytest.approx(10.0 * usual), 0.05, None)]
 
 
 def test_the_start_map_makes_a_cloud_round():

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize.optimization.polar import determinant
 from parameterize.training import losses
+from parameterize.training.matrices import determinant
 from parameterize.training.samples import OFFSETS
 
 CELL = 0.1

@@ -20,7 +20,7 @@ from iga_nn.workflow.cost_estimate import Forecast, available_memory_mb, forecas
 from parameterize.config import preset
 from parameterize.progress import Progress
 
-CPU = torch.device("cpu")
+CPU = "cpu"
 PACKAGES = str(Path(iga_nn.__file__).resolve().parents[1])
 QUICK = ["--steps-factor", "0.05", "--control-points", "8"]
 
@@ -62,9 +62,9 @@ def test_measuring_leaves_one_thread_an_operation_to_the_threads_that_help():
 import threading, torch, iga_nn
 from iga_nn.workflow.cost_estimate import forecast
 from parameterize.config import preset
-from parameterize.optimization.rounds import one_thread_an_operation
+from parameterize.training.backend import one_thread_an_operation
 from parameterize.threads import in_parallel
-forecast(iga_nn.sample("cube"), preset("fast").with_control_points(8), device=torch.device("cpu"))
+forecast(iga_nn.sample("cube"), preset("fast").with_control_points(8), device="cpu")
 barrier = threading.Barrier(2, timeout=10.0)
 with one_thread_an_operation():
     print(in_parallel(lambda _: barrier.wait() * 0 + torch.get_num_threads(), range(2), 2))
@@ -85,7 +85,7 @@ from iga_nn.workflow.cost_estimate import forecast
 from iga_nn.cli.commands import main
 from parameterize.config import preset
 config = preset("fast").scaled(0.05).with_control_points(8)
-said = forecast(iga_nn.sample("bean"), config, device=torch.device("cpu"), clock=time.process_time)
+said = forecast(iga_nn.sample("bean"), config, device="cpu", clock=time.process_time)
 assert main(["parameterize", "bean", "--device", "cpu", "--quiet", *{QUICK!r}, "--out", "out"]) in (0, 3)
 usage = resource.getrusage(resource.RUSAGE_SELF)
 print(json.dumps([*said.seconds, said.memory_mb, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1000.0]))

@@ -102,6 +102,18 @@ class Row:
     seconds_optimize: float | None = None
     seconds_refine: float | None = None
     seconds_certify: float | None = None
+    origin: str | None = None  # where the map comes from
+    attempts: str | None = None  # the starts that were tried; the rounds and seconds are of all of them
+    rounds_grow: int | None = None
+    rounds_shape: int | None = None
+    rounds_unfold: int | None = None
+    rounds_separate: int | None = None
+    rounds_polish: int | None = None
+    seconds_grow: float | None = None
+    seconds_shape: float | None = None
+    seconds_unfold: float | None = None
+    seconds_separate: float | None = None
+    seconds_polish: float | None = None
     threads: int | None = None
     exact: str | None = None
     l2_relative_refine_0: float | None = None
@@ -281,7 +293,7 @@ def row_of(known: Known) -> Row:
         found[f"iterations_refine_{level}"] = solved["iterations"]
         if not solved["converged"]:
             found["status"] = f"the solver did not converge at refine {level}"
-    return Row(known.entry.name, **found, **processes.times_of(known))
+    return Row(known.entry.name, **found, **processes.times_of(known), **processes.attempts_of(report))
 
 
 # Tables
@@ -317,6 +329,8 @@ def as_markdown(rows: Sequence[Row], options: Options) -> str:
         processes.as_markdown(DISTANCE_HEAD, [_cells(row, DISTANCE_COLUMNS) for row in measured]),
         "Control points, and wall seconds of the parameterization, which differ between machines and hours",
         processes.as_markdown(TIME_HEAD, [_cells(row, TIME_COLUMNS) for row in measured]),
+        "Where the map comes from, the starts that were tried, and of all these the rounds / seconds by phase",
+        processes.as_markdown(PHASE_HEAD, [_phase_cells(row) for row in measured]),
         "Poisson's equation; X, Y, Z are x, y, z scaled to volume 1 about the middle of the bounding box",
         processes.as_markdown(SOLVE_HEAD, [_cells(row, SOLVE_COLUMNS) for row in measured]),
         *_caveats(rows, options),
@@ -334,6 +348,7 @@ DISTANCE_HEAD = (
     "model", "both ways / diagonal, rms", "max", "spline to mesh rms", "max", "mesh to spline rms", "max", "flipped",
 )  # fmt: skip
 TIME_HEAD = ("model", "control points", "seconds", *processes.STAGES)
+PHASE_HEAD = ("model", "origin", "attempts", *processes.PHASES)
 SOLVE_HEAD = (
     "model", "exact solution", "relative L2, refine 0", "refine 1", "L2, refine 0", "refine 1", "iterations, refine 0",
     "refine 1",
@@ -365,6 +380,14 @@ SOLVE_COLUMNS: dict[str, Format] = {
 def _cells(row: Row, columns: dict[str, Format]) -> list[str]:
     values = ((getattr(row, name), form) for name, form in columns.items())
     return [row.model, *("" if value is None else form(value) for value, form in values)]
+
+
+def _phase_cells(row: Row) -> list[str]:
+    """One row of the table by phase."""
+    if row.origin is None or row.attempts is None:
+        return [row.model, *[""] * (len(PHASE_HEAD) - 1)]
+    found = [(getattr(row, f"rounds_{phase}"), getattr(row, f"seconds_{phase}")) for phase in processes.PHASES]
+    return [row.model, row.origin, row.attempts, *(f"{n} / {s:.1f}" if n else "" for n, s in found)]
 
 
 def _quality_cells(row: Row) -> list[str]:

@@ -23,6 +23,7 @@ from parameterize.threads import default_threads
 BAD_INPUT, INTERRUPTED = 2, 130
 THREADS = "threads.txt"  # in the folder of a surface whose seconds were measured
 STAGES = ("train", "fit", "optimize", "refine", "certify")
+PHASES = ("grow", "shape", "unfold", "separate", "polish")  # of a spline stage
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -57,6 +58,18 @@ def times_of(row: Row) -> dict[str, Any]:
         return {}
     seconds = {f"seconds_{stage}": row.report["seconds"].get(stage, 0.0) for stage in STAGES}
     return seconds | {"seconds": sum(seconds.values()), "threads": int(file.read_text(encoding="utf-8"))}
+
+
+def attempts_of(report: dict[str, Any]) -> dict[str, Any]:
+    """Where the map comes from, the starts that were tried, and their rounds and seconds by phase, added up."""
+    quality = report["parameterization"]
+    if (tried := quality.get("attempts")) is None:  # the report of an earlier version
+        return {}
+    found = {"origin": quality["origin"], "attempts": ", ".join(one["start"] for one in tried)}
+    for phase in PHASES:
+        for name in ("rounds", "seconds"):
+            found[f"{name}_{phase}"] = sum(one[name].get(phase, 0) for one in tried)
+    return found
 
 
 def run(

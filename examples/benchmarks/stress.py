@@ -11,10 +11,11 @@ its folder shows where it is not certified.
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from statistics import median
+from statistics import fmean, median
 
 import processes
 from hard_shapes import KINDS, compute_shape, kind_of
@@ -62,6 +63,18 @@ class Row:
     distance_max: float | None = None
     spline_to_mesh_max: float | None = None
     seconds: float | None = None
+    origin: str | None = None  # where the map comes from
+    attempts: str | None = None  # the starts that were tried; the rounds and seconds are of all of them
+    rounds_grow: int | None = None
+    rounds_shape: int | None = None
+    rounds_unfold: int | None = None
+    rounds_separate: int | None = None
+    rounds_polish: int | None = None
+    seconds_grow: float | None = None
+    seconds_shape: float | None = None
+    seconds_unfold: float | None = None
+    seconds_separate: float | None = None
+    seconds_polish: float | None = None
     error: str | None = None
 
     @property
@@ -184,6 +197,7 @@ def row_of(known: Known, options: Options) -> Row:
         distance_max=distance.get("max"),
         spline_to_mesh_max=quality["surface_distance"]["spline_to_mesh"]["unit_volume"]["max"],
         seconds=times.get("seconds"),
+        **processes.attempts_of(known.report),
     )
 
 
@@ -202,6 +216,7 @@ KIND_HEAD = (
     "kind", "what it is", "surfaces", "certified", "share", "ARAP mean", "at vertices", "both ways / diagonal",
     "seconds", "longest",
 )  # fmt: skip
+PHASE_HEAD = ("kind", "origins", "attempts", *processes.PHASES)
 FAILED_HEAD = ("surface", "verdict", "spans not proved", "faces", "ARAP mean", "seconds", "what it is")
 
 
@@ -214,6 +229,8 @@ def as_text(rows: Sequence[Row], options: Options) -> str:
         "distance at the mesh's vertices at volume 1, that of all of surface and spline both ways over the box's "
         "diagonal; medians over the surfaces of a kind.",
         processes.as_markdown(KIND_HEAD, [_kind_cells(kind, rows) for kind in KINDS if _of(kind, rows)]),
+        "Where the maps come from, and of a surface in the mean: attempts, and their rounds / seconds by phase.",
+        processes.as_markdown(PHASE_HEAD, [_phase_cells(kind, rows) for kind in KINDS if _of(kind, rows)]),
         summary(rows),
     ]
     if failed:
@@ -262,6 +279,24 @@ def _kind_cells(kind: str, rows: Sequence[Row]) -> list[str]:
         _median([row.distance_rms for row in own if row.distance_rms is not None], "{:.5f}"),
         _median(seconds, "{:.0f}"),
         f"{max(seconds):.0f}" if seconds else "",
+    ]
+
+
+def _phase_cells(kind: str, rows: Sequence[Row]) -> list[str]:
+    """One row of the table by phase; surfaces without a map do not count."""
+    own = [row for row in _of(kind, rows) if row.origin is not None]
+    if not own:
+        return [kind, *[""] * (len(PHASE_HEAD) - 1)]
+    origins = Counter(row.origin for row in own)
+    found = [
+        tuple(fmean(getattr(row, f"{name}_{phase}") for row in own) for name in ("rounds", "seconds"))
+        for phase in processes.PHASES
+    ]
+    return [
+        kind,
+        ", ".join(f"{name} {count}" for name, count in origins.most_common()),
+        f"{fmean(len((row.attempts or '').split(', ')) for row in own):.1f}",
+        *(f"{rounds:.1f} / {seconds:.1f}" if rounds else "" for rounds, seconds in found),
     ]
 
 

@@ -14,11 +14,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from parameterize.config import Config, RefinementConfig, SplineConfig
+from parameterize.config import Config, SplineConfig
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
 from solve.discretization.errors import POINTS
@@ -28,9 +27,6 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.options import SolveOptions
 
 from ..rounding import rounded
-
-if TYPE_CHECKING:
-    import torch
 
 log = logging.getLogger(__name__)
 
@@ -89,7 +85,7 @@ def forecast(
     surface: Surface,
     config: Config,
     *,
-    device: torch.device,
+    device: str,
     unknowns: int = 0,
     clock: Clock = time.perf_counter,
 ) -> Forecast:
@@ -98,10 +94,11 @@ def forecast(
     unknowns: of the largest problem that is solved afterwards. A second start, where the first is not certified, takes
     as long again.
     """
-    from parameterize.optimization.rounds import one_thread_an_operation
+    from parameterize.training.backend import one_thread_an_operation
+    from parameterize.training.effort import points_of_a_step
 
     spline, vertices = config.spline, len(surface.vertices)
-    points = _training_points(surface, config)
+    points = points_of_a_step(surface.unit_vertices, surface.faces, config.train)
     with one_thread_an_operation():  # as the run does: a helping thread keeps what it begins with
         one_pass = _pass_seconds(config, device, clock)
         product = _product_seconds(spline, clock) + CALLS * one_pass
@@ -117,7 +114,7 @@ def forecast(
     if config.refinement is not None:  # it may end with the first spline, or go on to its limit
         most = config.refinement.max_control_points
         rounds, steps = HARD_AFTER
-        growths = _growths(config.refinement, spline.control_points)
+        growths = _growths(config.refinement.max_control_points, spline.control_points)
         high += sum(growths) * rounds * (min(steps, spline.steps) * step + CERTIFICATE * product)
     activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
     mapped = PER_CONTROL_POINT * most**3 + PER_VERTEX * vertices
@@ -126,61 +123,40 @@ def forecast(
 
 
 def _training_steps(config: Config) -> tuple[float, float]:
-    """Return the steps for an easy surface, and those that show one to be hard: the first stage's."""
+    """Return the steps for an easy surface, and those that show one to be hard: the first stage's, or none."""
     steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
     steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.name == "cube"), 0))
-    look = steps if limit is None or config.starts == 1 else config.stages[0].steps
-    return look if limit == 0.0 else steps, look
+    if limit is None or config.starts == 1:
+        return steps, steps
+    return (0, 0) if limit == 0.0 else (steps, config.stages[0].steps)
 
 
-def _growths(refinement: RefinementConfig, control_points: int) -> list[float]:
-    """Return the factors by which the control points are more after each refinement, up to the limit."""
-    whole = (refinement.max_control_points / control_points) ** 3
-    count = math.ceil(math.log(whole) / math.log(refinement.growth))
-    return [min(refinement.growth**number, whole) for number in range(1, count + 1)]
+def _growths(most: int, control_points: int) -> list[float]:
+    """Return the factors by which the control points are more after each refinement, up to `most` a direction."""
+    from parameterize.refinement import GROWTH
+
+    whole = (most / control_points) ** 3
+    count = math.ceil(math.log(whole) / math.log(GROWTH))
+    return [min(GROWTH**number, whole) for number in range(1, count + 1)]
 
 
-def _training_points(surface: Surface, config: Config) -> int:
-    """Return the number of points that the network maps in a step."""
-    import torch
+def _pass_seconds(config: Config, device: str, clock: Clock) -> float:
+    from parameterize.training.effort import a_pass
 
-    from parameterize.training.samples import stencils
-
-    vertices, faces, cell = surface.unit_vertices, surface.faces, config.train.cell
-    nodes = stencils(vertices, faces, cell, device=torch.device("cpu"), dtype=torch.float32).nodes
-    return len(nodes) + min(len(vertices), 3 * config.train.triangles)
-
-
-def _pass_seconds(config: Config, device: torch.device, clock: Clock) -> float:
-    import torch
-
-    from parameterize.training.network import InverseMap, map_in_pieces
-
-    with torch.random.fork_rng(devices=[]):
-        network = InverseMap(config.network).to(device)
-    points = torch.full((PASS_POINTS, 3), 0.5, device=device)
-
-    def run() -> None:
-        loss = map_in_pieces(network, points).square().sum()
-        loss.backward()  # type: ignore[no-untyped-call]
-        float(loss.detach())  # waits for the device
-
-    return _fastest(run, clock) * 1000.0 / PASS_POINTS
+    return _fastest(a_pass(config.network, device, PASS_POINTS), clock) * 1000.0 / PASS_POINTS
 
 
 def _product_seconds(spline: SplineConfig, clock: Clock) -> float:
-    import torch
-
-    from parameterize.optimization.distortion import DistortionEnergy
+    from parameterize.optimization.distortion import Distortion
     from parameterize.spline.bspline import greville, open_uniform_knots
 
     count = min(spline.control_points, LARGEST)
     knots = open_uniform_knots(count, spline.degree)
     rows = greville(knots, spline.degree)
-    control = torch.as_tensor(np.stack(np.meshgrid(rows, rows, rows, indexing="ij")))
-    product = DistortionEnergy((knots, knots, knots), spline).curvature(control, 1.0)
-    rough = control.float()
-    seconds = _fastest(lambda: float(product(rough).sum()), clock)
+    control = np.stack(np.meshgrid(rows, rows, rows, indexing="ij"))
+    product = Distortion((knots, knots, knots), spline.degree).curvature(control)
+    single = control.astype(np.float32)
+    seconds = _fastest(lambda: float(product(single).sum()), clock)
     return seconds * (spline.control_points / count) ** 3
 
 

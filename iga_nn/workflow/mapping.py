@@ -90,7 +90,8 @@ def _prepare(
     The folder is cleared once all of them are accepted; where a run is resumed, only when its map is there: the
     checkpoint may be refused.
     """
-    from parameterize.run import choose_device, corner_vertices
+    from parameterize.run import corner_vertices
+    from parameterize.training.backend import choose_device
 
     with input_errors():
         config, device = mapping.config(), choose_device(mapping.device)
@@ -237,7 +238,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
         device=result.device,
         versions=reports.versions(),
         parameterization=result.quality.as_dict()
-        | {"origin": result.origin}
+        | {"origin": result.origin, "attempts": [asdict(attempt) for attempt in result.attempts]}
         | ({"refinement": asdict(result.refinement)} if result.refinement else {})
         | advice.unproved(result.volume, result.certificate),
     )

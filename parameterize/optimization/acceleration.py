@@ -3,8 +3,9 @@
 Anderson, J. ACM 12 (1965); Walker, Ni, SIAM J. Numer. Anal. 49 (2011), in the form without constraints.
 """
 
-import torch
-from torch import Tensor
+import numpy as np
+
+from ..arrays import Array
 
 _DAMPING = 1e-8  # of the least squares, against steps that are nearly alike
 
@@ -14,10 +15,10 @@ class Acceleration:
 
     def __init__(self, memory: int) -> None:
         self._memory = memory
-        self._starts: list[Tensor] = []
-        self._ends: list[Tensor] = []
+        self._starts: list[Array] = []
+        self._ends: list[Array] = []
 
-    def add(self, start: Tensor, end: Tensor) -> None:
+    def add(self, start: Array, end: Array) -> None:
         """Take the step from x to g(x)."""
         self._starts = [*self._starts[-self._memory :], start]
         self._ends = [*self._ends[-self._memory :], end]
@@ -27,14 +28,15 @@ class Acceleration:
         self._starts = self._starts[len(self._starts) - keep :]
         self._ends = self._ends[len(self._ends) - keep :]
 
-    def guess(self) -> Tensor | None:
+    def guess(self) -> Array | None:
         """Return the combination of the ends, factors of sum 1, whose steps cancel best; None with less than two."""
         if len(self._ends) < 2:
             return None
-        starts, ends = (torch.stack([x.flatten() for x in kept]) for kept in (self._starts, self._ends))
+        starts, ends = (np.stack([x.ravel() for x in kept]) for kept in (self._starts, self._ends))
         steps = ends - starts
-        changes = steps.diff(dim=0)
+        changes = np.diff(steps, axis=0)
         gram = changes @ changes.T
-        gram += _DAMPING * gram.trace() * torch.eye(len(gram), dtype=gram.dtype)
-        factors = torch.linalg.solve(gram, changes @ steps[-1])
-        return (ends[-1] - factors @ ends.diff(dim=0)).reshape(self._ends[-1].shape)
+        gram += _DAMPING * np.trace(gram) * np.eye(len(gram))
+        factors = np.linalg.solve(gram, changes @ steps[-1])
+        guess: Array = (ends[-1] - factors @ np.diff(ends, axis=0)).reshape(self._ends[-1].shape)
+        return guess

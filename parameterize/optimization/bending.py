@@ -1,4 +1,4 @@
-"""Fairness: the matrices of 1-D integrals, and the operator of the integral of the squared Hessians of F.
+"""Fairness: the matrices of 1-D integrals, the operator of the integral of F's squared Hessians, and that as a term.
 
 See operators.py for how control points are held, and how pieces of work are added.
 """
@@ -8,46 +8,75 @@ from functools import partial
 
 import numba
 import numpy as np
-import torch
-from torch import Tensor
+from numpy.typing import DTypeLike
 
-from ..arrays import Array
+from ..arrays import Array, Floats, Knots
 from ..spline.bspline import collocation, gauss_points
 from .operators import PiecewiseOperator
 from .tensor_product import Band, apply_band, band
+from .term import RoundWeights
 
-Grams = list[tuple[Tensor, ...]]  # mass, stiffness and bending matrices (n, n), each for the three directions
+Grams = list[tuple[Array, ...]]  # mass, stiffness and bending matrices (n, n), each for the three directions
 
 
-def grams(knots: tuple[Array, ...], degrees: tuple[int, ...]) -> Grams:
+def grams(knots: Knots, degrees: tuple[int, ...]) -> Grams:
     """Return the matrices of integrals of products of basis functions, of their first and of their second derivatives.
 
     Gauss quadrature, exact.
     """
 
-    def of(row: Array, degree: int, derivative: int) -> Tensor:
+    def of(row: Array, degree: int, derivative: int) -> Array:
         points, weights = gauss_points(row, degree + 1)
         table = collocation(row, degree, points.ravel(), derivative).toarray()
-        return torch.from_numpy(table.T @ (weights.ravel()[:, None] * table))
+        return np.asarray(table.T @ (weights.ravel()[:, None] * table))
 
     return [tuple(of(row, p, d) for row, p in zip(knots, degrees, strict=True)) for d in range(3)]
 
 
-def bending_operator(matrices: Grams, weight: float, dtype: torch.dtype = torch.float64) -> PiecewiseOperator:
+def bending_operator(matrices: Grams, weight: float, dtype: DTypeLike = np.float64) -> PiecewiseOperator:
     """Return x -> weight * H x with x^T H x = int |Hessian F|^2 (exact); a piece of work is one component of F.
 
     H = h x m x m + m x h x m + m x m x h + 2 (k x k x m + k x m x k + m x k x k), with mass matrices m, stiffness
     matrices k and bending matrices h of the three directions.
     """
     bands = tuple(
-        band(*((factor * matrix).to(dtype).numpy() for matrix in (mass, math.sqrt(2.0) * slope, curve)))
+        band(*((factor * matrix).astype(dtype) for matrix in (mass, math.sqrt(2.0) * slope, curve)))
         for factor, mass, slope, curve in zip((1.0, 1.0, weight), *matrices, strict=True)
     )
 
-    def bend(component: int, control: Tensor) -> Tensor:
-        return torch.from_numpy(_bent(bands, np.ascontiguousarray(control[component].numpy())))
+    def bend(component: int, control: Floats) -> Floats:
+        return np.asarray(_bent(bands, control[component]))
 
-    return PiecewiseOperator([partial(bend, component) for component in range(3)], lambda parts, _: torch.stack(parts))
+    return PiecewiseOperator([partial(bend, component) for component in range(3)], lambda parts, _: np.stack(parts))
+
+
+class Fairness:
+    """The term weight * int |Hessian F|^2, quadratic in the control points.
+
+    bend: its second derivative, in double precision. mass: the three matrices (n, n) of integrals of basis functions.
+    """
+
+    def __init__(self, knots: Knots, degree: int, weight: float) -> None:
+        self._weight, matrices = weight, grams(knots, (degree,) * 3)
+        self.mass, self._slope, self._curve = matrices
+        self.bend, self._rough = (bending_operator(matrices, 2.0 * weight, dtype) for dtype in (np.float64, np.float32))
+
+    def weight(self, weights: RoundWeights) -> float:
+        """Return 1: the operators hold the fairness."""
+        return 1.0
+
+    def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
+        """Return the term at control points (3, n_u, n_v, n_w), and its gradient."""
+        bent = self.bend(control)
+        return 0.5 * float(np.vdot(bent, control)), bent
+
+    def curvature(self, control: Array) -> PiecewiseOperator:
+        """Return the second derivative, the same everywhere, as an operator in single precision."""
+        return self._rough
+
+    def with_stiffness(self) -> tuple[Array, ...]:
+        """Return for the three directions twice the stiffness matrix and twice the weighted bending matrix: (n, n)."""
+        return tuple(2.0 * k + 2.0 * self._weight * h for k, h in zip(self._slope, self._curve, strict=True))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -10,17 +10,18 @@ from dataclasses import dataclass, replace
 
 import igl
 import numpy as np
-import torch
 from scipy.spatial import cKDTree
-from torch import Tensor
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, Floats, IntArray, Knots
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_normals
 from .operators import ControlRows, PiecewiseOperator
 from .sliding import SlidingParameters
+from .term import RoundWeights
 
+_GAP = 1e-3  # between sheets, in a domain of volume 1: the check of the boundary proves such a gap
+_WEIGHT = 10.0  # times that of the distance from the surface, whose data hold the sheets where they are
 _SAMPLES = 110  # a direction and cube face
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
 _CHUNK = 4096  # samples at a time, which take some 40 MB
@@ -38,46 +39,50 @@ class ContactPenalty:
 
     first: ControlRows
     second: ControlRows
-    normals: Tensor
+    normals: Floats
     share: float
     gap: float
     spans: IntArray
     near: IntArray
 
-    def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
+    def weight(self, weights: RoundWeights) -> float:
+        """Return a multiple of that of the distance from the surface."""
+        return _WEIGHT * weights.surface
+
+    def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
-        shortfall = (self.gap - self.distances(control)).clamp_min(0.0)
-        return self.share * float(shortfall.square().sum()), self._pull(-2.0 * self.share * shortfall, control)
+        shortfall = np.maximum(self.gap - self.distances(control), 0.0)
+        return self.share * float((shortfall**2).sum()), self._pull(-2.0 * self.share * shortfall, control)
 
-    def curvature(self, control: Tensor, dtype: torch.dtype) -> PiecewiseOperator:
-        """Return the second derivative at `control` as an operator."""
-        scale = 2.0 * self.share * (self.distances(control) < self.gap).to(dtype)
-        first, second = self.first.to(dtype), self.second.to(dtype)
-        single = replace(self, first=first, second=second, normals=self.normals.to(dtype))
+    def curvature(self, control: Array) -> PiecewiseOperator:
+        """Return the second derivative at `control` as an operator in single precision."""
+        scale = 2.0 * self.share * (self.distances(control) < self.gap).astype(np.float32)
+        first, second = self.first.in_single(), self.second.in_single()
+        single = replace(self, first=first, second=second, normals=self.normals.astype(np.float32))
 
-        def product(x: Tensor) -> Tensor:
+        def product(x: Floats) -> Floats:
             return single._pull(scale * single.distances(x), x)
 
         return PiecewiseOperator([product], lambda parts, _: parts[0])
 
-    def distances(self, control: Tensor) -> Tensor:
+    def distances(self, control: Floats) -> Floats:
         """Return (F(p) - F(q)) . n, negative where p lies behind the sheet of q: (k,)."""
-        return ((self.first(control) - self.second(control)) * self.normals).sum(1)
+        return ((self.first(control) - self.second(control)) * self.normals).sum(axis=1)
 
-    def _pull(self, factor: Tensor, like: Tensor) -> Tensor:
+    def _pull(self, factor: Floats, like: Floats) -> Floats:
         along = factor[:, None] * self.normals
         return self.first.adjoint(along, like) - self.second.adjoint(along, like)
 
 
 def contact_penalty(
-    knots: Knots, degree: int, control: Tensor, gap: float, near: IntArray | None = None
+    knots: Knots, degree: int, control: Array, gap: float = _GAP, near: IntArray | None = None
 ) -> ContactPenalty:
     """Return the penalty for the boundary of F at these control points; it is empty where no two sheets are near.
 
     gap: how far apart sheets must be, in units of the control points (3, n_u, n_v, n_w). near: look at these samples
     alone, those of a penalty a few steps before; looking at all of them takes longer than a Newton step.
     """
-    volume = BSplineVolume((degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy())
+    volume = BSplineVolume((degree,) * 3, knots, np.moveaxis(control, 0, -1))
     boundary = SampledBoundary.on(volume, *[np.linspace(0.0, 1.0, _SAMPLES)] * 3)
     normals = vertex_normals(boundary.points, boundary.triangles)
     asked = np.arange(len(boundary.points)) if near is None else near
@@ -93,7 +98,7 @@ def contact_penalty(
     return ContactPenalty(
         first.rows,
         second.rows,
-        torch.as_tensor(normals[facing]),
+        normals[facing],
         1.0 / len(boundary.points),
         gap,
         np.concatenate([first.spans(), second.spans()]),

@@ -13,16 +13,16 @@ from dataclasses import dataclass, fields
 
 import numba
 import numpy as np
-import torch
-from scipy.ndimage import binary_dilation
-from torch import Tensor
 
-from ..arrays import Array, IntArray, Knots, Mask
+from ..arrays import Array, Floats, IntArray, Knots, Mask
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
 from ..threads import in_parallel
 from .operators import PiecewiseOperator
+from .spans import with_neighbours
+from .term import RoundWeights
 
+MIN_COEFFICIENT = 0.1  # a Bernstein coefficient of det J below this is penalised on active spans; mean det J is 1
 _BLOCK = 32  # spans at a time: what they need fits into the cache
 _MOST_KEPT = 300e6  # bytes of rows that are kept from product to product; those of further spans are made anew
 
@@ -62,7 +62,7 @@ class _Rows:
     starts: IntArray
 
 
-class SpanBarrier:
+class DeterminantPenalty:
     """Mean over all spans of weight * (floor - coefficient)_+^2; coefficients of det J in Bernstein form.
 
     weights (n_u, n_v, n_w): of the spans, 0 to begin with; a span of positive weight is active.
@@ -70,7 +70,7 @@ class SpanBarrier:
     weight grows by the inverse of its square.
     """
 
-    def __init__(self, knots: Knots, degree: int, floor: float) -> None:
+    def __init__(self, knots: Knots, degree: int, floor: float = MIN_COEFFICIENT) -> None:
         self.floor = floor
         self._extractions = [extraction(k, degree) for k in knots]
         self._widths = [np.diff(breakpoints(k)) for k in knots]
@@ -115,7 +115,11 @@ class SpanBarrier:
         back = np.ascontiguousarray(np.swapaxes(bezier, 2, 3))
         self._pieces = [_Spans(first[b], volumes[b], floors[b], shares[b], bezier[b], back[b]) for b in blocks]
 
-    def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
+    def weight(self, weights: RoundWeights) -> float:
+        """Return that of the penalties on what is folded."""
+        return weights.penalty
+
+    def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
 
         def part(spans: _Spans) -> tuple[float, IntArray, Array]:
@@ -129,7 +133,7 @@ class SpanBarrier:
             [(first, pushed) for _, first, pushed in parts], control
         )
 
-    def curvature(self, control: Tensor) -> PiecewiseOperator:
+    def curvature(self, control: Array) -> PiecewiseOperator:
         """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision.
 
         Its rows are kept while they take less than `_MOST_KEPT`: those of a map that folds nearly everywhere would take
@@ -137,7 +141,7 @@ class SpanBarrier:
         """
         taken = 0.0
 
-        def piece(spans: _Spans) -> Callable[[Tensor], tuple[IntArray, Array]]:
+        def piece(spans: _Spans) -> Callable[[Floats], tuple[IntArray, Floats]]:
             nonlocal taken
             found = self._short_rows(control, spans, np.float32)
             taken += found.rows.nbytes
@@ -147,9 +151,9 @@ class SpanBarrier:
 
         return PiecewiseOperator(in_parallel(piece, self._pieces), _collected)
 
-    def _short_rows(self, control: Tensor, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
+    def _short_rows(self, control: Array, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
         """Return the coefficients that fall short on some spans."""
-        points = _bezier_points(np.ascontiguousarray(control.numpy()), spans.first, spans.weights)
+        points = _bezier_points(control, spans.first, spans.weights)
         points = points.reshape(len(points), 3, *spans.weights.shape[2:], spans.weights.shape[2])
         bezier = np.ascontiguousarray(np.moveaxis(points, 0, -1))  # (3, p + 1, p + 1, p + 1, k)
         nets = [np.diff(bezier, axis=1 + d) * scale[..., None] for d, scale in enumerate(self._scales)]
@@ -169,19 +173,19 @@ class SpanBarrier:
         return _Rows(spans.some(counts > 0), short[tuple(place.T)], shares, rows, starts)
 
 
-def _product(found: _Rows, x: Tensor) -> tuple[IntArray, Array]:
+def _product(found: _Rows, x: Floats) -> tuple[IntArray, Floats]:
     """Return where the windows of some spans begin, and what their rows, in single precision, make of x there."""
     spans = found.spans
     weights, back = spans.weights.astype(np.float32), spans.back.astype(np.float32)
-    pushed = _squared(x.numpy(), spans.first, weights, back, found.rows, found.starts, 2.0 * found.shares)
+    pushed = _squared(x, spans.first, weights, back, found.rows, found.starts, 2.0 * found.shares)
     return spans.first, pushed
 
 
-def _collected(parts: list[tuple[IntArray, Array]], like: Tensor) -> Tensor:
+def _collected(parts: list[tuple[IntArray, Floats]], like: Floats) -> Floats:
     """Add windows (k, 3, p + 1, p + 1, p + 1) of control points, each from its first one (k, 3) on, in their order."""
-    total = torch.zeros_like(like)
+    total = np.zeros_like(like)
     for first, windows in parts:
-        _add_windows(windows, first, total.numpy())
+        _add_windows(windows, first, total)
     return total
 
 
@@ -285,23 +289,3 @@ def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
                 for j in range(n):
                     for k in range(n):
                         total[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k] += windows[s, c, i, j, k]
-
-
-def with_neighbours(spans: IntArray, n_spans: tuple[int, ...]) -> Mask:
-    """Mark spans (k, 3) and all that touch them: (n_u, n_v, n_w)."""
-    marked = np.zeros(n_spans, dtype=bool)
-    marked[tuple(spans.T)] = True
-    return np.asarray(binary_dilation(marked, np.ones((3, 3, 3), dtype=bool)))
-
-
-def acting_on(spans: Mask, degree: int) -> Mask:
-    """Mark the control points that act on marked spans: (n_u, n_v, n_w), `degree` fewer spans a direction."""
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(spans, degree), (degree + 1,) * 3)
-    return np.asarray(windows.any(axis=(3, 4, 5)))
-
-
-def edge_spans(n_spans: tuple[int, int, int]) -> IntArray:
-    """Return the spans (k, 3) that touch one of the cube's 12 edges."""
-    index = np.indices(n_spans).reshape(3, -1).T
-    at_side = (index == 0) | (index == np.array(n_spans) - 1)
-    return index[at_side.sum(axis=1) >= 2]

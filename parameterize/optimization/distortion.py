@@ -4,134 +4,152 @@ from collections.abc import Callable
 
 import numba
 import numpy as np
-import torch
 from scipy.ndimage import uniform_filter
-from torch import Tensor
 
-from ..arrays import Array, Knots
-from ..config import SplineConfig
+from ..arrays import Array, Floats, Knots
+from ..quality.rotations import closest_rotations
 from ..threads import in_parallel
+from .matrices import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
 from .operators import PiecewiseOperator
-from .polar import closest_rotation, cofactor_and_determinant, least_eigenvalue
 from .tensor_product import SYMMETRIC, GaussGrid
+from .term import RoundWeights
 
-_LEAST_DET = 0.03  # in the metric of the damping
+ARAP_LIMIT = 6.0  # times 1 + the mean distortion: what lies above costs more, as a few elements would else be crushed
+_STIFFENING = 3.0  # weight of the squared excess above that limit
+_MIN_DET = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
+_GAUSS = 3, 1  # Gauss points a span and direction: on the first and last span, where F bends most, and on the others
+_LEAST_DET = 0.03  # in the metric of the damping: below, it would hold F still
 
 
-class DistortionEnergy:
+class Distortion:
     """int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over the cube with a = |J - R|^2, R the closest rotation.
 
     a is the ARAP energy of F; the second part keeps its maximum down; the third, like the paper's bijectivity term,
     holds against folds. Gauss quadrature. Where alpha is lowered by a share, w grows by the inverse of its square.
+
+    limit: l; penalty: w; folded: the quadrature points with det J <= 0 where the energy was last asked for; damping: of
+    Newton's step, times the squared change of J relative to J: det J bends most where it is small.
     """
 
-    def __init__(self, knots: Knots, config: SplineConfig) -> None:
-        self._grid = GaussGrid(knots, (config.degree,) * 3, config.gauss, inner=config.inner_gauss)
-        self._config = config
-        self._limit = config.arap_limit
-        self._shares = np.ones_like(self._grid.weights)  # of config.min_det, which det J shall have at the points
+    def __init__(self, knots: Knots, degree: int, gauss: tuple[int, int] = _GAUSS) -> None:
+        self._grid = GaussGrid(knots, (degree,) * 3, gauss[0], inner=gauss[1])
+        self.limit, self.penalty, self.damping, self.folded = ARAP_LIMIT, 0.0, 0.0, 0
+        self._floors = np.full_like(self._grid.weights, _MIN_DET)  # alpha at the points
+        self._short_weights = self._grid.weights  # of the squared shortfalls
 
-    def set_limit(self, control: Tensor) -> None:
-        """Put the limit l above which distortion costs more in proportion to 1 + the mean distortion at `control`."""
+    def start_round(self, control: Array, penalty: float) -> None:
+        """Take the penalty's weight, and put the limit in proportion to 1 + the mean distortion at `control`."""
+        self.penalty = penalty
 
         def part(planes: slice) -> float:
             jacobian = self._grid.jacobian(control, planes)
-            return float(self._weights(planes) @ (jacobian - closest_rotation(jacobian)).square().sum(dim=(0, 1)))
+            return float(self._weights(planes) @ squared_norms(jacobian - closest_rotations(jacobian)))
 
-        self._limit = self._config.arap_limit * (1.0 + sum(in_parallel(part, self._grid.planes())))
+        self.limit = ARAP_LIMIT * (1.0 + sum(in_parallel(part, self._grid.planes())))
 
-    def lower_floors(self, control: Tensor) -> Array:
+    def lower_floors(self, control: Array, least: float) -> Array:
         """Ask for less where det J is small all around at `control`; return the shares (n_u, n_v, n_w) of the spans.
+
+        least: of these shares.
 
         In a stalk that is far thinner than the rest all of det J is small. A penalty that asks for the usual one would
         blow the stalk up, against the surface's data. So half the mean around is enough, a ninth of the cube wide.
         """
 
         def part(planes: slice) -> Array:
-            return np.asarray(cofactor_and_determinant(self._grid.jacobian(control, planes))[1].numpy())
+            return np.asarray(cofactors_and_determinants(self._grid.jacobian(control, planes))[1])
 
         weights = self._grid.weights
         det = np.concatenate(in_parallel(part, self._grid.planes())).reshape(weights.shape)
         mass, volume = (self._grid.sum_on_spans(values) for values in (det * weights, weights))
         around = [2 * (count // 18) + 1 for count in mass.shape]
         mean = uniform_filter(mass, around, mode="nearest") / uniform_filter(volume, around, mode="nearest")
-        shares = np.clip(0.5 * mean / self._config.min_det, self._config.least_floor, 1.0)
-        self._shares = self._grid.at_points(shares)
+        shares = np.clip(0.5 * mean / _MIN_DET, least, 1.0)
+        at_points = self._grid.at_points(shares)
+        self._floors, self._short_weights = _MIN_DET * at_points, weights / at_points**2
         return np.asarray(shares)
 
-    def energy_and_gradient(self, control: Tensor, penalty: float) -> tuple[float, Tensor, int]:
-        """Energy, gradient (3, n_u, n_v, n_w), and the number of quadrature points with det J <= 0."""
-        config = self._config
+    def weight(self, weights: RoundWeights) -> float:
+        """Return 1: the unit of all weights; that of the penalty is taken at the start of a round."""
+        return 1.0
 
-        def part(planes: slice) -> tuple[float, int, tuple[int, Array]]:
+    def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
+        """Return the energy and its gradient (3, n_u, n_v, n_w); count what is folded."""
+
+        def part(planes: slice) -> tuple[float, int, tuple[int, Floats]]:
             jacobian, weights = self._grid.jacobian(control, planes), self._weights(planes)
-            cofactors, det = cofactor_and_determinant(jacobian)
-            share = self._shares_on(planes)
-            short = (share * config.min_det - det).clamp_min(0.0)
-            shortfall = weights / share.square() * short
-            gap = jacobian - closest_rotation(jacobian)
-            density = gap.square().sum(dim=(0, 1))
-            excess = (density - self._limit).clamp_min(0.0)
-            energy = weights @ (density + config.stiffening * excess.square())
-            energy += penalty * (shortfall @ short)
-            dual = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess) * gap
-            dual -= 2.0 * penalty * shortfall * cofactors
+            cofactors, det = cofactors_and_determinants(jacobian)
+            short = np.maximum(self._floors[planes].ravel() - det, 0.0)
+            shortfall = self._short_weights[planes].ravel() * short
+            gap = jacobian - closest_rotations(jacobian)
+            density = squared_norms(gap)
+            excess = np.maximum(density - self.limit, 0.0)
+            energy = weights @ (density + _STIFFENING * excess**2)
+            energy += self.penalty * (shortfall @ short)
+            dual = 2.0 * weights * (1.0 + 2.0 * _STIFFENING * excess) * gap
+            dual -= 2.0 * self.penalty * shortfall * cofactors
             return float(energy), int((det <= 0.0).sum()), self._grid.adjoint(dual, planes)
 
         energies, folded, pulled = zip(*in_parallel(part, self._grid.planes()), strict=True)
-        return sum(energies), self._grid.collect(list(pulled), control), sum(folded)
+        self.folded = sum(folded)
+        return sum(energies), self._grid.collect(list(pulled), control)
 
-    def curvature(self, control: Tensor, penalty: float, damping: float = 0.0) -> PiecewiseOperator:
-        """Return a positive semidefinite second derivative at `control`, as an operator in single precision.
-
-        damping: times the squared change of J relative to J, to be added: det J bends most where it is small.
+    def curvature(self, control: Array) -> PiecewiseOperator:
+        """Return a positive semidefinite second derivative at `control`, damped, as an operator in single precision.
 
         With S = R^T J, R turns by R [omega] when J changes by d, where (tr(S) I - S) omega = -sum_k R_k x d_k over the
         rows k, so the Hessian of a is 2 (d - R [omega]). It is positive where all sums of two singular values, the
         eigenvalues of tr(S) I - S, are at least 2; elsewhere these are lifted. The penalty's part is Gauss-Newton.
         """
-        rough, config = control.float(), self._config
+        rough = control.astype(np.float32)
 
-        def piece(planes: slice) -> Callable[[Tensor], tuple[int, Array]]:
-            jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).float()
-            rotation = closest_rotation(jacobian)
-            cofactors, det = cofactor_and_determinant(jacobian)
-            share = self._shares_on(planes).float()
-            push = (2.0 * penalty * weights * (det < share * config.min_det)).sqrt() / share * cofactors
+        def piece(planes: slice) -> Callable[[Floats], tuple[int, Floats]]:
+            jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).astype(np.float32)
+            rotation = closest_rotations(jacobian)
+            cofactors, det = cofactors_and_determinants(jacobian)
+            short_weights = self._short_weights[planes].ravel().astype(np.float32)
+            push = np.sqrt(2.0 * self.penalty * short_weights * (det < self._floors[planes].ravel())) * cofactors
             gap = jacobian - rotation
-            excess = (gap.square().sum(dim=(0, 1)) - self._limit).clamp_min(0.0)
-            pull = (8.0 * config.stiffening * weights * (excess > 0.0)).sqrt() * gap
-            scale = 2.0 * weights * (1.0 + 2.0 * config.stiffening * excess)
+            excess = np.maximum(squared_norms(gap) - self.limit, 0.0)
+            pull = np.sqrt(8.0 * _STIFFENING * weights * (excess > 0.0)) * gap
+            scale = 2.0 * weights * (1.0 + 2.0 * _STIFFENING * excess)
             # |J^-1|^2 / 3: 1 for the identity, and bounded where det J vanishes
-            inverse = cofactors.square().sum(dim=(0, 1)) / (3.0 * det.clamp_min(_LEAST_DET).square())
-            held = 2.0 * damping * weights * inverse.clamp(1.0, 1.0 / _LEAST_DET**2)
-            parts = rotation, _turning(rotation, jacobian), pull.flatten(0, 1), push.flatten(0, 1), scale, held
-            return self._grid.squared(_matrices(*(p.contiguous().numpy() for p in parts)), planes)
+            inverse = squared_norms(cofactors) / (3.0 * np.maximum(det, _LEAST_DET) ** 2)
+            held = 2.0 * self.damping * weights * np.clip(inverse, 1.0, 1.0 / _LEAST_DET**2)
+            parts = rotation, _turning(rotation, jacobian), pull.reshape(9, -1), push.reshape(9, -1), scale, held
+            return self._grid.squared(_matrices(*parts), planes)
 
         return PiecewiseOperator(in_parallel(piece, self._grid.planes()), self._grid.collect)
 
-    def _weights(self, planes: slice) -> Tensor:
-        return torch.from_numpy(self._grid.weights[planes].ravel())
-
-    def _shares_on(self, planes: slice) -> Tensor:
-        return torch.from_numpy(self._shares[planes].ravel())
+    def _weights(self, planes: slice) -> Array:
+        return self._grid.weights[planes].ravel()
 
 
-def _turning(rotation: Tensor, jacobian: Tensor) -> Tensor:
+def _turning(rotation: Floats, jacobian: Floats) -> Floats:
     """Return (tr(S) I - S)^-1 with S = R^T J, its eigenvalues lifted so that the least is 2: (3, 3, m)."""
-    stretch = torch.stack([rotation[k][:, None] * jacobian[k] for k in range(3)]).sum(0)  # S, symmetric
-    sums = -stretch
+    sums = -_stretches(rotation, jacobian)
+    trace = sums[0, 0] + sums[1, 1] + sums[2, 2]
     for i in range(3):
-        sums[i, i] += stretch[0, 0] + stretch[1, 1] + stretch[2, 2]
-    lift = (2.0 - least_eigenvalue(sums)).clamp_min(0.0)
+        sums[i, i] -= trace
+    lift = np.maximum(2.0 - least_eigenvalues(sums), 0.0)
     for i in range(3):
         sums[i, i] += lift
-    cofactors, det = cofactor_and_determinant(sums)  # of a symmetric matrix
-    return cofactors / det
+    cofactors, det = cofactors_and_determinants(sums)  # of a symmetric matrix
+    return np.asarray(cofactors / det)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _matrices(rotation: Array, softness: Array, pull: Array, push: Array, scale: Array, held: Array) -> Array:
+def _stretches(rotation: Floats, jacobian: Floats) -> Floats:
+    """Return the symmetric matrices R^T J: (3, 3, m)."""
+    out = np.zeros_like(jacobian)
+    for a in range(3):
+        for b in range(3):
+            out[a, b] = dots(rotation[:, a], jacobian[:, b])
+    return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _matrices(rotation: Floats, softness: Floats, pull: Floats, push: Floats, scale: Floats, held: Floats) -> Floats:
     """Return the symmetric matrices of the second derivative in the nine entries of J: (45, m), see SYMMETRIC.
 
     scale (I - B softness B^T) + pull pull^T + push push^T + held I; B^T d is the sum of R_k x d_k over the rows k.

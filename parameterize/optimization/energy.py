@@ -5,96 +5,104 @@ J: holding them still, as local-global methods do, makes sliding along the surfa
 penalties. The boundary term is quadratic with its parameters held.
 """
 
-import numpy as np
-import torch
-from torch import Tensor
+from collections.abc import Iterable
 
-from ..arrays import IntArray, Knots
-from ..config import GrowthConfig, SplineConfig
-from .bending import bending_operator, grams
+import numpy as np
+
+from ..arrays import Array, IntArray, Knots
+from .bending import Fairness
 from .contact import ContactPenalty, contact_penalty
-from .determinant_penalty import SpanBarrier, acting_on, with_neighbours
-from .distortion import DistortionEnergy
+from .determinant_penalty import DeterminantPenalty
+from .distortion import Distortion
 from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
 from .operators import conjugate_gradients, weighted_sum
+from .spans import acting_on, with_neighbours
 from .surface_distance import SurfaceFit
 from .tensor_product import FastDiagonalization
+from .term import RoundWeights, Term, Weights
 
-_ROUGH = torch.float32  # good enough for directions; energies and gradients are float64
+_REACH = 0.03  # while F grows, surface points farther from F than this do not slide, and draw F in all directions
+_SLIDES = 3  # of the boundary parameters after each step: further ones hardly move them
+_RELAXATIONS = 1  # sweeps over the triangles that these flipped: after every step, so that flips do not pile up
+_PULL = 3e-4  # share of the surface's weight in the preconditioner: more would hold back what slides along the surface
+_TOLERANCE, _ITERATIONS = 0.1, 20  # of a Newton direction, relative and at most: a better one does not save steps
+_SMOOTH_TOLERANCE, _SMOOTH_ITERATIONS = 1e-8, 5000  # of `smoothed`, whose result is a map and no direction
 
 
 class SplineEnergy:
-    """Distortion, fairness, boundary, and the penalties on det J at Gauss points and in Bernstein form."""
+    """The terms of the energy, those of the solid and those of the boundary apart.
 
-    def __init__(self, config: SplineConfig, knots: Knots, surface: SurfaceFit) -> None:
-        self.config, self.surface = config, surface
-        self.anchors = EdgeAnchors(surface, config)
+    `inner` changes with the control points alone, `outer` also where the surface's parameters slide.
+    """
+
+    def __init__(self, knots: Knots, surface: SurfaceFit, weights: Weights) -> None:
+        degree = surface.places.degree
+        self.surface, self.degree = surface, degree
+        self.anchors = EdgeAnchors(surface)
+        self.distortion = Distortion(knots, degree)
+        self.determinants = DeterminantPenalty(knots, degree)
+        self.fairness = Fairness(knots, degree, weights.fairness)
+        self.inner: tuple[Term, ...] = (self.distortion, self.fairness, self.determinants)
         self._facing: FacingPenalty | None = None
         self._contact: ContactPenalty | None = None
-        self._knots = knots
-        self.penalty, self.vertex = config.penalties[0], config.vertex
-        self._grows: GrowthConfig | None = None
-        self._distortion = DistortionEnergy(knots, config)
-        self._grams = grams(knots, (config.degree,) * 3)
-        self._bending, self._rough_bending = (
-            bending_operator(self._grams, 2.0 * config.fairness, dtype) for dtype in (torch.float64, _ROUGH)
-        )
-        self.barrier = SpanBarrier(knots, config.degree, config.min_coefficient)
+        self._knots, self._weights, self._grows = knots, weights, False
+        self._round = RoundWeights(0.0, weights.surface)
         self._precondition = self._preconditioner()
 
-    def _preconditioner(self) -> FastDiagonalization:
-        config, (mass, slope, curve) = self.config, self._grams
-        rough = tuple(2.0 * k + 2.0 * config.fairness * h for k, h in zip(slope, curve, strict=True))
-        for matrix in rough:
-            matrix[[0, -1], [0, -1]] += config.pull * self.vertex / 6.0  # the points spread over six faces
-        return FastDiagonalization(rough, mass).to(_ROUGH)
+    @property
+    def outer(self) -> tuple[Term, ...]:
+        """The terms of the boundary that act at present."""
+        terms: tuple[Term | None, ...] = (self.surface, self.anchors, self._contact, self._facing)
+        return tuple(term for term in terms if term is not None)
 
-    def start_round(self, control: Tensor, penalty: float, share: float | None = None) -> None:
+    def _preconditioner(self) -> FastDiagonalization:
+        """Return the inverse of the second derivative at the identity, the surface's data spread over six faces."""
+        rough = self.fairness.with_stiffness()
+        for matrix in rough:
+            matrix[[0, -1], [0, -1]] += _PULL * self._round.surface / 6.0
+        return FastDiagonalization(rough, self.fairness.mass).in_single()
+
+    def start_round(self, control: Array, penalty: float, share: float | None = None) -> None:
         """Take a penalty weight, and the limit of the distortion and the floors of det J that suit the control points.
 
         share: while F grows into the solid, that of the weight of the surface's data.
         """
-        self.penalty = penalty
-        self._distortion.set_limit(control)
-        if self.config.least_floor < 1.0:
-            self.barrier.lower_floors(self._distortion.lower_floors(control))
-        if share is None and self._grows is None:
+        self._round = RoundWeights(penalty, self._weights.surface * (1.0 if share is None else share))
+        self.distortion.start_round(control, penalty)
+        if self._weights.least_floor < 1.0:
+            self.determinants.lower_floors(self.distortion.lower_floors(control, self._weights.least_floor))
+        if share is None and not self._grows:
             return
-        self._grows = None if share is None else self.config.growth
-        self.vertex = self.config.vertex * (1.0 if share is None else share)
+        self._grows = share is not None
         self._precondition = self._preconditioner()
-        reach = np.inf if self._grows is None else self._grows.reach
+        reach = _REACH if self._grows else np.inf
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
-    def watch_facing(self, control: Tensor) -> None:
-        """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`."""
-        if self._grows is not None:  # F is too far away for that to mean something
-            self._facing = None
-            return
-        self._facing = facing_penalty(self.surface, control, self.config.min_facing, self.config.facing_margin)
+    def watch_facing(self, control: Array) -> None:
+        """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`.
 
-    def watch_contact(self, control: Tensor) -> IntArray:
+        While F grows it is too far away for that to mean something.
+        """
+        self._facing = None if self._grows else facing_penalty(self.surface, control)
+
+    def watch_contact(self, control: Array) -> IntArray:
         """Push apart, from now on, the sheets of F's boundary that hardly are at `control`; return their spans."""
-        self._contact = self._contact_at(control)
+        self._contact = contact_penalty(self._knots, self.degree, control)
         return self._contact.spans
 
-    def _contact_at(self, control: Tensor, near: IntArray | None = None) -> ContactPenalty:
-        return contact_penalty(self._knots, self.config.degree, control, self.config.gap, near)
-
-    def slide(self, control: Tensor) -> None:
+    def slide(self, control: Array) -> None:
         """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
         places, points, longest = self.surface.places, self.surface.points, 0.5 / max(control.shape[1:])
-        if self._grows is None:
-            for _ in range(self.config.slides):
-                places.slide(control, points, longest)
-            places.relax(self.config.relaxations)
+        if self._grows:
+            places.slide(control, points, longest, keep_layout=True, reach=_REACH)
         else:
-            for _ in range(self._grows.slides):
-                places.slide(control, points, longest, keep_layout=True, reach=self._grows.reach)
+            for _ in range(_SLIDES):
+                places.slide(control, points, longest)
+            places.relax(_RELAXATIONS)
         self.watch_facing(control)
         if self._contact is not None:
-            self._contact = self._contact_at(control, self._contact.near)
+            self._contact = contact_penalty(self._knots, self.degree, control, near=self._contact.near)
 
     def give_way(self, spans: IntArray, factor: float) -> None:
         """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""
@@ -111,68 +119,46 @@ class SplineEnergy:
         for fit in (self.surface, self.anchors.fit):
             fit.give_way(np.minimum(fit.yielding / factor, 1.0))
 
-    def volume_part(self, control: Tensor) -> tuple[float, Tensor, int]:
-        """Distortion, fairness and barrier: energy, gradient, folded quadrature points."""
-        arap, gradient, folded = self._distortion.energy_and_gradient(control, self.penalty)
-        shortfall, push = self.barrier.energy_and_gradient(control)
-        bent = self._bending(control)
-        energy = arap + 0.5 * float((bent * control).sum()) + self.penalty * shortfall
-        return energy, gradient + bent + self.penalty * push, folded
+    def volume_part(self, control: Array) -> tuple[float, Array, int]:
+        """Return the terms of the solid: energy, gradient, folded quadrature points."""
+        return *self._sum(self.inner, control), self.distortion.folded
 
-    def surface_part(self, control: Tensor) -> tuple[float, Tensor]:
-        """Return the boundary terms at the present parameters: energy and gradient."""
-        config = self.config
-        off, pull = self.surface.energy_and_gradient(control)
-        off_edges, pull_edges = self.anchors.fit.energy_and_gradient(control)
-        energy = self.vertex * (off + config.anchors * off_edges)
-        gradient = self.vertex * (pull + config.anchors * pull_edges)
-        if self._contact is not None:
-            overlap, apart = self._contact.energy_and_gradient(control)
-            energy += config.vertex * config.contact * overlap
-            gradient += config.vertex * config.contact * apart
-        if self._facing is None:
-            return energy, gradient
-        turned, push = self._facing.energy_and_gradient(control)
-        return energy + self.penalty * turned, gradient + self.penalty * push
+    def surface_part(self, control: Array) -> tuple[float, Array]:
+        """Return the terms of the boundary at the present parameters: energy and gradient."""
+        return self._sum(self.outer, control)
 
-    def smoothed(self, control: Tensor, spans: IntArray) -> Tensor:
+    def _sum(self, terms: Iterable[Term], control: Array) -> tuple[float, Array]:
+        energy, gradient = 0.0, np.zeros_like(control)
+        for term in terms:
+            weight, (value, slope) = term.weight(self._round), term.energy_and_gradient(control)
+            energy += weight * value
+            gradient += weight * slope
+        return energy, gradient
+
+    def smoothed(self, control: Array, spans: IntArray) -> Array:
         """Bend F as little as possible in and next to spans (k, 3): return the control points, the others held.
 
         Which side is folded over which plays no part in this, as it does where det J is penalised.
         """
-        near = with_neighbours(spans, self.barrier.weights.shape)
-        free = torch.from_numpy(acting_on(near, self.config.degree)).to(control.dtype)
+        free = acting_on(with_neighbours(spans, self.determinants.weights.shape), self.degree)
         moved, _ = conjugate_gradients(
-            lambda x: free * self._bending(x),
-            -free * self._bending(control),
+            lambda x: self.fairness.bend(x) * free,
+            -(self.fairness.bend(control) * free),
             lambda x: x,
-            tolerance=self.config.smoothing_tolerance,
-            max_iterations=self.config.smoothing_iterations,
+            tolerance=_SMOOTH_TOLERANCE,
+            max_iterations=_SMOOTH_ITERATIONS,
         )
         return control + moved
 
-    def newton_direction(self, control: Tensor, right: Tensor, damping: float = 0.0) -> Tensor:
+    def newton_direction(self, control: Array, right: Array, damping: float = 0.0) -> Array:
         """Solve roughly (Hessian + damping) x = right at `control`, the parameters of the surface held."""
-        config = self.config
-        surface, anchors = self.surface.hessian(_ROUGH), self.anchors.fit.hessian(_ROUGH)
-        distortion = self._distortion.curvature(control, self.penalty, damping)
-        barrier = self.barrier.curvature(control)
-        terms = [
-            (1.0, distortion),
-            (1.0, self._rough_bending),
-            (self.penalty, barrier),
-            (self.vertex, surface),
-            (self.vertex * config.anchors, anchors),
-        ]
-        if self._facing is not None:
-            terms.append((self.penalty, self._facing.curvature(control, _ROUGH)))
-        if self._contact is not None:
-            terms.append((config.vertex * config.contact, self._contact.curvature(control, _ROUGH)))
+        self.distortion.damping = damping
+        terms = [(term.weight(self._round), term.curvature(control)) for term in (*self.inner, *self.outer)]
         direction, _ = conjugate_gradients(
             weighted_sum(terms),
-            right.to(_ROUGH),
+            right.astype(np.float32),
             self._precondition,
-            tolerance=config.tolerance,
-            max_iterations=config.iterations,
+            tolerance=_TOLERANCE,
+            max_iterations=_ITERATIONS,
         )
-        return direction.to(right.dtype)
+        return direction.astype(np.float64)

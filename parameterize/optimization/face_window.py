@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from torch import Tensor
 
 from ..arrays import Array, IntArray, Knots, Mask
 from ..spline.bspline import basis_derivatives, breakpoints
@@ -48,9 +47,9 @@ class FaceWindow:
         """Return the control points' weights in the derivative of order a and b: (N, k)."""
         return (self.in_a[:, a, :, None] * self.in_b[:, b, None, :]).reshape(self.indices.shape)
 
-    def derivatives(self, control: Tensor) -> tuple[Array, Array, Array]:
+    def derivatives(self, control: Array) -> tuple[Array, Array, Array]:
         """Return F and its tangents t_a and t_b at the points: (N, 3) each."""
-        flat, windows = control.reshape(3, -1).numpy(), (self.indices, self.in_a, self.in_b)
+        flat, windows = control.reshape(3, -1), (self.indices, self.in_a, self.in_b)
         found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), pieces(len(self.indices)))
         value, along_a, along_b = np.concatenate(found).swapaxes(0, 1)
         return value, along_a, along_b

@@ -1,8 +1,6 @@
 """First spline from the trained network: least squares on pairs (G(x), x), slightly smoothed (section 4.3.2)."""
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from ..arrays import Array, Knots
 from ..spline.bspline import basis_derivatives
@@ -11,9 +9,7 @@ from .operators import ControlRows, conjugate_gradients, weighted_sum
 from .tensor_product import FastDiagonalization
 
 
-def fit_pairs(
-    parameters: Array, points: Array, weights: Array, knots: Knots, degree: int, *, fairness: float
-) -> Tensor:
+def fit_pairs(parameters: Array, points: Array, weights: Array, knots: Knots, degree: int, *, fairness: float) -> Array:
     """Control points (3, n_u, n_v, n_w) that minimise sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
 
     parameters (m, 3) in the unit cube, points (m, 3), weights (m,) that sum to 1: the discrete form of the paper's
@@ -31,6 +27,6 @@ def fit_pairs(
     smooth = bending_operator(matrices, fairness)
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
     operator = weighted_sum([(1.0, rows.squared(weights[:, None, None] * np.eye(3))), (1.0, smooth)])
-    right = rows.adjoint(torch.as_tensor(weights[:, None] * points), torch.zeros((3, *sizes)))
+    right = rows.adjoint(weights[:, None] * points, np.zeros((3, *sizes)))
     control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
     return control

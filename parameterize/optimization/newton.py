@@ -1,4 +1,4 @@
-"""One round of truncated Newton steps on the energy of energy.py, and when it ends.
+"""One round of truncated Newton steps on the energy of energy.py, and the rule by which it ends.
 
 Between steps the boundary parameters slide (surface_distance.py). Steps and sliding by turns converge linearly;
 acceleration.py looks ahead, and what it finds is kept where it is lower.
@@ -6,44 +6,50 @@ acceleration.py looks ahead, and what it finds is kept where it is lower.
 
 import logging
 import math
-import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from torch import Tensor
-
-from ..config import SplineConfig
-from ..progress import History, Progress, ProgressCallback
+from ..arrays import Array
 from .acceleration import Acceleration
 from .energy import SplineEnergy
 
 _log = logging.getLogger(__name__)
 _SHORTEST_STEP = 1e-6
+_MEMORY = 4  # differences of Newton steps from which the next place is guessed: older ones belong to another shape
+_DAMPING = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
+_DAMPING_GROWTH = 3.0  # factor after each further one, and divisor after a full step
+FIRST_GAIN = 8e-3  # `StoppingRule.gain` of the first round of all: what it leaves the next ones lower anyway
+GAIN = 1e-3  # likewise of later ones
+LEAST_STEPS = 6  # a round: what unfolds a few spans hardly lowers the energy of the whole
+_SMALL_GAINS = 2  # in a row end a round: a step may gain little by chance
 
 
 @dataclass(frozen=True, eq=False)
-class _Point:
+class Point:
     """Control points with energy and gradient, the boundary's part apart: it alone changes when parameters slide."""
 
-    control: Tensor
-    inner: tuple[float, Tensor]
-    outer: tuple[float, Tensor]
+    control: Array
+    inner: tuple[float, Array]
+    outer: tuple[float, Array]
     folded: int
 
     @property
     def total(self) -> float:
+        """Return the energy."""
         return self.inner[0] + self.outer[0]
 
     @property
-    def gradient(self) -> Tensor:
+    def gradient(self) -> Array:
+        """Return its gradient."""
         return self.inner[1] + self.outer[1]
 
 
-def _evaluate(control: Tensor, energy: SplineEnergy) -> _Point:
+def _evaluate(control: Array, energy: SplineEnergy) -> Point:
     value, gradient, folded = energy.volume_part(control)
-    return _Point(control, (value, gradient), energy.surface_part(control), folded)
+    return Point(control, (value, gradient), energy.surface_part(control), folded)
 
 
-def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> tuple[_Point, float] | None:
+def _line_search(point: Point, direction: Array, energy: SplineEnergy) -> tuple[Point, float] | None:
     """Shorten the step until the energy falls enough (Armijo); return where it leads, and its length, at most 1.
 
     The next length is where the parabola through the values and the slope at 0 has its minimum, between a tenth and a
@@ -61,7 +67,7 @@ def _line_search(point: _Point, direction: Tensor, energy: SplineEnergy) -> tupl
     return None
 
 
-def _look_ahead(found: _Point, acceleration: Acceleration, energy: SplineEnergy) -> _Point | None:
+def _look_ahead(found: Point, acceleration: Acceleration, energy: SplineEnergy) -> Point | None:
     """Return the point that the acceleration guesses, parameters slid there; None where it lies no lower than `found`.
 
     The parameters are then where they were.
@@ -79,68 +85,63 @@ def _look_ahead(found: _Point, acceleration: Acceleration, energy: SplineEnergy)
     return None
 
 
-def _next_damping(damping: float, length: float, config: SplineConfig) -> float:
+def _next_damping(damping: float, length: float) -> float:
     """Raise the damping after a step that had to be shortened to less than half, lower it after a full one."""
     if length < 0.5:
-        return max(config.damping, config.damping_growth * damping)
-    lowered = damping / config.damping_growth if length == 1.0 else damping
-    return lowered if lowered >= config.damping else 0.0
+        return max(_DAMPING, _DAMPING_GROWTH * damping)
+    lowered = damping / _DAMPING_GROWTH if length == 1.0 else damping
+    return lowered if lowered >= _DAMPING else 0.0
 
 
-def _expected_steps(config: SplineConfig, number: int, step: int) -> int:
-    """Return how many steps are left after one of a round where the run is a usual one; hard shapes take more."""
-    usual = [min(count, config.steps) for count in config.usual_steps]
-    present = usual[number] if number < len(usual) else config.least_steps
-    return max(present - step - 1, 1) + sum(usual[number + 1 :])
+@dataclass
+class StoppingRule:
+    """When a round of steps ends: after `steps`, or where they lower the energy by less than the share `gain`.
+
+    Steps with sliding count together: single ones may gain little, and sliding may raise the energy of what is folded.
+    """
+
+    steps: int
+    gain: float
+    taken: int = 0
+    lowest: float = math.inf  # energy before each of the steps taken
+    waited: int = 0  # steps since it was last lowered enough
+    small: int = 0  # gains in a row that were too small
+
+    def ends(self, before: float, searched: float, slid: float) -> bool:
+        """Return whether a step is the last: its energy before it, after the line search, and after sliding."""
+        self.taken += 1
+        self.lowest = min(self.lowest, before)
+        self.waited = 0 if slid < (1.0 - self.gain) * self.lowest else self.waited + 1
+        self.small = self.small + 1 if before - min(searched, slid) < self.gain * slid else 0
+        tired = self.small >= _SMALL_GAINS or self.waited >= LEAST_STEPS
+        return self.taken >= self.steps or (self.taken >= LEAST_STEPS and tired)
 
 
-def descend(
-    energy: SplineEnergy,
-    control: Tensor,
-    number: int,
-    *,
-    growing: bool,
-    history: History,
-    progress: ProgressCallback,
-) -> Tensor:
+def descend(energy: SplineEnergy, control: Array, rule: StoppingRule, after_step: Callable[[Point], None]) -> Array:
     """Return the control points (3, n_u, n_v, n_w) after one round of steps; the surface's parameters slide with them.
 
-    number: of the round. growing: whether F still grows into the solid in it, which then has fewer steps.
+    after_step: called with where each step has led to.
     """
-    config, steps = energy.config, energy.config.steps
-    most = config.growth.steps if config.growth and growing else steps
     energy.watch_facing(control)
     point = _evaluate(control, energy)
-    lowest, waited, small, damping, acceleration = point.total, 0, 0, 0.0, Acceleration(config.memory)
-    for step in range(most):
-        begun = time.perf_counter()
+    damping, acceleration, ended = 0.0, Acceleration(_MEMORY), False
+    while not ended:
         direction = energy.newton_direction(point.control, -point.gradient, damping)
         searched = _line_search(point, direction, energy)
         if searched is None:
-            _log.info("round %d: no descent after step %d", number, step)
+            _log.info("no descent after step %d of the round", rule.taken)
             break
         found, length = searched
-        damping = _next_damping(damping, length, config)
+        damping = _next_damping(damping, length)
         if length < 1.0:
             acceleration.forget()
         else:
             acceleration.add(point.control, found.control)
         ahead = _look_ahead(found, acceleration, energy)
-        before = point.total
         if ahead is None:
             energy.slide(found.control)
             ahead = replace(found, outer=energy.surface_part(found.control))
+        after_step(ahead)
+        ended = rule.ends(point.total, found.total, ahead.total)
         point = ahead
-        gain = before - min(found.total, point.total)  # sliding may raise the energy of what is folded
-        done = number * steps + step + 1
-        history.add("spline", done - 1, point.total, point.folded, {"surface": point.outer[0]})
-        total = max(number + 1, len(config.usual_steps)) * steps
-        left = _expected_steps(config, number, step) * (time.perf_counter() - begun)
-        progress(Progress("spline", done, total, point.total, point.folded, left))
-        enough = config.gain if number else config.first_gain
-        waited = 0 if point.total < (1.0 - enough) * lowest else waited + 1
-        lowest = min(lowest, point.total)
-        small = small + 1 if gain < enough * point.total else 0
-        if step + 1 >= config.least_steps and (small >= config.small_gains or waited >= config.least_steps):
-            break
     return point.control

@@ -8,13 +8,16 @@ and t_b the tangents of F along the cube's face and n the mesh's normal (one-sid
 from dataclasses import dataclass
 
 import numpy as np
-import torch
-from torch import Tensor
 
+from ..arrays import Array, Floats
 from ..cube.cube import axis_and_side
+from .matrices import cross, dots
 from .operators import ControlRows, PiecewiseOperator
-from .polar import cross
 from .surface_distance import SurfaceFit
+from .term import RoundWeights
+
+_FLOOR = 0.1  # (t_a x t_b) . n below this is penalised; its mean over the boundary is near 1
+_MARGIN = 3.0  # times that: points below may fall under it in the next step and are watched
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,55 +29,62 @@ class FacingPenalty:
     """
 
     tangents: tuple[ControlRows, ControlRows]
-    normals: Tensor
-    weights: Tensor
+    normals: Floats
+    weights: Floats
     floor: float
 
-    def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
+    def weight(self, weights: RoundWeights) -> float:
+        """Return that of the penalties on what is folded."""
+        return weights.penalty
+
+    def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
         by_a, by_b, size = self._slopes(control)
-        shortfall = (self.floor - size).clamp_min(0.0)
+        shortfall = np.maximum(self.floor - size, 0.0)
         gradient = self._pull(-2.0 * self.weights * shortfall, by_a, by_b, control)
-        return float(self.weights @ shortfall.square()), gradient
+        return float(self.weights @ shortfall**2), gradient
 
-    def curvature(self, control: Tensor, dtype: torch.dtype) -> PiecewiseOperator:
-        """Return the Gauss-Newton part of the second derivative at `control`."""
-        along_a, along_b = (rows.to(dtype) for rows in self.tangents)
-        single = FacingPenalty((along_a, along_b), self.normals.to(dtype), self.weights.to(dtype), self.floor)
-        by_a, by_b, size = single._slopes(control.to(dtype))
+    def curvature(self, control: Array) -> PiecewiseOperator:
+        """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
+        along_a, along_b = (rows.in_single() for rows in self.tangents)
+        normals, weights = self.normals.astype(np.float32), self.weights.astype(np.float32)
+        single = FacingPenalty((along_a, along_b), normals, weights, self.floor)
+        by_a, by_b, size = single._slopes(control.astype(np.float32))
         scale = 2.0 * single.weights * (size < self.floor)
 
-        def product(x: Tensor) -> Tensor:
+        def product(x: Floats) -> Floats:
             a, b = (rows(x).T for rows in single.tangents)
-            return single._pull(scale * ((by_a * a).sum(0) + (by_b * b).sum(0)), by_a, by_b, x)
+            return single._pull(scale * (dots(by_a, a) + dots(by_b, b)), by_a, by_b, x)
 
         return PiecewiseOperator([product], lambda parts, _: parts[0])
 
-    def _slopes(self, control: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def _slopes(self, control: Floats) -> tuple[Floats, Floats, Floats]:
         """Return (t_a x t_b) . n, last, after its derivatives in t_a and t_b: (3, k) each."""
         a, b = (rows(control).T for rows in self.tangents)
-        by_a, by_b = cross(b[None], self.normals[None])[0], cross(self.normals[None], a[None])[0]
-        return by_a, by_b, (a * by_a).sum(0)
+        by_a, by_b = np.empty_like(self.normals), np.empty_like(self.normals)
+        cross(b, self.normals, by_a)
+        cross(self.normals, a, by_b)
+        return by_a, by_b, dots(a, by_a)
 
-    def _pull(self, factor: Tensor, by_a: Tensor, by_b: Tensor, like: Tensor) -> Tensor:
+    def _pull(self, factor: Floats, by_a: Floats, by_b: Floats, like: Floats) -> Floats:
         along_a, along_b = self.tangents
         return along_a.adjoint((factor * by_a).T, like) + along_b.adjoint((factor * by_b).T, like)
 
 
-def facing_penalty(fit: SurfaceFit, control: Tensor, floor: float, margin: float) -> FacingPenalty:
-    """Return the penalty at the points of the surface where (t_a x t_b) . n < margin * floor at these control points.
+def facing_penalty(fit: SurfaceFit, control: Array, floor: float = _FLOOR) -> FacingPenalty:
+    """Return the penalty at the points of the surface where (t_a x t_b) . n is near the floor at these control points.
 
-    With a margin above 1 it also holds points that could fall below the floor in the next step.
+    It also holds points that could fall below the floor in the next step.
     """
     window = fit.places.window
     _, tangent_a, tangent_b = window.derivatives(control)
     outward = axis_and_side(fit.places.cube_faces)[1] == 1
     normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
-    low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < margin * floor
+    low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < _MARGIN * floor
     along_a, along_b = window.weights(1, 0), window.weights(0, 1)
     return FacingPenalty(
         (ControlRows(window.indices[low], along_a[low]), ControlRows(window.indices[low], along_b[low])),
-        torch.as_tensor(np.ascontiguousarray(normals[low].T)),
-        torch.as_tensor(fit.weights[low]),
+        np.ascontiguousarray(normals[low].T),
+        fit.weights[low],
         floor,
     )

@@ -11,13 +11,11 @@ from typing import Any
 
 import numba
 import numpy as np
-import torch
-from torch import Tensor
 
-from ..arrays import Array, IntArray
+from ..arrays import Floats, IntArray
 from ..threads import in_parallel
 
-Operator = Callable[[Tensor], Tensor]
+Operator = Callable[[Floats], Floats]
 _ROWS = 4096  # in a piece of work
 
 
@@ -25,10 +23,10 @@ _ROWS = 4096  # in a piece of work
 class PiecewiseOperator:
     """x -> add(what every piece makes of x, x); `add` takes these in the order of the pieces."""
 
-    pieces: list[Callable[[Tensor], Any]]
-    add: Callable[[list[Any], Tensor], Tensor]
+    pieces: list[Callable[[Floats], Any]]
+    add: Callable[[list[Any], Floats], Floats]
 
-    def __call__(self, x: Tensor) -> Tensor:
+    def __call__(self, x: Floats) -> Floats:
         """Apply the operator to control points: (3, n_u, n_v, n_w) -> the same shape."""
         return self.add(in_parallel(lambda piece: piece(x), self.pieces), x)
 
@@ -41,11 +39,11 @@ def pieces(count: int) -> list[slice]:
 def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOperator:
     """Return the sum of operators times their weights: one call runs all their pieces."""
 
-    def add(found: list[Any], x: Tensor) -> Tensor:
-        total, begin = torch.zeros_like(x), 0
+    def add(found: list[Any], x: Floats) -> Floats:
+        total, begin = np.zeros_like(x), 0
         for weight, operator in terms:
             end = begin + len(operator.pieces)
-            total.add_(operator.add(found[begin:end], x), alpha=weight)
+            total += weight * operator.add(found[begin:end], x)
             begin = end
         return total
 
@@ -53,23 +51,23 @@ def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOpera
 
 
 def conjugate_gradients(
-    operator: Operator, right: Tensor, precondition: Operator, *, tolerance: float, max_iterations: int
-) -> tuple[Tensor, int]:
+    operator: Operator, right: Floats, precondition: Operator, *, tolerance: float, max_iterations: int
+) -> tuple[Floats, int]:
     """Solve operator(x) = right from x = 0 until |r| <= tolerance |right|; returns x and the iterations done."""
-    x = torch.zeros_like(right)
-    residual = right.clone()
-    goal = tolerance * float(right.norm())
+    x = np.zeros_like(right)
+    residual = right.copy()
+    goal = tolerance * float(np.linalg.norm(right))
     direction = precondition(residual)
-    product = float((residual * direction).sum())
+    product = float(np.vdot(residual, direction))
     for iteration in range(max_iterations):
-        if float(residual.norm()) <= goal:
+        if float(np.linalg.norm(residual)) <= goal:
             return x, iteration
         image = operator(direction)
-        step = product / float((direction * image).sum())
+        step = product / float(np.vdot(direction, image))
         x += step * direction
         residual -= step * image
         scaled = precondition(residual)
-        new_product = float((residual * scaled).sum())
+        new_product = float(np.vdot(residual, scaled))
         direction = scaled + (new_product / product) * direction
         product = new_product
     return x, max_iterations
@@ -80,43 +78,43 @@ class ControlRows:
     """Rows that apply to control points, and their transpose: N of k entries each, their columns and values (N, k)."""
 
     columns: IntArray
-    values: Array
+    values: Floats
 
-    def to(self, dtype: torch.dtype) -> "ControlRows":
-        """Return the same rows in another precision."""
-        return ControlRows(self.columns, torch.from_numpy(self.values).to(dtype).numpy())
+    def in_single(self) -> "ControlRows":
+        """Return the same rows in single precision."""
+        return ControlRows(self.columns, self.values.astype(np.float32))
 
-    def __call__(self, control: Tensor) -> Tensor:
+    def __call__(self, control: Floats) -> Floats:
         """Return the values (N, 3) at control points (3, n_u, n_v, n_w)."""
-        field = control.reshape(3, -1).numpy()
+        field = control.reshape(3, -1)
         found = in_parallel(lambda rows: _times(self.columns[rows], self.values[rows], field), pieces(len(self.values)))
-        return torch.from_numpy(np.concatenate(found))
+        return np.concatenate(found)
 
-    def adjoint(self, dual: Tensor, like: Tensor) -> Tensor:
+    def adjoint(self, dual: Floats, like: Floats) -> Floats:
         """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
-        flat, count = np.ascontiguousarray(dual.numpy()), like.numel() // 3
+        flat, count = np.ascontiguousarray(dual), like.size // 3
 
-        def part(rows: slice) -> Array:
-            return _spread(self.columns[rows], self.values[rows], flat[rows], count)
+        def part(rows: slice) -> Floats:
+            return np.asarray(_spread(self.columns[rows], self.values[rows], flat[rows], count))
 
         return _summed(in_parallel(part, pieces(len(self.values))), like)
 
-    def squared(self, metric: Array) -> PiecewiseOperator:
+    def squared(self, metric: Floats) -> PiecewiseOperator:
         """Return the rows, then matrices (N, 3, 3) on what they yield, then the transpose of the rows."""
 
-        def product(rows: slice, field: Tensor) -> Array:
-            return _squared(self.columns[rows], self.values[rows], metric[rows], field.reshape(3, -1).numpy())
+        def product(rows: slice, field: Floats) -> Floats:
+            return np.asarray(_squared(self.columns[rows], self.values[rows], metric[rows], field.reshape(3, -1)))
 
         return PiecewiseOperator([partial(product, rows) for rows in pieces(len(self.values))], _summed)
 
 
-def _summed(parts: list[Array], like: Tensor) -> Tensor:
+def _summed(parts: list[Floats], like: Floats) -> Floats:
     """Add parts (3, n), in their order, to control points of the shape of `like`."""
-    return torch.from_numpy(sum(parts[1:], start=parts[0])).view(like.shape)
+    return sum(parts[1:], start=parts[0]).reshape(like.shape)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _times(columns: IntArray, values: Array, field: Array) -> Array:
+def _times(columns: IntArray, values: Floats, field: Floats) -> Floats:
     """Multiply rows (m, k) by a field (3, n): (m, 3)."""
     out = np.zeros((len(columns), 3), field.dtype)
     for row in range(len(columns)):
@@ -128,7 +126,7 @@ def _times(columns: IntArray, values: Array, field: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _spread(columns: IntArray, values: Array, dual: Array, count: int) -> Array:
+def _spread(columns: IntArray, values: Floats, dual: Floats, count: int) -> Floats:
     """Multiply the transpose of rows (m, k) by (m, 3): (3, count)."""
     out = np.zeros((3, count), dual.dtype)
     for row in range(len(columns)):
@@ -140,7 +138,7 @@ def _spread(columns: IntArray, values: Array, dual: Array, count: int) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _squared(columns: IntArray, values: Array, metric: Array, field: Array) -> Array:
+def _squared(columns: IntArray, values: Floats, metric: Floats, field: Floats) -> Floats:
     """Multiply the transpose of rows (m, k) by metrics (m, 3, 3) times the rows times a field (3, n): (3, n)."""
     out, zero = np.zeros_like(field), field.dtype.type(0.0)
     for row in range(len(columns)):

@@ -1,101 +1,52 @@
 """Control-point optimisation: distortion, smoothness, boundary and injectivity of F together (section 4.3.2, step 3).
 
-The energy of energy.py is lowered in rounds (newton.py). After each the map is certified; what folds is weighed anew.
+The energy of energy.py is lowered in rounds (newton.py), phase after phase (phases.py). After each round the map is
+certified; what folds is weighed anew.
 """
 
 import logging
-import math
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-import torch
-from torch import Tensor
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from ..arrays import Array, IntArray, Knots
-from ..certificate.boundary import check_boundary
-from ..certificate.jacobian import Certificate, certify
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
-from ..progress import History, ProgressCallback, ignore
+from ..progress import History, Progress, ProgressCallback, ignore, timed
 from ..spline.bspline import breakpoints
-from ..spline.volume import BSplineVolume
-from .determinant_penalty import acting_on, edge_spans, with_neighbours
+from ..threads import one_blas_thread
+from .endings import Course, Reason
 from .energy import SplineEnergy
-from .newton import descend
+from .newton import FIRST_GAIN, LEAST_STEPS, Point, StoppingRule, descend
+from .optimized import Optimized
+from .phases import GIVING_WAY, PATIENT_ROUNDS, Grow, Phase, Schedule
+from .spans import edge_spans
+from .state import State
 from .surface_distance import SurfaceFit
+from .term import Weights
 
 _log = logging.getLogger(__name__)
-_CHECKPOINT = "spline"
-_COUNTS = ("number", "parting", "polished", "unproved", "fewest", "halved")  # of rounds and spans, in a checkpoint
-
-
-@dataclass(frozen=True, eq=False)
-class Optimized:
-    """Control points (3, n_u, n_v, n_w) at volume 1, and what is proved of them.
-
-    injective: True where the boundary is proved not to meet itself, False where it was found to, None where that is not
-    decided; it is asked of certified maps alone.
-    """
-
-    control: Tensor
-    certificate: Certificate
-    injective: bool | None
-
-    @classmethod
-    def of(cls, control: Tensor, knots: Knots, config: SplineConfig) -> "Optimized":
-        """Certify control points and, where that succeeds, check their boundary."""
-        volume = BSplineVolume((config.degree,) * 3, knots, control.permute(1, 2, 3, 0).cpu().numpy())
-        certificate = certify(volume)
-        injective = check_boundary(volume).injective if certificate.verdict == "certified" else None
-        return cls(control, certificate, injective)
-
-    @property
-    def meets_itself(self) -> bool:
-        """Whether the boundary of a certified map was found to meet itself."""
-        return self.injective is False
-
-    @property
-    def faults(self) -> tuple[int, bool]:
-        """What keeps the map from being one-to-one; fewer unproved spans count first."""
-        return len(self.certificate.unproved), self.meets_itself
-
-    @property
-    def rank(self) -> tuple[int, bool, bool]:
-        """The faults, and whether the boundary is undecided: of two maps the one with the lower rank is better."""
-        return *self.faults, self.injective is None
+_SPAN_GROWTH = 5.0  # factor of the penalty's weight at unproved spans, each round
+_SPAN_MOST = 125.0  # of these factors together
 
 
 def optimize(
-    control: Tensor,
+    control: Array,
     knots: Knots,
     surface: SurfaceFit,
     config: SplineConfig,
+    schedule: Schedule,
+    weights: Weights = Weights(),  # noqa: B008 - frozen
     *,
     history: History,
     progress: ProgressCallback = ignore,
     checkpoints: Checkpoints | None = None,
     begun: int = 0,
     watched: IntArray | None = None,
-) -> Optimized:
-    """Minimise from `control` (3, n_u, n_v, n_w), volume 1, in rounds: descend, certify, watch the spans not proved.
+) -> tuple[Optimized, Course]:
+    """Minimise from `control` (3, n_u, n_v, n_w), volume 1, phase after phase, in rounds: descend, certify, weigh anew.
 
-    Each round raises the weight of the penalties on det J, so the first ones shape the map and the later ones
-    unfold what is left. Where spans stay unproved, the penalty on them and their neighbours grows further, and after
-    `firm_rounds` the surface data near them loses weight. Where few of them stay for `smoothing_rounds`, F is smoothed
-    there. Unless F still grows, the rounds end without a certified map where `stalling` of them have not halved the
-    number of unproved spans, and after `firm_rounds` where more than `most_watched` spans are unproved or F is farther
-    than `far` from the surface, root mean square: that of growth after the first round in which F no longer grows.
-
-    Where the boundary of a certified map meets itself, up to `parting` rounds push it apart, and the surface data there
-    lose weight; where it still does then, the rounds end. Once the map is certified, a few more rounds take back what
-    the data has lost, step by step, as far as they can. What these rounds fold again is moved back; where it cannot be
-    and the next round does not unfold it but folds more, the rounds end. Anchors along the
-    cube's edges draw F to the surface in those last rounds and, where it is close to begin with, in the first ones: not
-    while what is folded comes apart. The result is the last certified map whose boundary is proved not to meet itself,
+    Return a map, and how the rounds went. It is the last certified map whose boundary is proved not to meet itself,
     else the last one where that is not decided, else the last certified one, else the one with the fewest unproved
     spans.
 
@@ -103,214 +54,92 @@ def optimize(
     A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
-    with one_thread_an_operation():
-        energy = SplineEnergy(config, knots, surface)
-        energy.barrier.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))  # type: ignore[arg-type]
+    with one_blas_thread():
+        energy = SplineEnergy(knots, surface, weights)
+        energy.determinants.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))
         if watched is not None:
-            energy.barrier.activate(watched)
-        first = Optimized.of(control, knots, config)
+            energy.determinants.activate(watched)
+        first = Optimized.of(control, knots, config.degree)
         places = surface.places.parameters, surface.places.cube_faces
-        near = energy.anchors.near(control)
-        rounds = _Rounds(energy, knots, control, first, places, near=near, number=begun, halved=begun)
-        if (saved := checkpoints.load(_CHECKPOINT)) is not None:
-            rounds.restore(*saved, history)
-        while not rounds.finished:
-            rounds.begin()
-            lowered = descend(
-                energy, rounds.control, rounds.number, growing=rounds.growing, history=history, progress=progress
-            )
-            rounds.conclude(lowered)
-            rounds.save(checkpoints, history)
-        surface.places.place(*rounds.best_places)
-    return rounds.best
+        state = State(energy, knots, control, first, places, energy.anchors.near(control), number=begun, halved=begun)
+        state.restore(checkpoints, history)
+
+        def one_round(phase: Phase) -> None:
+            with timed(state.seconds, phase.name):
+                _round(state, phase, schedule, _StepReport(state.number, config.steps, schedule, history, progress))
+            state.save(checkpoints, history)
+
+        ending = _run(state, schedule, one_round)
+        surface.places.place(*state.best_places)
+    _log.info("%s: %s", ending, ending.sentence)
+    return state.best, Course(state.rounds, state.seconds, ending)
 
 
-@contextmanager
-def one_thread_an_operation() -> Iterator[None]:
-    """Most tensors here are small: handing them to a second thread costs more than it saves (up to 4 times).
+def _run(state: State, schedule: Schedule, one_round: Callable[[Phase], None]) -> Reason:
+    """Go through the phases, each round by round until it is over; return why the last one of them was."""
+    for phase in schedule.phases:
+        while (reason := phase.done(state)) is None:
+            if state.number >= schedule.rounds:
+                return Reason.OUT_OF_ROUNDS
+            one_round(phase)
+        if reason.ends_the_rounds:
+            return reason
+    raise AssertionError("the last phase does not end the rounds")
 
-    A thread of `in_parallel` begins with torch's setting at its first operation and keeps it. All torch work in pieces
-    belongs under this: else such a thread splits its sums, and bits depend on which thread takes a piece.
-    """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
+
+def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport") -> None:
+    """Weigh, descend, certify; then watch the spans not proved and let the surface give way near them."""
+    energy, number, grows = state.energy, state.number, isinstance(phase, Grow)
+    share, steps = (phase.shares[number], phase.steps) if isinstance(phase, Grow) else (None, report.most)
+    phase.begin(state)
+    energy.start_round(state.control, phase.penalty(number), share)
+    rule = StoppingRule(steps, schedule.gain if number else FIRST_GAIN)
+    control = descend(energy, state.control, rule, report)
+    found = Optimized.of(control, state.knots, energy.degree)
+    state.last_square = energy.surface.mean_square(control)
+    found = phase.amended(state, found)
+    verdict, unproved = found.certificate.verdict, found.certificate.unproved
+    meets = ", the boundary meets itself" if found.meets_itself else ""
+    _log.info("round %d, %s: %s, %d spans unproved%s", number, phase.name, verdict, len(unproved), meets)
+    state.control, state.unproved_before, state.unproved = found.control, state.unproved, len(unproved)
+    state.certified |= not grows and verdict == "certified"
+    if number == 0 or grows or found.rank <= state.best.rank:
+        state.keep(found)
+    if not state.many:
+        energy.determinants.activate(unproved)
+    if number >= PATIENT_ROUNDS and len(unproved):
+        energy.determinants.stiffen(unproved, _SPAN_GROWTH, _SPAN_MOST)
+    if number >= phase.firm and len(unproved):
+        energy.give_way(unproved, GIVING_WAY)
+    if 2 * len(unproved) <= state.fewest or number <= schedule.grown:
+        state.fewest, state.halved = len(unproved), number
+    state.number += 1
+    state.rounds[phase.name] += 1
 
 
 @dataclass
-class _Rounds:
-    """Where the optimisation stands between two rounds; number, parting and polished count those done."""
+class _StepReport:
+    """Tells history and progress of each step of a round."""
 
-    energy: SplineEnergy
-    knots: Knots
-    control: Tensor
-    best: Optimized
-    best_places: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their cube faces (N,)
-    near: bool  # whether F was close to the surface all along the cube's edges to begin with
-    number: int = 0
-    certified: bool = False  # whether a round on these knots has ended with a certified map
-    parting: int = 0  # rounds in which the boundary of a certified map that meets itself is pushed apart
-    polished: int = 0  # rounds after that, or after the map was certified for the first time
-    unproved: int = 0  # spans that the last round has left so
-    fewest: int = sys.maxsize  # spans unproved when their number was last halved
-    halved: int = 0  # the round in which that was
-    off: float = math.inf  # mean squared distance of the best map from the surface
-    lost: bool = False  # whether further rounds would bring no better map
+    number: int  # of the round
+    most: int  # steps a round
+    schedule: Schedule
+    history: History
+    progress: ProgressCallback
+    step: int = 0
+    begun: float = field(default_factory=time.perf_counter)
 
-    @property
-    def finished(self) -> bool:
-        """Whether no round is left, or the last polish has left nothing to take back."""
-        config = self.energy.config
-        polished = self.polished == config.polish or (self.polished > 0 and self.settled and not self.energy.yields)
-        return self.number >= config.rounds or polished or self.lost
+    def __call__(self, point: Point) -> None:
+        """Report where a step has led to."""
+        done, usual = self.number * self.most + self.step, self.schedule.usual_steps
+        self.history.add("spline", done, point.total, point.folded, {"surface": point.outer[0]})
+        seconds, self.begun = time.perf_counter() - self.begun, time.perf_counter()
+        total, left = max(self.number + 1, len(usual)) * self.most, seconds * self._expected_steps()
+        self.progress(Progress("spline", done + 1, total, point.total, point.folded, left))
+        self.step += 1
 
-    @property
-    def growing(self) -> bool:
-        """Whether the next round is one of those in which F grows into the solid."""
-        return self.number < len(self.shares)
-
-    @property
-    def shares(self) -> tuple[float, ...]:
-        """The shares of the weight of the surface's data in the rounds in which F grows; none for other maps."""
-        growth = self.energy.config.growth
-        return () if growth is None else growth.shares
-
-    @property
-    def settled(self) -> bool:
-        """Whether the last round has ended with the best map, not with one that folds again."""
-        return torch.equal(self.control, self.best.control)
-
-    def begin(self) -> None:
-        """Weigh penalties, surface data and anchors for the next round."""
-        config, energy = self.energy.config, self.energy
-        if self.certified and self.best.meets_itself and self.parting < config.parting:
-            self.parting += 1
-            energy.give_way(energy.watch_contact(self.control), config.contact_way)
-        elif self.certified:
-            self.polished += 1
-            if self.parting:
-                energy.watch_contact(self.control)
-            if self.settled:
-                energy.take_back(config.giving_way)
-        if self.polished or (self.near and self.number < config.patient_rounds):
-            energy.anchors.aim(self.control, hold=not self.polished)
-        else:
-            energy.anchors.release()
-        penalty = config.penalties[min(self.number, len(config.penalties) - 1)]
-        energy.start_round(self.control, penalty, self.shares[self.number] if self.growing else None)
-
-    def conclude(self, control: Tensor) -> None:
-        """Certify what the round has found; watch the spans not proved and let the surface give way near them."""
-        config = self.energy.config
-        found, distance = Optimized.of(control, self.knots, config), self.energy.surface.mean_square(control)
-        if self.polished:
-            found = self._mended(found)
-        elif not self.certified:
-            found = self._smoothed(found)
-        self.control, unproved = found.control, found.certificate.unproved
-        meets = ", the boundary meets itself" if found.meets_itself else ""
-        _log.info("round %d: %s, %d spans unproved%s", self.number, found.certificate.verdict, len(unproved), meets)
-        self.certified |= not self.growing and found.certificate.verdict == "certified"
-        if self.number == 0 or self.growing or found.rank <= self.best.rank:
-            places = self.energy.surface.places
-            self.best, self.best_places = found, (places.parameters, places.cube_faces)
-            self.off = self.energy.surface.mean_square(found.control)
-        many = len(unproved) > config.most_watched
-        if not many:
-            self.energy.barrier.activate(unproved)
-        if self.number >= config.patient_rounds and len(unproved):
-            self.energy.barrier.stiffen(unproved, config.span_growth, config.span_most)
-        if self.number >= config.firm_rounds and not self.polished and len(unproved):
-            self.energy.give_way(unproved, config.giving_way)
-        if 2 * len(unproved) <= self.fewest or self.number <= len(self.shares):
-            self.fewest, self.halved = len(unproved), self.number
-        self.number += 1
-        worse = self.polished > 0 and (many or 0 < self.unproved < len(unproved))
-        self.unproved = len(unproved)
-        self.lost = not self.growing and (worse or self._hopeless(many, distance))
-
-    def _hopeless(self, many: bool, distance: float) -> bool:
-        """Return whether further rounds would not part a boundary that meets itself, or not unfold F at the surface.
-
-        many: whether more than `most_watched` spans are unproved. distance: mean squared, of what the steps have led
-        to; where F is smoothed after them, it is farther for a while.
-        """
-        config = self.energy.config
-        if self.certified:
-            return self.best.meets_itself and (self.parting == config.parting or distance > config.parted**2)
-        if self.number > self.halved + config.stalling:
-            return True
-        just_grown = self.number == len(self.shares) + 1
-        far = config.growth.far if config.growth and just_grown else config.far
-        return self.number >= config.firm_rounds and (many or distance > far**2)
-
-    def _smoothed(self, found: Optimized) -> Optimized:
-        """Smooth the map near spans that the last rounds have not unfolded; return it where fewer are unproved then."""
-        unproved, config = found.certificate.unproved, self.energy.config
-        stalled = not self.growing and self.number >= max(config.firm_rounds, self.halved + config.smoothing_rounds)
-        if not stalled or not 0 < len(unproved) <= config.most_smoothed:
-            return found
-        smoothed = Optimized.of(self.energy.smoothed(found.control, unproved), self.knots, config)
-        _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.certificate.unproved))
-        return smoothed if smoothed.faults < found.faults else found
-
-    def _mended(self, found: Optimized) -> Optimized:
-        """Move what folds again back to where it was certified; return the map found where that brings nothing."""
-        config, held = self.energy.config, np.zeros(self.energy.barrier.weights.shape, dtype=bool)
-        mended = found
-        for _ in range(config.mendings):
-            unproved = mended.certificate.unproved
-            if not 0 < len(unproved) <= config.most_watched:
-                break
-            held |= with_neighbours(unproved, held.shape)
-            back = torch.from_numpy(acting_on(held, config.degree))
-            mended = Optimized.of(torch.where(back, self.best.control, found.control), self.knots, config)
-        if mended is found or mended.rank > self.best.rank:
-            return found
-        places = self.energy.surface.places
-        before = places.parameters, places.cube_faces
-        self.energy.slide(mended.control)
-        if self.energy.surface.mean_square(mended.control) >= self.off:
-            places.place(*before)
-            return found
-        self.energy.barrier.activate(found.certificate.unproved)
-        self.energy.give_way(found.certificate.unproved, config.giving_way)
-        _log.info("moved back near %d spans", len(found.certificate.unproved))
-        return mended
-
-    def save(self, checkpoints: Checkpoints, history: History) -> None:
-        """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
-        surface, anchors = self.energy.surface, self.energy.anchors.fit
-        tensors = {
-            "control": self.control,
-            "best": self.best.control,
-            "best_parameters": torch.as_tensor(self.best_places[0]),
-            "best_cube_faces": torch.as_tensor(self.best_places[1]),
-            "parameters": torch.as_tensor(surface.places.parameters),
-            "cube_faces": torch.as_tensor(surface.places.cube_faces),
-            "yielding": torch.as_tensor(surface.yielding),
-            "anchors": torch.as_tensor(anchors.points),
-            "anchors_yielding": torch.as_tensor(anchors.yielding),
-            "span_weights": torch.as_tensor(self.energy.barrier.weights),
-        }
-        counts = {name: getattr(self, name) for name in _COUNTS}
-        state = counts | {"certified": self.certified, "lost": self.lost, "off": self.off, "history": history.rows}
-        checkpoints.save(_CHECKPOINT, tensors, state)
-
-    def restore(self, tensors: dict[str, Tensor], state: dict[str, Any], history: History) -> None:
-        """Continue from a checkpoint that `save` has kept."""
-        energy = self.energy
-        energy.surface.places.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
-        energy.surface.give_way(tensors["yielding"].numpy())
-        energy.anchors.restore(tensors["anchors"].numpy(), tensors["anchors_yielding"].numpy())
-        energy.barrier.weigh(tensors["span_weights"].numpy())
-        self.control = tensors["control"]
-        self.best = Optimized.of(tensors["best"], self.knots, energy.config)
-        self.best_places = tensors["best_parameters"].numpy(), tensors["best_cube_faces"].numpy()
-        for name in _COUNTS:
-            setattr(self, name, int(state[name]))
-        self.certified, self.lost, self.off = bool(state["certified"]), bool(state["lost"]), float(state["off"])
-        history.rows[:] = [tuple(row) for row in state["history"]]
+    def _expected_steps(self) -> int:
+        """Return how many steps are left after this one where the run is a usual one; hard shapes take more."""
+        usual = [min(count, self.most) for count in self.schedule.usual_steps]
+        present = usual[self.number] if self.number < len(usual) else LEAST_STEPS
+        return max(present - self.step - 1, 1) + sum(usual[self.number + 1 :])

@@ -10,16 +10,15 @@ from functools import cached_property
 
 import numba
 import numpy as np
-from torch import Tensor
 
 from ..arrays import Array, IntArray, Knots, Mask
 from ..cube.cube import damped_solution, nearest_faces
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints
 from ..threads import in_parallel
-from .determinant_penalty import with_neighbours
 from .face_window import FaceWindow, Polynomials, fill_tangents, fill_window, polynomials_of
 from .operators import ControlRows, pieces
+from .spans import with_neighbours
 
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3
@@ -55,7 +54,7 @@ class SlidingParameters:
         other.place(self.parameters, self.cube_faces)
         return other
 
-    def values(self, control: Tensor) -> Array:
+    def values(self, control: Array) -> Array:
         """Return F at the parameters: (N, 3)."""
         return self.window.derivatives(control)[0]
 
@@ -71,7 +70,7 @@ class SlidingParameters:
         return with_neighbours(spans, shape)[tuple(self.spans().T)]
 
     def slide(
-        self, control: Tensor, points: Array, max_step: float, *, keep_layout: bool = False, reach: float = np.inf
+        self, control: Array, points: Array, max_step: float, *, keep_layout: bool = False, reach: float = np.inf
     ) -> None:
         """Take one Gauss-Newton step of every parameter towards where F's boundary is closest to its point (N, 3).
 
@@ -79,7 +78,7 @@ class SlidingParameters:
         that would end up farther away, and those farther away than `reach`, stay where they are; with `keep_layout`
         steps that would flip a triangle are shortened.
         """
-        window, field = self.window, control.reshape(3, -1).numpy()
+        window, field = self.window, control.reshape(3, -1)
         polynomials, before = self._polynomials, (self.parameters, self.cube_faces)
 
         def part(rows: slice) -> tuple[Array, ...]:
@@ -105,7 +104,7 @@ class SlidingParameters:
             self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
         self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
 
-    def at_closest_points(self, control: Tensor, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
+    def at_closest_points(self, control: Array, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
         """Return the parameters where F's boundary is closest to their points (N, 3), as far as no triangle flips.
 
         They slide `slides` times; triangles that this flips are relaxed in at most so many sweeps; then they slide as

@@ -6,13 +6,14 @@ on sharp edges across both sides, at corners in all directions.
 """
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from ..arrays import Array, Knots, Mask
 from ..surface.geometry import vertex_normals
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
+from .term import RoundWeights
+
+TANGENTIAL = 2e-4  # share of the distance within the tangent plane: holds what slides, and hardly draws F
 
 
 class SurfaceFit:
@@ -48,7 +49,6 @@ class SurfaceFit:
     def aim(self, points: Array, quadrics: Array) -> None:
         """Take other points (N, 3) and quadrics (N, 3, 3)."""
         self.points, self._quadrics = points, quadrics
-        self._points = torch.as_tensor(points)
         self.give_way(self.yielding)
 
     def give_way(self, yielding: Array) -> None:
@@ -56,28 +56,31 @@ class SurfaceFit:
         self.yielding = yielding
         self.weights = yielding * self._weights
         quadrics = np.where(self._held[:, None, None], np.eye(3), self._quadrics)
-        self._metric = torch.as_tensor(self.weights[:, None, None] * quadrics)
+        self._metric = self.weights[:, None, None] * quadrics
 
     def hold(self, held: Mask) -> None:
         """Count the distance of these points (N,) in all directions, that of the others as the quadrics say."""
         self._held = held
         self.give_way(self.yielding)
 
-    def energy_and_gradient(self, control: Tensor) -> tuple[float, Tensor]:
+    def weight(self, weights: RoundWeights) -> float:
+        """Return that of the distance from the surface."""
+        return weights.surface
+
+    def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the sum of r^T Q r at the present parameters and its gradient (3, n_u, n_v, n_w)."""
-        residual = self.places.rows(control) - self._points  # (N, 3)
-        pulled = (self._metric @ residual[:, :, None])[:, :, 0]
-        return float((residual * pulled).sum()), 2.0 * self.places.rows.adjoint(pulled, control)
+        residual = self.places.rows(control) - self.points  # (N, 3)
+        pulled = np.einsum("nij,nj->ni", self._metric, residual)
+        return float(np.vdot(residual, pulled)), 2.0 * self.places.rows.adjoint(pulled, control)
 
-    def hessian(self, dtype: torch.dtype) -> PiecewiseOperator:
-        """Return the second derivative of the energy, parameters held, as an operator on (3, n_u, n_v, n_w)."""
-        rows, metric = self.places.rows.to(dtype), 2.0 * self._metric.to(dtype)
-        return rows.squared(metric.numpy())
+    def curvature(self, control: Array) -> PiecewiseOperator:
+        """Return the second derivative of the energy, parameters held, as an operator in single precision."""
+        return self.places.rows.in_single().squared(2.0 * self._metric.astype(np.float32))
 
-    def residuals(self, control: Tensor) -> Array:
+    def residuals(self, control: Array) -> Array:
         """Return F(p) - v: (N, 3)."""
         return self.places.values(control) - self.points
 
-    def mean_square(self, control: Tensor) -> float:
+    def mean_square(self, control: Array) -> float:
         """Return the mean of |F(p) - v|^2 at the present parameters."""
         return float(np.square(self.residuals(control)).sum(axis=1).mean())

@@ -3,16 +3,16 @@
 See operators.py for how control points are held, and how pieces of work are added.
 """
 
+import math
 from collections.abc import Callable
 from copy import copy
 from typing import Any
 
 import numba
 import numpy as np
-import torch
-from torch import Tensor
+from scipy.linalg import eigh
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, Floats, IntArray
 from ..spline.bspline import breakpoints, collocation, gauss_points
 
 _END_SPANS = 1
@@ -22,12 +22,12 @@ _POINTS = 256  # at a time: their matrices stay in the cache
 SYMMETRIC = np.array([[max(a, b) * (max(a, b) + 1) // 2 + min(a, b) for b in range(9)] for a in range(9)])
 
 
-def along(matrix: Tensor, field: Tensor, axis: int) -> Tensor:
+def along(matrix: Floats, field: Floats, axis: int) -> Floats:
     """Apply a matrix (m, n) along one axis of a field, in as few and as large products as the layout allows."""
     before, after = field.shape[:axis], field.shape[axis + 1 :]
     if not after:
-        return field @ matrix.T
-    return (matrix @ field.reshape(-1, field.shape[axis], after.numel())).view(*before, len(matrix), *after)
+        return (field.reshape(-1, field.shape[axis]) @ matrix.T).reshape(*before, len(matrix))
+    return (matrix @ field.reshape(-1, field.shape[axis], math.prod(after))).reshape(*before, len(matrix), *after)
 
 
 Band = tuple[Any, ...]  # of matrices: first columns (m,), entries from there on (m, k) each
@@ -79,21 +79,19 @@ class GaussGrid:
         u, v, w = self._spans
         return np.ascontiguousarray(np.swapaxes(values[np.ix_(u, v, w)], 1, 2)).reshape(self.weights.shape)
 
-    def jacobian(self, control: Tensor, planes: slice) -> Tensor:
+    def jacobian(self, control: Floats, planes: slice) -> Floats:
         """Return J (component, direction, point) on some planes: (3, n_u, n_v, n_w) -> (3, 3, m)."""
-        field = np.ascontiguousarray(control.numpy())
-        return torch.from_numpy(_jacobian(self._forward(planes, field.dtype), field))
+        return np.asarray(_jacobian(self._forward(planes, control.dtype), control))
 
-    def adjoint(self, dual: Tensor, planes: slice) -> tuple[int, Array]:
+    def adjoint(self, dual: Floats, planes: slice) -> tuple[int, Floats]:
         """Apply the transpose of `jacobian`: the first layer of control points, and what all layers get from it."""
-        field = np.ascontiguousarray(dual.numpy())
-        layer, backward = self._backward(planes, field.dtype)
-        return layer, _jacobian_adjoint(backward, field)
+        layer, backward = self._backward(planes, dual.dtype)
+        return layer, _jacobian_adjoint(backward, dual)
 
-    def squared(self, matrices: Array, planes: slice) -> Callable[[Tensor], tuple[int, Array]]:
+    def squared(self, matrices: Floats, planes: slice) -> Callable[[Floats], tuple[int, Floats]]:
         """Return `jacobian`, then symmetric matrices (45, m) on its nine entries, see SYMMETRIC, then `adjoint`."""
         forward, (layer, backward) = self._forward(planes, matrices.dtype), self._backward(planes, matrices.dtype)
-        return lambda control: (layer, _squared_jacobian(forward, backward, matrices, control.numpy()))
+        return lambda control: (layer, _squared_jacobian(forward, backward, matrices, control))
 
     def _forward(self, planes: slice, dtype: Any) -> tuple[Band, ...]:
         (first, values, slopes), *across = self._bands[dtype][0]
@@ -104,11 +102,11 @@ class GaussGrid:
         (first, values, slopes), *_ = self._forward(planes, dtype)
         return int(first[0]), ((first - first[0], values, slopes), *self._bands[dtype][1][1:])
 
-    def collect(self, parts: list[tuple[int, Array]], like: Tensor) -> Tensor:
+    def collect(self, parts: list[tuple[int, Floats]], like: Floats) -> Floats:
         """Add what the pieces of work give to the layers of control points, in their order."""
-        total = torch.zeros_like(like)
+        total = np.zeros_like(like)
         for first, layers in parts:
-            total[:, first : first + layers.shape[1]] += torch.from_numpy(layers)
+            total[:, first : first + layers.shape[1]] += layers
         return total
 
 
@@ -225,25 +223,18 @@ class FastDiagonalization:
     matrices: three symmetric A_d (n, n); mass: three M_d. Three generalised eigenproblems, then products only.
     """
 
-    def __init__(self, matrices: tuple[Tensor, ...], mass: tuple[Tensor, ...], shift: float = 0.0) -> None:
-        vectors, values = [], []
-        for a, m in zip(matrices, mass, strict=True):
-            factor = torch.linalg.cholesky(m)
-            half = torch.linalg.solve_triangular(factor, a, upper=False)
-            value, vector = torch.linalg.eigh(torch.linalg.solve_triangular(factor, half.T, upper=False))
-            vectors.append(torch.linalg.solve_triangular(factor.T, vector, upper=True))
-            values.append(value)
-        self._vectors = tuple(vectors)
-        u, v, w = values
-        self._inverse = 1.0 / (u[:, None, None] + v[:, None] + w + shift)
+    def __init__(self, matrices: tuple[Array, ...], mass: tuple[Array, ...], shift: float = 0.0) -> None:
+        (u, v, w), self._vectors = zip(*(eigh(a, m) for a, m in zip(matrices, mass, strict=True)), strict=True)
+        self._inverse: Floats = 1.0 / (u[:, None, None] + v[:, None] + w + shift)
 
-    def to(self, dtype: torch.dtype) -> "FastDiagonalization":
-        """Return the same in another precision."""
+    def in_single(self) -> "FastDiagonalization":
+        """Return the same in single precision."""
         other = copy(self)
-        other._vectors, other._inverse = tuple(v.to(dtype) for v in self._vectors), self._inverse.to(dtype)
+        other._vectors = tuple(vectors.astype(np.float32) for vectors in self._vectors)
+        other._inverse = self._inverse.astype(np.float32)
         return other
 
-    def __call__(self, residual: Tensor) -> Tensor:
+    def __call__(self, residual: Floats) -> Floats:
         """Apply the inverse: (3, n_u, n_v, n_w) -> the same shape."""
         for axis, vectors in enumerate(self._vectors, start=1):
             residual = along(vectors.T, residual, axis)

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from ..arrays import IntArray
 from ..cube.cube import CORNERS
-from ..optimization.polar import closest_rotation, cofactor, determinant
+from .matrices import closest_rotation, cofactor, determinant
 from .network import InverseMap, map_in_pieces
 from .samples import OFFSETS, Stencils, TriangleSampler, gather
 from .stages import Stage

@@ -2,9 +2,11 @@
 
 from math import pi
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from ..arrays import Array
 from ..cube.cube import axis_and_side
 
 
@@ -20,6 +22,11 @@ def nearest_on_cube(points: Tensor) -> Tensor:
     to_face, axis = torch.minimum(clamped, 1.0 - clamped).min(dim=1, keepdim=True)  # (m, 1)
     on_face = clamped.scatter(1, axis, clamped.gather(1, axis).round())
     return torch.where(to_face > 0.0, on_face, clamped)
+
+
+def nearest_places(points: Array) -> Array:
+    """Return `nearest_on_cube` of arrays: (m, 3) -> (m, 3)."""
+    return np.asarray(nearest_on_cube(torch.as_tensor(points)))
 
 
 def nearest_on_cube_face(points: Tensor, face: Tensor) -> Tensor:

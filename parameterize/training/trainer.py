@@ -21,6 +21,7 @@ from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targe
 from ..cube.layout import CubeLayout
 from ..cube.turning import best_turn, hollowness
 from ..progress import History, Progress, ProgressCallback
+from .backend import PRECISIONS
 from .losses import BoundarySamples, EdgePaths, Objective
 from .network import InverseMap
 from .optimizer import TrainingOptimizer
@@ -59,23 +60,24 @@ class Trainer:
         config: Config,
         *,
         seed: int,
-        device: torch.device,
-        dtype: torch.dtype,
+        device: str,
+        dtype: str,
         given_corners: IntArray | None,
         history: History,
         progress: ProgressCallback,
         checkpoints: Checkpoints,
     ) -> None:
-        self.config, self.seed, self.device, self.dtype = config, seed, device, dtype
+        self.config, self.seed = config, seed
+        self.device, self.dtype = torch.device(device), PRECISIONS[dtype]
         self.vertices, self.faces, self.corners = vertices, faces, given_corners
         self.history, self.progress, self.checkpoints = history, progress, checkpoints
         self.generator = torch.Generator()
         first_weights = torch.Generator().manual_seed(seed % 2**63)
-        self.network = InverseMap(config.network, first_weights).to(device=device, dtype=dtype)
+        self.network = InverseMap(config.network, first_weights).to(device=self.device, dtype=self.dtype)
         if config.train.whiten:
             first = start_map(interior_points(vertices, faces, config.train.cell))
             self.network.affine.copy_(self._tensor(first))
-        inside = stencils(vertices, faces, config.train.cell, device=device, dtype=dtype)
+        inside = stencils(vertices, faces, config.train.cell, device=self.device, dtype=self.dtype)
         self.objective = Objective(self.network, inside)
 
     def run(self, *, give_up: bool = False) -> InverseMap | None:
@@ -86,7 +88,7 @@ class Trainer:
         with a warning: the spline stage moves edges anyway. Raises PathError instead where the user gave the corners.
         """
         given, limit = self.corners is not None, self.config.train.easy_loss
-        saved = self.checkpoints.load(_CHECKPOINT)
+        saved = self._saved()
         first = int(saved[1]["number"]) if saved else 0
         for number, stage in list(enumerate(self.config.stages))[first:]:
             run = self._load_run(*saved) if saved else _Run(number, 0, self._state(), self._state())
@@ -103,14 +105,16 @@ class Trainer:
             elif number == self._race_stage:
                 run, optimizer = self._race(number, boundary)
             self._train(run, boundary, optimizer)
-            if give_up and number == 0 and limit is not None and self._misfit(stage) > limit:
-                return None
+            if number == 0 and limit is not None and self._misfit(stage) > limit:
+                if give_up:
+                    return None
+                _log.warning("the shape is hard for the network, and trained to the end: no other start may follow")
             saved = None
         return self.network
 
     def map(self, points: Array) -> Array:
         """Return G at points (m, 3), as float64."""
-        return map_points(self.network, points, self.device, self.dtype)
+        return map_points(self.network, points)
 
     def mapped(self) -> Array:
         """Return G at the surface's vertices (n, 3), as the network is now."""
@@ -244,7 +248,16 @@ class Trainer:
             "corners": None if self.corners is None else self.corners.tolist(),
             "history": self.history.rows,
         }
-        self.checkpoints.save(_CHECKPOINT, tensors, state)
+        self.checkpoints.save(_CHECKPOINT, {name: t.detach().cpu().numpy() for name, t in tensors.items()}, state)
+
+    def _saved(self) -> tuple[State, dict[str, Any]] | None:
+        """Return the tensors and the state of the checkpoint; None where there is none.
+
+        The tensors are copies: sums over memory that lies otherwise than in the first run round differently.
+        """
+        if (saved := self.checkpoints.load(_CHECKPOINT)) is None:
+            return None
+        return {name: torch.tensor(array) for name, array in saved[0].items()}, saved[1]
 
     def _load_run(self, tensors: State, state: dict[str, Any]) -> _Run:
         """Restore everything but the optimiser; leave the network as it was at the start of the stage."""
@@ -277,9 +290,7 @@ def _part(tensors: State, prefix: str) -> State:
 
 
 @torch.no_grad()
-def map_points(
-    network: InverseMap, points: Array, device: torch.device, dtype: torch.dtype, block: int = 65_536
-) -> Array:
-    """Return G at points (m, 3) as float64, computed in blocks."""
-    pieces = torch.as_tensor(points, dtype=dtype, device=device)
+def map_points(network: InverseMap, points: Array, block: int = 65_536) -> Array:
+    """Return G at points (m, 3) as float64, computed in blocks, where the network is and in its precision."""
+    pieces = torch.as_tensor(points).to(network.affine)
     return np.asarray(torch.cat([network(piece) for piece in torch.split(pieces, block)]).double().cpu())

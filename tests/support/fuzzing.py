@@ -35,7 +35,6 @@ from pathlib import Path
 import formulas
 import meshio
 import numpy as np
-import torch
 from mesh_files import (
     CUBE,
     MIXED,
@@ -366,12 +365,12 @@ def npz_reader(name, read, *things):
 
 
 def checkpoint_reader():
-    """Header and tensors are the pieces, the header's length goes before them."""
+    """Header and arrays are the pieces, the header's length goes before them."""
 
     def save(path):
-        tensors = {"now.weight": torch.arange(12.0).reshape(3, 4), "adam.0.step": torch.tensor(3.0)}
+        arrays = {"now.weight": np.arange(12.0).reshape(3, 4), "adam.0.step": np.array(3.0)}
         state = {"number": 1, "step": 7, "best_key": [0, 0.5], "corners": None, "history": [["S(2)", 0, 1.0, 0, {}]]}
-        Checkpoints(path.parent, IDENTITY, resume=True).save(path.stem, tensors, state)
+        Checkpoints(path.parent, IDENTITY, resume=True).save(path.stem, arrays, state)
 
     content = written(save, ".safetensors")
     start = 8 + int.from_bytes(content[:8], "little")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from shapes import rounded_cube, turned
 
-from parameterize.config import GrowthConfig, NetworkConfig, preset
+from parameterize.config import NetworkConfig, preset
 from parameterize.surface.surface import surface_from_arrays
 
 BATCH_WORKER = Path(__file__).with_name("batch_worker.py")
@@ -22,8 +22,8 @@ def shortened(config):
         network=NetworkConfig(width=16, modules=1, frequencies=3),
         train=replace(config.train, cell=0.2, triangles=200, easy_loss=None),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
-        spline=replace(config.spline, fit_cell=0.1, steps=3, penalties=(20.0, 500.0), rounds=2),
-        growth=GrowthConfig(shares=(0.1, 1.0), steps=3, rounds=2),
+        spline=replace(config.spline, fit_cell=0.1, steps=3, rounds=2),
+        steps_factor=0.25,
     )
 
 

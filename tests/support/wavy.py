@@ -1,12 +1,11 @@
 """A wavy cube as a spline, and points on the boundary of its parameters."""
 
 import numpy as np
-import torch
 
 from parameterize.cube.cube import nearest_faces
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
-from parameterize.training.target_shapes import nearest_on_cube
+from parameterize.training.target_shapes import nearest_places
 
 DEGREE = 3
 KNOTS = (open_uniform_knots(6, DEGREE), open_uniform_knots(5, DEGREE), open_uniform_knots(7, DEGREE))
@@ -15,14 +14,13 @@ KNOTS = (open_uniform_knots(6, DEGREE), open_uniform_knots(5, DEGREE), open_unif
 def wavy_control(amplitude=0.02):
     rows = [greville(k, DEGREE) for k in KNOTS]
     points = np.stack(np.meshgrid(*rows, indexing="ij"))
-    return torch.as_tensor(points + amplitude * np.random.default_rng(0).uniform(-1.0, 1.0, points.shape))
+    return points + amplitude * np.random.default_rng(0).uniform(-1.0, 1.0, points.shape)
 
 
 def as_volume(control):
-    return BSplineVolume((DEGREE,) * 3, KNOTS, control.permute(1, 2, 3, 0).numpy())
+    return BSplineVolume((DEGREE,) * 3, KNOTS, np.moveaxis(control, 0, -1))
 
 
 def on_the_cube(count, seed=0):
-    points = torch.as_tensor(np.random.default_rng(seed).uniform(-0.2, 1.2, (count, 3)))
-    parameters = nearest_on_cube(points).numpy()
+    parameters = nearest_places(np.random.default_rng(seed).uniform(-0.2, 1.2, (count, 3)))
     return parameters, nearest_faces(parameters)

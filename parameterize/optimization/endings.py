@@ -1,0 +1,51 @@
+"""Why a phase of the rounds is over, and how the rounds went: names and numbers that the log and report.json carry."""
+
+from collections import Counter
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Reason(StrEnum):
+    """Why a phase is over, with a sentence that explains it."""
+
+    sentence: str
+
+    GROWN = "grown", "all of the surface's data draw F."
+    SHAPED = "shaped", "the rounds that shape F are done."
+    CERTIFIED = "certified", "det J > 0 is proved."
+    APART = "apart", "the boundary was not found to meet itself."
+    POLISHED = "certified and polished", "all of the surface's data have their whole weight again."
+    LESS_POLISHED = "certified, less polished", "some of the surface's data still have less weight; no polish is left."
+    FOLDS_AGAIN = "folds again in polish", "the data cannot have more weight: F folds more with it."
+    MEETS_ITSELF = "still meets itself", "the rounds that push the boundary apart are used up."
+    DRIFTED_AWAY = "drifted away while parting", "the boundary meets itself, and F is too far from the surface."
+    STALLED = "stalled", "too many rounds have not halved the number of unproved spans."
+    TOO_MANY_FOLDED = "too many folded spans", "more spans are folded than can be watched one by one."
+    TOO_FAR = "too far from the surface", "F is folded, and not close to the surface either."
+    OUT_OF_ROUNDS = "out of rounds", "the stage has had all its rounds."
+
+    def __new__(cls, name: str, sentence: str) -> "Reason":
+        """Return a member that is equal to its name."""
+        reason = str.__new__(cls, name)
+        reason._value_, reason.sentence = name, sentence
+        return reason
+
+    @property
+    def ends_the_rounds(self) -> bool:
+        """Whether no other phase follows."""
+        return self not in (Reason.GROWN, Reason.SHAPED, Reason.CERTIFIED, Reason.APART)
+
+
+@dataclass(frozen=True)
+class Course:
+    """How the rounds of a spline stage went: their number and wall seconds by phase, and why they ended."""
+
+    rounds: Counter[str]
+    seconds: dict[str, float]
+    ending: Reason
+
+    def after(self, earlier: "Course") -> "Course":
+        """Return the course of both, with the rounds of an earlier one counted first."""
+        names = earlier.seconds | self.seconds
+        seconds = {name: earlier.seconds.get(name, 0.0) + self.seconds.get(name, 0.0) for name in names}
+        return Course(earlier.rounds + self.rounds, seconds, self.ending)

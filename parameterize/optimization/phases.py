@@ -1,0 +1,233 @@
+"""The phases of a spline stage: each weighs what acts in its rounds, amends what they find, and says when it is over.
+
+F is shaped or grows, then unfolded until it is certified; its boundary is pushed apart where it meets itself; a last
+phase takes back what the surface's data have lost. Rounds are counted over the whole stage, from 0.
+"""
+
+import logging
+import sys
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from .endings import Reason
+from .newton import GAIN
+from .optimized import Optimized
+from .spans import acting_on, with_neighbours
+from .state import MOST_WATCHED, State
+
+_log = logging.getLogger(__name__)
+
+FULL_PENALTY = 2500.0  # weight on det J once F has its shape: what the surface's data fold then unfolds against them
+RAMP = (
+    20.0,
+    100.0,
+    500.0,
+    FULL_PENALTY,
+)  # one a round, for a map that starts folded: it may still take its shape through folds
+PATIENT_ROUNDS = 2  # of a stage: after them anchors let go, and the penalty grows at unproved spans
+FIRM_ROUNDS = 4  # after these the surface gives way at unproved spans, which more weight alone has not unfolded
+GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
+_CONTACT_WAY = 0.0625  # likewise where the boundary meets itself, of whose rounds there are few
+_STALLING = 8  # rounds in which the unproved spans are not halved: another start costs as much as waiting longer
+_SMOOTHING_ROUNDS = 2  # likewise; F is then smoothed there: no descent undoes some folds
+_MOST_SMOOTHED = 10  # spans that stay unproved: to smooth F near more of them would take its shape away
+_MENDINGS = 6  # attempts to restore certified control points around spans that fold again
+FAR = 0.02  # from the surface, root mean square: a folded map so far away has left the surface to unfold
+PARTED = 0.01  # likewise where sheets are pushed apart: a map so far away is worth no polish
+
+
+@dataclass(frozen=True)
+class Phase(ABC):
+    """Rounds with one aim.
+
+    penalties: on det J, one for each round of the stage, then the last again. firm: rounds of the stage after which the
+    surface's data give way at unproved spans.
+    """
+
+    name: ClassVar[str]
+    penalties: tuple[float, ...] = (FULL_PENALTY,)
+    firm: int = FIRM_ROUNDS
+
+    def penalty(self, number: int) -> float:
+        """Return the weight of the penalties on det J in a round."""
+        return self.penalties[min(number, len(self.penalties) - 1)]
+
+    def begin(self, state: State) -> None:
+        """Weigh data and anchors for the next round: anchors hold a map that starts close to the surface at first."""
+        if state.near and state.number < PATIENT_ROUNDS:
+            state.energy.anchors.aim(state.control, hold=True)
+        else:
+            state.energy.anchors.release()
+
+    def amended(self, state: State, found: Optimized) -> Optimized:
+        """Return the map that a round has found, or one made of it that is better."""
+        return found
+
+    @abstractmethod
+    def done(self, state: State) -> Reason | None:
+        """Return why the phase is over; None where it goes on."""
+
+
+@dataclass(frozen=True)
+class Grow(Phase):
+    """F grows from a cube: the surface's data draw it with a larger share of their weight, `shares`, round by round.
+
+    steps: of Newton's method in a round, at most.
+    """
+
+    name = "grow"
+    shares: tuple[float, ...] = ()
+    steps: int = 1
+
+    def done(self, state: State) -> Reason | None:
+        """End when all shares have been taken."""
+        return Reason.GROWN if state.number >= len(self.shares) else None
+
+
+@dataclass(frozen=True)
+class Shape(Phase):
+    """F takes its shape."""
+
+    name = "shape"
+
+    def done(self, state: State) -> Reason | None:
+        """End after the patient rounds, or with a certified map."""
+        if state.certified:
+            return Reason.CERTIFIED
+        return Reason.SHAPED if state.number >= PATIENT_ROUNDS else None
+
+
+@dataclass(frozen=True)
+class Unfold(Phase):
+    """Spans that stay unproved weigh more, the surface gives way near them, and few of them are smoothed.
+
+    far: distance from the surface, root mean square, with which a folded map is given up once it is firm; far_first:
+    likewise after `first` rounds of the stage, the first round in which F no longer grows.
+    """
+
+    name = "unfold"
+    far: float = FAR
+    far_first: float = FAR
+    first: int = 0
+
+    def amended(self, state: State, found: Optimized) -> Optimized:
+        """Smooth the map near spans that the last rounds have not unfolded; return it where fewer are unproved then."""
+        unproved, patience = found.certificate.unproved, max(self.firm, state.halved + _SMOOTHING_ROUNDS)
+        if state.number < patience or not 0 < len(unproved) <= _MOST_SMOOTHED:
+            return found
+        control = state.energy.smoothed(found.control, unproved)
+        smoothed = Optimized.of(control, state.knots, state.energy.degree)
+        _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.certificate.unproved))
+        return smoothed if smoothed.faults < found.faults else found
+
+    def done(self, state: State) -> Reason | None:
+        """End with a certified map, or where further rounds would not unfold F at the surface."""
+        if state.certified:
+            return Reason.CERTIFIED
+        if state.number > state.halved + _STALLING:
+            return Reason.STALLED
+        if state.number < self.firm:
+            return None
+        if state.many:
+            return Reason.TOO_MANY_FOLDED
+        far = self.far_first if state.number == self.first else self.far
+        return Reason.TOO_FAR if state.last_square > far**2 else None
+
+
+@dataclass(frozen=True)
+class Separate(Phase):
+    """The boundary of a certified map that meets itself is pushed apart, and the surface's data give way there.
+
+    far: distance from the surface, root mean square, with which that is given up.
+    """
+
+    name = "separate"
+    rounds: int = 6
+    far: float = PARTED
+
+    def begin(self, state: State) -> None:
+        """Let the surface give way where sheets touch."""
+        state.energy.give_way(state.energy.watch_contact(state.control), _CONTACT_WAY)
+        super().begin(state)
+
+    def done(self, state: State) -> Reason | None:
+        """End when the boundary no longer meets itself, or cannot be parted near the surface."""
+        if not state.best.meets_itself:
+            return Reason.APART
+        if state.rounds[self.name] == self.rounds:
+            return Reason.MEETS_ITSELF
+        return Reason.DRIFTED_AWAY if state.last_square > self.far**2 else None
+
+
+@dataclass(frozen=True)
+class Polish(Phase):
+    """The surface's data get back the weight that they have lost, step by step, as far as F stays certified."""
+
+    name = "polish"
+    firm: int = sys.maxsize
+    rounds: int = 6
+
+    def begin(self, state: State) -> None:
+        """Give the data more weight, unless the last round has folded F again; draw F's edges to the surface."""
+        energy = state.energy
+        if state.rounds["separate"]:
+            energy.watch_contact(state.control)
+        if state.settled:
+            energy.take_back(GIVING_WAY)
+        energy.anchors.aim(state.control, hold=False)
+
+    def amended(self, state: State, found: Optimized) -> Optimized:
+        """Move what folds again back to where it was certified; return the map found where that brings nothing."""
+        energy, folded, mended = state.energy, found.certificate.unproved, found
+        degree, held = energy.degree, np.zeros(energy.determinants.weights.shape, dtype=bool)
+        for _ in range(_MENDINGS):
+            unproved = mended.certificate.unproved
+            if not 0 < len(unproved) <= MOST_WATCHED:
+                break
+            held |= with_neighbours(unproved, held.shape)
+            back = acting_on(held, degree)
+            mended = Optimized.of(np.where(back, state.best.control, found.control), state.knots, degree)
+        if mended is found or mended.rank > state.best.rank:
+            return found
+        places = energy.surface.places
+        before = places.parameters, places.cube_faces
+        energy.slide(mended.control)
+        if energy.surface.mean_square(mended.control) >= state.best_square:
+            places.place(*before)
+            return found
+        energy.determinants.activate(folded)
+        energy.give_way(folded, GIVING_WAY)
+        _log.info("moved back near %d spans", len(folded))
+        return mended
+
+    def done(self, state: State) -> Reason | None:
+        """End when nothing is left to take back, where F folds more and more, or after the last of these rounds."""
+        if not (count := state.rounds[self.name]):
+            return None
+        if state.settled and not state.energy.yields:
+            return Reason.POLISHED
+        if state.many or 0 < state.unproved_before < state.unproved:
+            return Reason.FOLDS_AGAIN
+        return Reason.LESS_POLISHED if count == self.rounds else None
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The phases of a spline stage in their order, and what they share.
+
+    rounds: of the stage, at most. usual_steps: of Newton's method in the rounds of most runs, which tells the time
+    left. gain: share of the energy; where steps lower it by less, a round ends.
+    """
+
+    phases: tuple[Phase, ...]
+    rounds: int
+    usual_steps: tuple[int, ...]
+    gain: float = GAIN
+
+    @property
+    def grown(self) -> int:
+        """The number of rounds in which F grows."""
+        return sum(len(phase.shares) for phase in self.phases if isinstance(phase, Grow))

@@ -1,0 +1,96 @@
+"""Where the rounds of a spline stage stand, and the checkpoint of that."""
+
+import math
+import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Array, IntArray, Knots
+from ..checkpoint import Checkpoints
+from ..progress import History
+from .energy import SplineEnergy
+from .optimized import Optimized
+
+MOST_WATCHED = 1000  # spans: where more are unproved, the penalty at the Gauss points has to unfold most of them first
+_CHECKPOINT = "spline"
+_NUMBERS = ("number", "certified", "unproved", "unproved_before", "fewest", "halved", "last_square", "best_square")
+
+
+@dataclass
+class State:
+    """Where the rounds stand between two of them; squares are mean squared distances from the surface."""
+
+    energy: SplineEnergy
+    knots: Knots
+    control: Array
+    best: Optimized
+    best_places: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their cube faces (N,)
+    near: bool  # whether F was close to the surface all along the cube's edges to begin with
+    number: int  # of rounds done, those on other knots among them
+    halved: int  # the round in which the number of unproved spans was last halved
+    certified: bool = False  # whether a round on these knots, one in which F does not grow, has certified the map
+    unproved: int = 0  # spans that the last round has left so
+    unproved_before: int = 0  # likewise the round before it
+    fewest: int = sys.maxsize  # spans unproved when their number was last halved
+    last_square: float = 0.0  # of what the last round's steps have led to: smoothing leads away for a while
+    best_square: float = math.inf
+    rounds: Counter[str] = field(default_factory=Counter)  # done on these knots, by phase
+    seconds: dict[str, float] = field(default_factory=dict)  # of these
+
+    @property
+    def many(self) -> bool:
+        """Whether more spans are unproved than can be watched."""
+        return self.unproved > MOST_WATCHED
+
+    @property
+    def settled(self) -> bool:
+        """Whether the last round has ended with the best map, not with one that folds again."""
+        return np.array_equal(self.control, self.best.control)
+
+    def keep(self, found: Optimized) -> None:
+        """Take a map, with the surface's parameters as they are, for the best one."""
+        places = self.energy.surface.places
+        self.best, self.best_places = found, (places.parameters, places.cube_faces)
+        self.best_square = self.energy.surface.mean_square(found.control)
+
+    def save(self, checkpoints: Checkpoints, history: History) -> None:
+        """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
+        surface, anchors = self.energy.surface, self.energy.anchors.fit
+        arrays = {
+            "control": self.control,
+            "best": self.best.control,
+            "best_parameters": self.best_places[0],
+            "best_cube_faces": self.best_places[1],
+            "parameters": surface.places.parameters,
+            "cube_faces": surface.places.cube_faces,
+            "yielding": surface.yielding,
+            "anchors": anchors.points,
+            "anchors_yielding": anchors.yielding,
+            "span_weights": self.energy.determinants.weights,
+        }
+        numbers = {name: getattr(self, name) for name in _NUMBERS}
+        phases = {"rounds": self.rounds, "seconds": self.seconds}
+        checkpoints.save(_CHECKPOINT, arrays, numbers | phases | {"history": history.rows})
+
+    def restore(self, checkpoints: Checkpoints, history: History) -> None:
+        """Go on from the checkpoint that `save` has kept, where there is one."""
+        if (saved := checkpoints.load(_CHECKPOINT)) is None:
+            return
+        arrays: dict[str, NDArray[Any]] = saved[0]
+        state: dict[str, Any] = saved[1]
+        energy = self.energy
+        energy.surface.places.place(arrays["parameters"], arrays["cube_faces"])
+        energy.surface.give_way(arrays["yielding"])
+        energy.anchors.restore(arrays["anchors"], arrays["anchors_yielding"])
+        energy.determinants.weigh(arrays["span_weights"])
+        self.control = arrays["control"]
+        self.best = Optimized.of(arrays["best"], self.knots, energy.degree)
+        self.best_places = arrays["best_parameters"], arrays["best_cube_faces"]
+        for name in _NUMBERS:
+            setattr(self, name, state[name])
+        self.rounds, self.seconds = Counter(state["rounds"]), state["seconds"]
+        history.rows[:] = [tuple(row) for row in state["history"]]

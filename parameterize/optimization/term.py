@@ -1,0 +1,41 @@
+"""What every term of a map's energy offers, and by what terms are weighed."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..arrays import Array
+from .operators import PiecewiseOperator
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights that belong to a map, in a domain of volume 1: a start or a refinement may set others.
+
+    fairness: of the integral of the squared Hessians. surface: of the mean squared distance from the surface along its
+    normals. least_floor: share to which the floors of det J are lowered, at most, where det J is small all around.
+    """
+
+    fairness: float = 1e-3
+    surface: float = 1.2e5
+    least_floor: float = 1.0
+
+
+@dataclass(frozen=True)
+class RoundWeights:
+    """Weights of one round: of the penalties on what is folded, and of the distance from the surface."""
+
+    penalty: float
+    surface: float
+
+
+class Term(Protocol):
+    """A summand of the energy in control points (3, n_u, n_v, n_w), in double precision."""
+
+    def weight(self, weights: RoundWeights) -> float:
+        """Return what the term counts in a round."""
+
+    def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
+        """Return the term without its weight, and its gradient (3, n_u, n_v, n_w)."""
+
+    def curvature(self, control: Array) -> PiecewiseOperator:
+        """Return a positive semidefinite second derivative at `control`, as an operator in single precision."""

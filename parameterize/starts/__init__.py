@@ -1,0 +1,1 @@
+"""The ways to a first map, one a file."""

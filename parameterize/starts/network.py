@@ -1,0 +1,83 @@
+"""The first start: the network is trained, F is fitted to its map, and optimised."""
+
+import logging
+from dataclasses import dataclass, replace
+
+from ..arrays import Array, IntArray
+from ..checkpoint import Checkpoints
+from ..config import SplineConfig
+from ..cube.edge_paths import PathError, choose_corners, lay_out
+from ..cube.flips import flipped, untangle
+from ..cube.layout import CubeLayout
+from ..optimization.phases import RAMP, Polish, Schedule, Separate, Shape, Unfold
+from ..progress import timed
+from ..threads import one_blas_thread
+from ..training.backend import one_thread_an_operation
+from ..training.samples import interior_points
+from ..training.target_shapes import nearest_places
+from ..training.trainer import Trainer, map_points
+from .first_spline import COARSE, first_spline
+from .start import Attempt, Start, Task, optimized
+
+_log = logging.getLogger(__name__)
+
+_FEW_FLIPS = 1e-2  # with a larger share of flipped triangles the surface is cut along traced cube edges
+_USUAL_STEPS = (13, 21, 27, 7, 6, 6)  # of the rounds of most runs: tells the time left
+
+
+@dataclass(frozen=True)
+class Network(Start):
+    """The trained network maps the solid into the cube."""
+
+    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
+        """Train the network, fit F to it and optimise F; None where the shape is hard and other starts may follow."""
+        others = task.most_starts > 1
+        if others and task.config.train.easy_loss == 0.0:  # every shape counts as hard
+            return None
+        with timed(task.seconds, "train"), one_thread_an_operation():
+            trainer = Trainer(
+                *task.mesh,
+                task.config,
+                seed=task.seed,
+                device=task.device,
+                dtype=task.dtype,
+                given_corners=task.given_corners,
+                checkpoints=checkpoints,
+                **task.report,
+            )
+            network = trainer.run(give_up=others)
+        if network is None:
+            return None
+        spline = task.config.spline
+        vertices, faces = task.mesh
+        with timed(task.seconds, "fit"), one_thread_an_operation(), one_blas_thread():
+            mapped = map_points(network, vertices)
+            fit = task.fit(_layout(mapped, trainer.corners, task), COARSE)
+            inside = interior_points(vertices, faces, spline.fit_cell)
+            places = map_points(network, inside).clip(0.0, 1.0)
+            control = first_spline(inside, places, fit)
+        return optimized(control, fit, schedule(spline), task, checkpoints)
+
+
+NETWORK = Network("network", "network", "training the network")
+
+
+def schedule(spline: SplineConfig) -> Schedule:
+    """Return the rounds that follow: F starts folded where the network's map does, and the penalties grow slowly."""
+    return Schedule((Shape(RAMP), Unfold(RAMP), Separate(RAMP), Polish(RAMP)), spline.rounds, _USUAL_STEPS)
+
+
+def _layout(mapped: Array, corners: IntArray | None, task: Task) -> CubeLayout:
+    """Return nearest points on the cube, untangled; where that leaves flips, patches between traced edges.
+
+    The first stays closer to the network's map, the second always succeeds where the edges can be traced.
+    """
+    layout = CubeLayout(*task.mesh, mapped, task.own)
+    untangled = untangle(nearest_places(mapped), layout.faces)
+    if flipped(untangled, layout.faces).mean() > _FEW_FLIPS:
+        try:
+            chosen = choose_corners(mapped) if corners is None else corners
+            return lay_out(layout, chosen)
+        except PathError as error:
+            _log.warning("the first layout has flipped triangles: %s", error)
+    return replace(layout, places=untangled)

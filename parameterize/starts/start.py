@@ -1,0 +1,130 @@
+"""What a start is: it makes a map of a surface, which the rounds then optimise; and what all starts share."""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+from ..arrays import Array, IntArray
+from ..checkpoint import Checkpoints
+from ..coarse import coarse_knots, optimize_coarse_first
+from ..config import Config
+from ..cube.cutting import subdivide_finely
+from ..cube.layout import CubeLayout
+from ..cube.sphere import lay_on_sphere
+from ..optimization.endings import Course
+from ..optimization.optimized import Optimized
+from ..optimization.phases import Schedule
+from ..optimization.sliding import SlidingParameters
+from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
+from ..optimization.term import Weights
+from ..progress import timed
+from ..surface.geometry import vertex_quadrics, vertex_weights
+from ..surface.surface import Surface
+
+Origin = Literal["network", "growth", "extension"]
+MOST_POINTS = (
+    30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What all starts share: the surface, options, the place, and what is computed of the surface once."""
+
+    surface: Surface
+    config: Config
+    seed: int
+    device: str  # where the network is trained, "cpu" or "cuda"
+    dtype: str  # its precision, "float32" or "float64"
+    given_corners: IntArray | None
+    seconds: dict[str, float]  # which grow as the run goes on
+    report: dict[str, Any]  # history and progress, as Trainer and optimize take them
+
+    @property
+    def own(self) -> int:
+        """Number of the surface's own vertices, which stay the first ones where edges are cut."""
+        return len(self.surface.vertices)
+
+    @property
+    def most_starts(self) -> int:
+        """Number of starts that may be tried: the first alone holds corners that the user gives."""
+        return self.config.starts if self.given_corners is None else 1
+
+    @cached_property
+    def mesh(self) -> tuple[Array, IntArray]:
+        """Vertices (n, 3) and faces (m, 3) at volume 1, long edges cut."""
+        longest = self.config.spline.longest_edge
+        return subdivide_finely(self.surface.unit_vertices, self.surface.faces, longest, self.own + MOST_POINTS)
+
+    @cached_property
+    def sphere(self) -> CubeLayout:
+        """The surface at volume 1, laid on the sphere."""
+        surface = self.surface
+        return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"])
+
+    def fit(self, layout: CubeLayout, coarse: float) -> SurfaceFit:
+        """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1).
+
+        coarse: share of the spans a direction in the first rounds.
+        """
+        spline = self.config.spline
+        return SurfaceFit(
+            SlidingParameters(coarse_knots(spline, coarse), spline.degree, layout.places, layout.faces),
+            layout.points,
+            vertex_quadrics(layout.points, layout.faces, TANGENTIAL),
+            vertex_weights(layout.points, layout.faces, layout.n_own),
+            given_corners=None if self.given_corners is None else self.mesh[0][self.given_corners],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """A map, how its rounds went, the surface data that belong to it, and the weights by which it may be refined."""
+
+    found: Optimized
+    course: Course
+    fit: SurfaceFit
+    weights: Weights
+
+    @cached_property
+    def distance(self) -> float:
+        """Root mean square distance of the surface's points from the map, at volume 1."""
+        return math.sqrt(self.fit.mean_square(self.found.control))
+
+    @property
+    def rank(self) -> tuple[int, bool, bool, float]:
+        """What is not proved, then the distance: of two attempts the one with the lower rank is better."""
+        return *self.found.rank, self.distance
+
+
+@dataclass(frozen=True)
+class Start(ABC):
+    """A way to a first map.
+
+    name: in report.json. origin: the kind of the way. doing: the way in words, as the log has it.
+    """
+
+    name: str
+    origin: Origin
+    doing: str
+
+    @abstractmethod
+    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
+        """Return an optimised map; None where the shape does not suit."""
+
+
+def optimized(
+    control: Array,
+    fit: SurfaceFit,
+    schedule: Schedule,
+    task: Task,
+    checkpoints: Checkpoints,
+    weights: Weights = Weights(),  # noqa: B008 - frozen
+) -> Attempt:
+    """Optimise a first map `control` (3, n_u, n_v, n_w) on the knots of `fit`."""
+    spline = task.config.spline
+    with timed(task.seconds, "optimize"):
+        made = optimize_coarse_first(control, fit, spline, schedule, weights, checkpoints=checkpoints, **task.report)
+    return Attempt(*made, weights)

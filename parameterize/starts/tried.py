@@ -1,0 +1,65 @@
+"""What has become of the starts that were tried, and the best of their maps."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from .start import Attempt, Origin, Start
+
+
+@dataclass(frozen=True)
+class AttemptReport:
+    """What a start has led to.
+
+    Attributes
+    ----------
+    start : str
+        The name of the start.
+    origin : "network", "growth" or "extension"
+        The kind of start.
+    ending : str
+        Why its rounds ended.
+    rounds : dict of str to int
+        The number of rounds by phase: grow, shape, unfold, separate, polish.
+    seconds : dict of str to float
+        Wall seconds of train and fit, and by phase.
+    unproved : int or None
+        Spans on which det J > 0 is not proved; None without a map.
+    meets_itself : bool or None
+        Whether the boundary of a certified map was found to meet itself; None without a map.
+    distance : float or None
+        Root mean square distance of the surface's points from the map, at volume 1; None without a map.
+    """
+
+    start: str
+    origin: Origin
+    ending: str
+    rounds: dict[str, int]
+    seconds: dict[str, float]
+    unproved: int | None = None
+    meets_itself: bool | None = None
+    distance: float | None = None
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A start that was tried, its map, None where the shape did not suit, and the wall seconds of its steps."""
+
+    start: Start
+    attempt: Attempt | None
+    seconds: dict[str, float]
+
+    def report(self) -> AttemptReport:
+        """Return what the result and report.json tell."""
+        seconds = {step: spent for step, spent in self.seconds.items() if step in ("train", "fit") and spent > 0.0}
+        start = self.start.name, self.start.origin
+        if self.attempt is None:
+            return AttemptReport(*start, "hard for the network", {}, seconds)
+        found, course = self.attempt.found, self.attempt.course
+        rounds, seconds = dict(course.rounds), seconds | course.seconds
+        return AttemptReport(*start, str(course.ending), rounds, seconds, *found.faults, self.attempt.distance)
+
+
+def best_of(tried: Iterable[Tried]) -> tuple[Start, Attempt] | None:
+    """Return the map of which most is proved, then the nearest to the surface, with its start; None without a map."""
+    maps = [(one.start, one.attempt) for one in tried if one.attempt is not None]
+    return min(maps, key=lambda one: one[1].rank, default=None)

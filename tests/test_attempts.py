@@ -1,0 +1,83 @@
+"""Which start follows those that were tried, and which of their maps is the result."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from small_run import small_surface, tiny_config
+
+from parameterize import attempts
+from parameterize.attempts import EXTENSION, GROWTH, LAST, NETWORK, STARTS, STIFF, next_start
+from parameterize.optimization.endings import Course, Reason
+from parameterize.run import parameterize
+from parameterize.starts.start import Attempt, Start
+from parameterize.starts.tried import Tried, best_of
+
+FAR, NEAR = 2.0 * GROWTH.far, 0.5 * GROWTH.far
+
+
+def tried(start, unproved=0, *, meets=False, distance=NEAR):
+    """A start that was tried and the map that it has made, of which so much is proved."""
+    faults = (unproved, meets)
+    found = SimpleNamespace(faults=faults, rank=(*faults, False), meets_itself=meets, control=None)
+    fit = SimpleNamespace(mean_square=lambda _: distance**2)
+    return Tried(start, Attempt(found, Course({}, {}, Reason.STALLED), fit, None), {})
+
+
+HARD = Tried(NETWORK, None, {})
+FOLDED, CROSSED = tried(NETWORK, 3), tried(NETWORK, meets=True)
+
+
+@pytest.mark.parametrize(
+    ("before", "following"),
+    [
+        ((), NETWORK),
+        ((tried(NETWORK),), None),
+        ((tried(NETWORK, distance=FAR),), None),
+        ((HARD,), GROWTH),
+        ((FOLDED,), GROWTH),
+        ((CROSSED,), GROWTH),
+        ((HARD, tried(GROWTH)), None),
+        ((FOLDED, tried(GROWTH, 1)), EXTENSION),
+        ((FOLDED, tried(GROWTH, 1, distance=FAR)), STIFF),
+        ((FOLDED, tried(GROWTH, meets=True)), STIFF),
+        ((HARD, tried(GROWTH, distance=FAR)), STIFF),
+        ((HARD, tried(GROWTH, distance=FAR), tried(STIFF, 1)), None),
+        ((FOLDED, tried(GROWTH, 1, distance=FAR), tried(STIFF, distance=FAR)), None),
+        ((FOLDED, tried(GROWTH, 1, distance=FAR), tried(STIFF, 1)), EXTENSION),
+        ((FOLDED, tried(GROWTH, 1), tried(EXTENSION, 1)), STIFF),
+        ((FOLDED, tried(GROWTH, 1), tried(EXTENSION, 1), tried(STIFF, 1)), LAST),
+        ((FOLDED, tried(GROWTH, 1), tried(EXTENSION, 1), tried(STIFF, 1), tried(LAST, 1)), None),
+    ],
+)
+def test_the_start_that_follows(before, following):
+    assert next_start(before) is following
+
+
+def test_the_best_map_is_the_one_of_which_most_is_proved_then_the_nearest():
+    far, near = tried(GROWTH, distance=FAR), tried(STIFF, distance=NEAR)
+    assert best_of((HARD, FOLDED, far, near)) == (STIFF, near.attempt)
+    assert best_of((CROSSED, FOLDED)) == (NETWORK, CROSSED.attempt)
+    assert best_of((far, tried(LAST, distance=FAR))) == (GROWTH, far.attempt)
+    assert best_of((HARD,)) is None
+
+
+def test_starts_have_names_of_their_own():
+    assert len({start.name for start in STARTS}) == len(STARTS)
+
+
+def test_what_was_tried_is_reported():
+    report = tried(STIFF, 3, distance=FAR).report()
+    assert (report.start, report.origin, report.ending) == ("stiff growth", "growth", "stalled")
+    assert (report.unproved, report.meets_itself, report.distance) == (3, False, pytest.approx(FAR))
+    assert HARD.report().ending == "hard for the network" and HARD.report().unproved is None
+
+
+def test_a_start_is_one_object_in_the_tuple(few_distances, monkeypatch):
+    class Again(Start):
+        def make(self, task, checkpoints):
+            return NETWORK.make(task, checkpoints)
+
+    monkeypatch.setattr(attempts, "STARTS", (Again("again", "network", "training once more"),))
+    result = parameterize(small_surface(), replace(tiny_config(), starts=2), seed=3, device="cpu")
+    assert [attempt.start for attempt in result.attempts] == ["again"]
