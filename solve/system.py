@@ -68,7 +68,7 @@ class System:
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
     right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
-    loads: Array  # (c, n_u, n_v, n_w): of all coefficients, before what is known is taken from them
+    loads: Array  # (c, n_u, n_v, n_w): of all coefficients, before the known ones are subtracted
     setup: float  # process seconds
 
     @property
@@ -100,7 +100,7 @@ class System:
     def field(self, x: Array) -> SplineField:
         """Return the spline of the free coefficients x (N,) and of those that are fixed.
 
-        Raises ValueError for another number of them.
+        Raises ValueError for another number of coefficients.
         """
         if np.size(x) != self.right.size:
             raise ValueError(f"x must have {self.right.size} entries, the free coefficients, got {np.size(x)}")
@@ -150,7 +150,7 @@ class System:
         return self.solve_with(IterationOptions.of(how))
 
     def solve_with(self, options: IterationOptions) -> Solution:
-        """Return what `solve` does, of options as one object."""
+        """Return the solution of `solve` for options as one object."""
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
@@ -215,7 +215,7 @@ class System:
         return float(self.space.total((self.right * free).sum()))
 
     def _iterate(self, options: IterationOptions) -> LinearResult:
-        """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
+        """Return the result of conjugate gradients, or of GMRES where the law is not symmetric."""
         operator, limits = self.matrix, (options.tolerance, options.max_iterations)
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
         if options.device != "cpu":
@@ -247,7 +247,7 @@ def build(
 ) -> System:
     """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
 
-    shift: A is the law's matrix plus so many times the mass.
+    shift: factor of the mass matrix in A, beside the law's matrix.
     """
     start = time.process_time()
     with one_blas_thread():

@@ -52,7 +52,7 @@ class Display:
         self._stage, self._printed = "", time.monotonic()
 
     def show(self, line: str, stage: str = "", **now: Any) -> None:
-        """Take the state after a change: as a line, and as what the task of the bar is now."""
+        """Take the state after a change: as a line, and as the present task of the bar."""
         self.bar.update(self._task, visible=True, **now)
         if self.bar.disable and (stage != self._stage or time.monotonic() - self._printed >= PLAIN_INTERVAL):
             self.bar.console.print(Text(line), soft_wrap=True)
@@ -121,7 +121,7 @@ def shown_batch(quiet: bool) -> Iterator[BatchProgress | None]:
 
 @contextmanager
 def _shown(quiet: bool, *columns: ProgressColumn) -> Iterator[Show | None]:
-    """Show the log of the packages on stderr, and yield what shows the progress on such a bar; None where `quiet`."""
+    """Show the log of the packages on stderr, and yield the callback of its progress bar; None where `quiet`."""
     console = Console(file=sys.stderr, highlight=False)
     with logged(_ConsoleHandler(console), logging.WARNING if quiet else logging.INFO):
         if quiet:

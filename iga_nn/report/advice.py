@@ -1,4 +1,4 @@
-"""Says where a map is not certified, and what to try."""
+"""Advice on a map that is not certified: the places without a proof, and the remedies."""
 
 from typing import Any
 

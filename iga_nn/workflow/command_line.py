@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-SILENT = ("resume",)  # changes how a result is reached, not what it is
+SILENT = ("resume",)  # changes the way to a result, not the result
 
 
 def command_line(command: str, source: str | Path, *chosen: Any, **given: Any) -> str:

@@ -59,7 +59,7 @@ class GaussRule:
         return w_u[q] * (w_w[:, None] * w_v)
 
     def strips(self, most: int) -> list["GaussRule"]:
-        """Return rules of consecutive points of w that make up this one, with at most so many points in a plane."""
+        """Return rules of consecutive points of w that make up this one, with at most `most` points in a plane."""
         (u, v, w), (weights_u, weights_v, weights_w) = self.points, self.weights
         step = max(1, most // len(v))
         parts = [slice(start, start + step) for start in range(0, len(w), step)]

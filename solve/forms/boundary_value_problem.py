@@ -26,7 +26,7 @@ Robin = Mapping[str, tuple[Data, Data | None]]
 
 
 class BoundaryValueProblem:
-    """What the solver asks of a problem: its law, and its data at points (3, ...), components first.
+    """A law and its data at points (3, ...), components first: the interface of a problem to the solver.
 
     Data have roles: exact, source, boundary; "neumann u0", "robin u0" and "robin u0: alpha" of a face; and those of the
     law's own coefficients. Every method raises ExpressionError where data are not finite.
@@ -35,7 +35,7 @@ class BoundaryValueProblem:
     form: Form
     exact: Data | None
     of_coordinates: ClassVar[bool] = False  # whether functions as data take three arrays x, y, z
-    labels: ClassVar[Mapping[str, str]] = {}  # role -> name in messages, where that is another
+    labels: ClassVar[Mapping[str, str]] = {}  # role -> its name in messages, where it has another
     natural: tuple[str, ...]  # faces on which the flux through them is given
     dirichlet: tuple[str, ...]  # faces on which u itself is given
     conditions: tuple[Condition, ...]  # on regions of the boundary; where there are any, all else of it is free
@@ -66,7 +66,7 @@ class BoundaryValueProblem:
         if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
             raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
         if both := neumann.keys() & robin.keys():
-            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give one of them")
+            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give only one")
         on_faces = {f"neumann {face}": entry for face, entry in neumann.items()}
         for face, (alpha, entry) in robin.items():
             on_faces |= {f"robin {face}: alpha": alpha, f"robin {face}": entry}
@@ -243,7 +243,7 @@ class BoundaryValueProblem:
         return finite(f"{self.label(role)} (from exact)", flux, x, self._first_formula)
 
     def values_on(self, condition: Condition, direction: Array, x: Array) -> Array:
-        """Return what an essential condition gives of u along a direction (c, m) at points (3, m): (m,)."""
+        """Return the values (m,) of an essential condition along a direction (c, m) at points (3, m)."""
         role = condition.role if condition.role in self.data else "exact"
         found = self.data[role](x)
         return found[0] if len(found) != len(direction) else np.asarray((found * direction).sum(axis=0))
@@ -251,7 +251,7 @@ class BoundaryValueProblem:
     def flux_on(self, condition: Condition | None, x: Array, normal: Array) -> Array:
         """Return the flux (c, m) into the body that a condition gives at points (3, m) with normals (3, m).
 
-        None stands for the flux of `exact`, or none, on what no region names. That of a factor is for u = 0.
+        None stands for the rest of the boundary, with the flux of `exact` or none. The flux of a factor is for u = 0.
         """
         if condition is None or (condition.data is None and condition.role not in self.data):
             if not self.exact_formulas:
