@@ -110,7 +110,7 @@ def _volume_of(body: BSplineVolume | Solution) -> BSplineVolume:
 
 
 def _counts(body: BSplineVolume | Solution) -> list[int]:
-    """Return how many Gauss points a span and direction: exact for the volume, as many as the errors' of a solution."""
+    """Return the number of Gauss points a span and direction: exact for a volume, as for the errors of a solution."""
     degrees = zip(_volume_of(body).degrees, body.degrees, strict=True)
     return [max((3 * of_map + 1) // 2, own + 2) for of_map, own in degrees]
 

@@ -108,7 +108,7 @@ def march(
     dt : float
         The time step.
     steps : int
-        How many.
+        Number of time steps.
     scheme : str
         "bdf2" or "trapezoidal".
     capacity : float
@@ -253,7 +253,7 @@ class _Path:
         return SplineField(space.degrees, space.knots, coefficients, self.data.volume)
 
     def step(self, time: float) -> int:
-        """Go to a time, and return how many iterations it took. Raises ConvergenceError."""
+        """Go to a time, and return the number of iterations. Raises ConvergenceError."""
         load, known = self.data.at(time)
         system, right = self._equation(load)
         window = (slice(None), *self.data.space.window)

@@ -37,7 +37,7 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     Other Parameters
     ----------------
     refine : int
-        How often every span of the map's knots is halved for the trial space; 0 by default.
+        Number of times that every span of the map's knots is halved for the trial space; 0 by default.
     degree : int, optional
         Of the trial space; the map's own by default.
     threads : int, optional

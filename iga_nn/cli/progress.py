@@ -34,7 +34,7 @@ Show = Callable[..., None]  # Display.show
 
 
 class Display:
-    """Shows how far a command is: a bar on a terminal, else a line at each new stage and every ten seconds."""
+    """Shows the progress of a command: a bar on a terminal, else a line at each new stage and every ten seconds."""
 
     def __init__(self, console: Console, *columns: ProgressColumn) -> None:
         state = TextColumn("{task.fields[state]}", table_column=Column(ratio=1, no_wrap=True))  # is cut off first
@@ -67,7 +67,7 @@ def tell_run(show: Show, now: Progress) -> None:
 
 
 def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
-    """Show the state of a batch: how many surfaces ended, the stage and the share done of those computed."""
+    """Show the state of a batch: the number of ended surfaces, and the stage and share of the running ones."""
     total = len(batch.rows)
     ended = total - batch.counts.get("waiting", 0)
     state = (
@@ -79,7 +79,7 @@ def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
 
 
 def describe(progress: Progress) -> str:
-    """Return folds, time left and loss as text; how long the spline fit takes is known only when it runs."""
+    """Return folds, time left and loss as text; the seconds of the spline fit are known only while it runs."""
     minutes, seconds = divmod(math.ceil(max(0.0, progress.seconds_left)), 60)
     left = f"{minutes}:{seconds:02d} left"
     folds = f"{progress.folded} fold{'s' * (progress.folded != 1)}"

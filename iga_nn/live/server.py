@@ -208,7 +208,7 @@ class Page:
         return web.Response(text=str(job.number))
 
     async def _keep(self, request: web.Request, path: Path) -> int:
-        """Write the body to a file, up to the limit, and return how many bytes came."""
+        """Write the body to a file, up to the limit, and return the number of bytes."""
         size = 0
         with path.open("wb") as stream:
             async for part in request.content.iter_chunked(MEGABYTE):

@@ -88,7 +88,7 @@ def is_ahead(job: Job) -> bool:
 def _facts(job: Job, now: Progress) -> list[list[str]]:
     """Return the facts of a run on the page: the name of each, its value and a remark."""
     is_spline = now.stage == "spline"
-    step = f"step {now.step}" if is_spline else f"step {now.step} of {now.steps}"  # how many it takes is not known
+    step = f"step {now.step}" if is_spline else f"step {now.step} of {now.steps}"  # their number is not known
     stage = [LAST, "the volume is made"] if job.is_mapped else [STAGES.get(now.stage, now.stage), step]
     aim = "between them the proof decides" if is_spline else "0 is the aim"
     facts = [

@@ -20,9 +20,9 @@ class SurfaceOptions(Checked):
     """Options of the surface that is read from a file.
 
     Attributes:
-        component: number of the connected component to take, counted from 0.
+        component: number of the connected component that is taken, counted from 0.
         max_faces: refuse surfaces with more faces.
-        decimate: reduce surfaces with more faces to max_faces instead; a notice says how far they moved.
+        decimate: reduce surfaces with more faces to max_faces instead; a notice has the distance from the original.
     """
 
     component: int | None = None

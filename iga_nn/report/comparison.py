@@ -13,7 +13,7 @@ from ..version import __version__
 from . import document as reports
 from . import extremes, html
 
-Cell = tuple[float | None, str]  # the number, where it is one, and how it is shown
+Cell = tuple[float | None, str]  # the number, None for a text, and its text
 
 
 @dataclass(frozen=True)

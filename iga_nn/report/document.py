@@ -122,7 +122,7 @@ def one_to_one(report: Report) -> str:
 
 
 def control_points_in_words(report: Report) -> str:
-    """Return how many control points `auto` took and why no more; empty where their number was given."""
+    """Return the number of control points of `auto`, and the reason for no more; empty where the number was given."""
     if not (told := report["parameterization"].get("refinement")):
         return ""
     first, last, asked = told["levels"][0], told["levels"][-1], f"tolerance {told['tolerance']:.2g}"

@@ -1,8 +1,8 @@
 """Estimates the time and the memory of a run, and the memory of a solve, before it starts.
 
-That of a run comes from counts and the time of two small pieces of work on all threads: a pass (the network forward and
-backward on 1000 points) and a product with the second derivative of the spline's distortion. How many of them a run
-takes is known from conch and duck, and of hard surfaces from bone and homer. That of a solve comes from counts alone.
+The cost of a run comes from counts and the time of two small pieces of work on all threads: a pass (the network forward
+and backward on 1000 points) and a product with the second derivative of the spline's distortion. Their number in a run
+was measured on conch and duck, and for hard surfaces on bone and homer. The cost of a solve comes from counts alone.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Forecast:
     after: tuple[float, float] = (0.0, 0.0)
 
     def seconds_after(self, stage: str) -> float:
-        """Return how long a usual run takes after the training stages, or after the stage "spline"."""
+        """Return the seconds of a usual run after the training stages, or after the stage "spline"."""
         return self.after[stage == "spline"]
 
     def __str__(self) -> str:

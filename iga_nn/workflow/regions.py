@@ -84,7 +84,7 @@ def _draw(picture: Path, surface: Surface, regions: Sequence[Region]) -> None:
 
 
 def facts_of(region: Region, surface: Surface) -> dict[str, Any]:
-    """Return a region's text, its area, its share of the surface's, and how many triangles lie mostly in it.
+    """Return a region's text, its area, its share of the surface's, and the number of triangles mostly in it.
 
     Raises ValueError where no point of the surface lies in it.
     """

@@ -64,7 +64,7 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    threads: of a product. folded: at how many of the points of all processes det J has the wrong sign.
+    threads: of a product. folded: number of points of all processes where det J has the wrong sign.
     faces: the terms on the faces of the cube that have some, as far as this process integrates.
     """
 

@@ -28,7 +28,7 @@ LARGEST_STEP = 0.4  # of a weight over itself, and of a point over the distance 
 QUADRATURES = ("spline", "gauss", "gauss+1")
 SAMPLES = 6  # places a direction, each three neighbouring spans, at which a map is measured
 LIMIT = 0.03  # trained maps reach 0.06 and more after two refinements, the twisted cube 0.02 with 14 elements
-TIMES = (1.0, 2.0, 2.0, 1.0, 2.0, 1.0)  # how often each of the six entries stands in a symmetric matrix
+TIMES = (1.0, 2.0, 2.0, 1.0, 2.0, 1.0)  # number of times that each of the six entries stands in a symmetric matrix
 
 log = logging.getLogger(__name__)
 

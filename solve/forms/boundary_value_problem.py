@@ -51,36 +51,18 @@ class BoundaryValueProblem:
     ) -> None:
         """Parse the data. Raises ValueError where they do not fit together or cannot be known.
 
-        counts: role -> how many entries its datum has, where these are not the law's components.
+        counts: role -> number of entries of its datum, where this is not the number of the law's components.
         """
-        if not isinstance(count := self.form.components, int) or count < 1:
-            raise ValueError(
-                f"{type(self.form).__name__}.components must be a whole number, 1 or more, got {count!r:.80}"
-            )
-        for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
-            if not isinstance(faces, Mapping):
-                raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
-            for face in faces:
-                if face not in FACE_NAMES:
-                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
-        if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
-            raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
-        if both := neumann.keys() & robin.keys():
-            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give only one")
+        self._check_components()
+        self._check_faces(neumann, robin)
         on_faces = {f"neumann {face}": entry for face, entry in neumann.items()}
         for face, (alpha, entry) in robin.items():
             on_faces |= {f"robin {face}: alpha": alpha, f"robin {face}": entry}
-        data = {}
-        for role, entry in {**given, **on_faces}.items():
-            if entry is not None:
-                count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
-                face = role.split(":")[0].partition(" ")[2]
-                data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
         on_regions = {role: pair for condition in conditions for role, pair in condition.given().items()}
+        data = self._parsed({**given, **on_faces}, counts)
         for role, (entry, size) in on_regions.items():
             if entry is not None:
-                count = size or self.form.components
-                data[role] = parse(role, entry, count, of_coordinates=self.of_coordinates)
+                data[role] = parse(role, entry, size or self.form.components, of_coordinates=self.of_coordinates)
         dirichlet = tuple(face for face in FACE_NAMES if face not in neumann and face not in robin)
         if conditions:
             if on_faces or given.get("boundary") is not None:
@@ -100,6 +82,37 @@ class BoundaryValueProblem:
         for role in ("source", *on_faces, *on_regions):
             if role not in data:
                 self._check_derived(role)
+
+    def _check_components(self) -> None:
+        """Raise ValueError for a law whose number of components is not a whole number."""
+        count = self.form.components
+        if not isinstance(count, int) or count < 1:
+            raise ValueError(
+                f"{type(self.form).__name__}.components must be a whole number, 1 or more, got {count!r:.80}"
+            )
+
+    def _check_faces(self, neumann: Natural, robin: Robin) -> None:
+        """Raise ValueError for names that are no faces, faces with two kinds of data, and incomplete Robin data."""
+        for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
+            if not isinstance(faces, Mapping):
+                raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
+            for face in faces:
+                if face not in FACE_NAMES:
+                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
+        if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
+            raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
+        if both := neumann.keys() & robin.keys():
+            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give only one")
+
+    def _parsed(self, given: Mapping[str, Data | None], counts: Mapping[str, int]) -> dict[str, Datum]:
+        """Return the data of the volume and of faces by role, without roles that have none."""
+        data = {}
+        for role, entry in given.items():
+            if entry is not None:
+                count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
+                face = role.split(":")[0].partition(" ")[2]
+                data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
+        return data
 
     def _check_derived(self, role: str) -> None:
         """Raise ValueError where data that are not given do not follow from `exact`."""

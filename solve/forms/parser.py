@@ -43,7 +43,7 @@ FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
     **{name: getattr(Jet, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh")},
     "abs": abs,
 }
-CHOICES = {"min": 2, "max": 2, "where": 3}  # functions that choose among values, and how many arguments they take
+CHOICES = {"min": 2, "max": 2, "where": 3}  # functions that choose among values -> number of their arguments
 COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
