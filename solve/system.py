@@ -16,7 +16,7 @@ from parameterize.spline.volume import BSplineVolume
 
 from .assembly import assemble_data, balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
-from .discretization.errors import error_norms, missing_mean
+from .discretization.errors import Errors, error_norms, missing_mean
 from .discretization.estimate import error_estimate
 from .discretization.on_regions import demand_supports
 from .discretization.operator import FormOperator, Operator, assemble, with_mass
@@ -174,13 +174,9 @@ class System:
         if self.blocks[0].singular:
             full += missing_mean(volume, space, full[0], problem)
         clock.append(time.process_time())
-        errors = estimate = None
         largest = max(space.shared(float(np.abs(full).max(initial=0.0))))
         has_norm = largest <= LARGEST_VALUE
-        if has_norm and problem.exact is not None:
-            errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
-        if has_norm and (options.estimate or (options.estimate is None and problem.exact is None)):
-            estimate = error_estimate(volume, space, full, problem, self._energy(result.x))
+        errors, estimate = self._errors(full, result.x, options.estimate) if has_norm else (None, None)
         clock.append(time.process_time())
         doubtful, meaningful = judge(volume, problem, errors, estimate if result.converged else None, dofs)
         if errors is None and problem.form.caveat:
@@ -206,6 +202,19 @@ class System:
         )
         field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
+
+    def _errors(self, full: Array, free: Array, is_estimated: bool | None) -> tuple[Errors | None, Errors | None]:
+        """Return the errors of a solution, where the exact one is known, and their estimate, where it is wanted.
+
+        full, free: all coefficients, and the free ones. is_estimated: None for where the exact solution is not known.
+        """
+        volume, problem, space = self.volume, self.problem, self.space
+        errors = estimate = None
+        if problem.exact is not None:
+            errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
+        if is_estimated or (is_estimated is None and problem.exact is None):
+            estimate = error_estimate(volume, space, full, problem, self._energy(free))
+        return errors, estimate
 
     def _energy(self, free: Array) -> float | None:
         """Return a(u_h, u_h) of free coefficients that solve the system, None where it is not the work of the loads."""
