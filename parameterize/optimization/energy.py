@@ -10,6 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..arrays import Array, IntArray, Knots
+from ..spline.spline_map import SplineMap
 from .bending import Fairness
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import DeterminantPenalty
@@ -88,7 +89,7 @@ class SplineEnergy:
 
     def watch_contact(self, control: Array) -> IntArray:
         """Push apart, from now on, the sheets of F's boundary that hardly are at `control`; return their spans."""
-        self._contact = contact_penalty(self._knots, self.degree, control)
+        self._contact = contact_penalty(SplineMap(self.degree, self._knots, control))
         return self._contact.spans
 
     def slide(self, control: Array) -> None:
@@ -102,7 +103,7 @@ class SplineEnergy:
             places.relax(_RELAXATIONS)
         self.watch_facing(control)
         if self._contact is not None:
-            self._contact = contact_penalty(self._knots, self.degree, control, near=self._contact.near)
+            self._contact = contact_penalty(SplineMap(self.degree, self._knots, control), near=self._contact.near)
 
     def give_way(self, spans: IntArray, factor: float) -> None:
         """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""

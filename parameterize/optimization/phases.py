@@ -58,7 +58,7 @@ class Phase(ABC):
     def begin(self, state: State) -> None:
         """Weigh data and anchors for the next round: anchors hold a map that starts close to the surface at first."""
         if state.near and state.number < PATIENT_ROUNDS:
-            state.energy.anchors.aim(state.control, hold=True)
+            state.energy.anchors.aim(state.spline.control, hold=True)
         else:
             state.energy.anchors.release()
 
@@ -118,8 +118,8 @@ class Unfold(Phase):
         unproved, patience = found.certificate.unproved, max(self.firm, state.halved + _SMOOTHING_ROUNDS)
         if state.number < patience or not 0 < len(unproved) <= _MOST_SMOOTHED:
             return found
-        control = state.energy.smoothed(found.control, unproved)
-        smoothed = Optimized.of(control, state.knots, state.energy.degree)
+        control = state.energy.smoothed(found.spline.control, unproved)
+        smoothed = Optimized.of(found.spline.with_control(control))
         _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.certificate.unproved))
         return smoothed if smoothed.faults < found.faults else found
 
@@ -150,7 +150,7 @@ class Separate(Phase):
 
     def begin(self, state: State) -> None:
         """Let the surface give way where sheets touch."""
-        state.energy.give_way(state.energy.watch_contact(state.control), _CONTACT_WAY)
+        state.energy.give_way(state.energy.watch_contact(state.spline.control), _CONTACT_WAY)
         super().begin(state)
 
     def done(self, state: State) -> Reason | None:
@@ -174,28 +174,29 @@ class Polish(Phase):
         """Give the data more weight, unless the last round has folded F again; draw F's edges to the surface."""
         energy = state.energy
         if state.rounds["separate"]:
-            energy.watch_contact(state.control)
+            energy.watch_contact(state.spline.control)
         if state.settled:
             energy.take_back(GIVING_WAY)
-        energy.anchors.aim(state.control, hold=False)
+        energy.anchors.aim(state.spline.control, hold=False)
 
     def amended(self, state: State, found: Optimized) -> Optimized:
         """Move what folds again back to where it was certified; return the map found where that brings nothing."""
         energy, folded, mended = state.energy, found.certificate.unproved, found
-        degree, held = energy.degree, np.zeros(energy.determinants.weights.shape, dtype=bool)
+        held = np.zeros(energy.determinants.weights.shape, dtype=bool)
         for _ in range(_MENDINGS):
             unproved = mended.certificate.unproved
             if not 0 < len(unproved) <= MOST_WATCHED:
                 break
             held |= with_neighbours(unproved, held.shape)
-            back = acting_on(held, degree)
-            mended = Optimized.of(np.where(back, state.best.control, found.control), state.knots, degree)
+            back = acting_on(held, energy.degree)
+            control = np.where(back, state.best.spline.control, found.spline.control)
+            mended = Optimized.of(found.spline.with_control(control))
         if mended is found or mended.rank > state.best.rank:
             return found
         places = energy.surface.places
         before = places.parameters, places.cube_faces
-        energy.slide(mended.control)
-        if energy.surface.mean_square(mended.control) >= state.best_square:
+        energy.slide(mended.spline.control)
+        if energy.surface.mean_square(mended.spline.control) >= state.best_square:
             places.place(*before)
             return found
         energy.determinants.activate(folded)

@@ -9,11 +9,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import IntArray
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
 from ..progress import History, Progress, ProgressCallback, ignore, timed
 from ..spline.bspline import breakpoints
+from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .endings import Course, Reason
 from .energy import SplineEnergy
@@ -31,8 +32,7 @@ _SPAN_MOST = 125.0  # of these factors together
 
 
 def optimize(
-    control: Array,
-    knots: Knots,
+    start: SplineMap,
     surface: SurfaceFit,
     config: SplineConfig,
     schedule: Schedule,
@@ -44,24 +44,24 @@ def optimize(
     begun: int = 0,
     watched: IntArray | None = None,
 ) -> tuple[Optimized, Course]:
-    """Minimise from `control` (3, n_u, n_v, n_w), volume 1, phase after phase, in rounds: descend, certify, weigh anew.
+    """Minimise the energy from a map at volume 1, phase after phase, in rounds: descend, certify, weigh anew.
 
     Return a map, and how the rounds went. It is the last certified map whose boundary is proved not to meet itself,
     else the last one where that is not decided, else the last certified one, else the one with the fewest unproved
     spans.
 
-    begun: of how many rounds `control` is the result, on other knots; watched (k, 3): spans that nearly fold there.
+    begun: of how many rounds `start` is the result, on other knots; watched (k, 3): spans that nearly fold there.
     A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with one_blas_thread():
-        energy = SplineEnergy(knots, surface, weights)
-        energy.determinants.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))
+        energy = SplineEnergy(start.knots, surface, weights)
+        energy.determinants.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in start.knots)))
         if watched is not None:
             energy.determinants.activate(watched)
-        first = Optimized.of(control, knots, config.degree)
+        first = Optimized.of(start)
         places = surface.places.parameters, surface.places.cube_faces
-        state = State(energy, knots, control, first, places, energy.anchors.near(control), number=begun, halved=begun)
+        state = State(energy, start, first, places, energy.anchors.near(start.control), number=begun, halved=begun)
         state.restore(checkpoints, history)
 
         def one_round(phase: Phase) -> None:
@@ -92,16 +92,16 @@ def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport"
     energy, number, grows = state.energy, state.number, isinstance(phase, Grow)
     share, steps = (phase.shares[number], phase.steps) if isinstance(phase, Grow) else (None, report.most)
     phase.begin(state)
-    energy.start_round(state.control, phase.penalty(number), share)
+    energy.start_round(state.spline.control, phase.penalty(number), share)
     rule = StoppingRule(steps, schedule.gain if number else FIRST_GAIN)
-    control = descend(energy, state.control, rule, report)
-    found = Optimized.of(control, state.knots, energy.degree)
+    control = descend(energy, state.spline.control, rule, report)
+    found = Optimized.of(state.spline.with_control(control))
     state.last_square = energy.surface.mean_square(control)
     found = phase.amended(state, found)
     verdict, unproved = found.certificate.verdict, found.certificate.unproved
     meets = ", the boundary meets itself" if found.meets_itself else ""
     _log.info("round %d, %s: %s, %d spans unproved%s", number, phase.name, verdict, len(unproved), meets)
-    state.control, state.unproved_before, state.unproved = found.control, state.unproved, len(unproved)
+    state.spline, state.unproved_before, state.unproved = found.spline, state.unproved, len(unproved)
     state.certified |= not grows and verdict == "certified"
     if number == 0 or grows or found.rank <= state.best.rank:
         state.keep(found)

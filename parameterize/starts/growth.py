@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..arrays import Array, Knots
+from ..arrays import Knots
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.flips import Layout
@@ -19,6 +19,8 @@ from ..optimization.phases import FAR, PARTED, Grow, Polish, Schedule, Separate,
 from ..optimization.term import Weights
 from ..progress import timed
 from ..spline.bspline import greville
+from ..spline.spline_map import SplineMap
+from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_weights
 from ..threads import one_blas_thread
 from .on_cube import MORE_ROUNDS, USUAL_STEPS, surface_on_cube
@@ -51,8 +53,8 @@ class Growth(Start):
         with timed(task.seconds, "fit"), one_blas_thread():
             layout = surface_on_cube(task, self.turn)
             fit = task.fit(layout, _COARSE)
-            control = first_cube(layout, task.own, fit.places.knots, fit.places.degree)
-        return optimized(control, fit, self.schedule(task.config), task, checkpoints, self.weights)
+            first = first_cube(layout, task.own, fit.places.knots, fit.places.degree)
+        return optimized(first, fit, self.schedule(task.config), task, checkpoints, self.weights)
 
     @property
     def weights(self) -> Weights:
@@ -80,9 +82,9 @@ STIFF = Growth(
 LAST = replace(STIFF, name="last growth", doing="growing a stiffer map, farther from the surface,", turn=2, far=0.05)
 
 
-def first_cube(layout: Layout, own: int, knots: Knots, degree: int) -> Array:
-    """Return control points (3, n_u, n_v, n_w) of the unit cube, turned so that it faces the surface as laid out."""
+def first_cube(layout: Layout, own: int, knots: Knots, degree: int) -> SplineMap:
+    """Return the map onto the unit cube, turned so that it faces the surface as laid out."""
     weights = vertex_weights(layout.vertices, layout.faces, own)
     rotation, _ = Rotation.align_vectors(layout.vertices - 0.5, layout.places - 0.5, weights)
     points = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1) - 0.5
-    return np.ascontiguousarray(np.moveaxis(0.5 + points @ rotation.as_matrix().T, -1, 0))
+    return SplineMap.of(BSplineVolume((degree,) * 3, knots, 0.5 + points @ rotation.as_matrix().T))

@@ -20,6 +20,7 @@ from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
 from ..progress import timed
+from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
 
@@ -93,7 +94,7 @@ class Attempt:
     @cached_property
     def distance(self) -> float:
         """Root mean square distance of the surface's points from the map, at volume 1."""
-        return math.sqrt(self.fit.mean_square(self.found.control))
+        return math.sqrt(self.fit.mean_square(self.found.spline.control))
 
     @property
     def rank(self) -> tuple[int, bool, bool, float]:
@@ -118,15 +119,15 @@ class Start(ABC):
 
 
 def optimized(
-    control: Array,
+    first: SplineMap,
     fit: SurfaceFit,
     schedule: Schedule,
     task: Task,
     checkpoints: Checkpoints,
     weights: Weights = Weights(),  # noqa: B008 - frozen
 ) -> Attempt:
-    """Optimise a first map `control` (3, n_u, n_v, n_w) on the knots of `fit`."""
+    """Optimise a first map on the knots of `fit`."""
     spline = task.config.spline
     with timed(task.seconds, "optimize"):
-        made = optimize_coarse_first(control, fit, spline, schedule, weights, checkpoints=checkpoints, **task.report)
+        made = optimize_coarse_first(first, fit, spline, schedule, weights, checkpoints=checkpoints, **task.report)
     return Attempt(*made, weights)
