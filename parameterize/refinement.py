@@ -218,7 +218,7 @@ def _optimized_on(
     start, surface = volume.on_knots(finer), fit.on_knots(finer)
     form = DeterminantForm(start)
     nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < config.min_coefficient)
-    found, _ = optimize(
+    found, course = optimize(
         torch.as_tensor(np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0))),
         finer,
         surface,
@@ -229,4 +229,5 @@ def _optimized_on(
         watched=form.numbers(nearly),
         **report,
     )
+    _log.info("the rounds end: %s; %s", course.ending, course.ending.sentence)
     return found, surface

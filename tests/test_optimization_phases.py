@@ -11,9 +11,10 @@ from test_optimization_rounds import CONFIG, surface_fit
 from parameterize.optimization.endings import Course, Reason
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.optimized import Optimized
-from parameterize.optimization.phases import Grow, Polish, Schedule, Separate, Shape, Unfold
+from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.state import State
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.starts.growth import Grow
 
 KNOTS = (open_uniform_knots(14, 3),) * 3
 

@@ -36,8 +36,6 @@ _STALLING = 8  # rounds in which the unproved spans are not halved: another star
 _SMOOTHING_ROUNDS = 2  # likewise; F is then smoothed there: no descent undoes some folds
 _MOST_SMOOTHED = 10  # spans that stay unproved: to smooth F near more of them would take its shape away
 _MENDINGS = 6  # attempts to restore certified control points around spans that fold again
-FAR = 0.02  # from the surface, root mean square: a folded map so far away has left the surface to unfold
-PARTED = 0.01  # likewise where sheets are pushed apart: a map so far away is worth no polish
 
 
 @dataclass(frozen=True)
@@ -45,12 +43,15 @@ class Phase(ABC):
     """Rounds with one aim.
 
     penalties: on det J, one for each round of the stage, then the last again. firm: rounds of the stage after which the
-    surface's data give way at unproved spans.
+    surface's data give way at unproved spans. shares: where F grows, of the weight of the surface's data, one a round.
+    steps: of Newton's method in a round, at most; None: as many as the options say.
     """
 
     name: ClassVar[str]
     penalties: tuple[float, ...] = (FULL_PENALTY,)
     firm: int = FIRM_ROUNDS
+    shares: tuple[float, ...] = ()
+    steps: int | None = None
 
     def penalty(self, number: int) -> float:
         """Return the weight of the penalties on det J in a round."""
@@ -70,22 +71,6 @@ class Phase(ABC):
     @abstractmethod
     def done(self, state: State) -> Reason | None:
         """Return why the phase is over; None where it goes on."""
-
-
-@dataclass(frozen=True)
-class Grow(Phase):
-    """F grows from a cube: the surface's data draw it with a larger share of their weight, `shares`, round by round.
-
-    steps: of Newton's method in a round, at most.
-    """
-
-    name = "grow"
-    shares: tuple[float, ...] = ()
-    steps: int = 1
-
-    def done(self, state: State) -> Reason | None:
-        """End when all shares have been taken."""
-        return Reason.GROWN if state.number >= len(self.shares) else None
 
 
 @dataclass(frozen=True)
@@ -110,8 +95,8 @@ class Unfold(Phase):
     """
 
     name = "unfold"
-    far: float = FAR
-    far_first: float = FAR
+    far: float = 0.02
+    far_first: float = 0.02
     first: int = 0
 
     def amended(self, state: State, found: Optimized) -> Optimized:
@@ -147,7 +132,7 @@ class Separate(Phase):
 
     name = "separate"
     rounds: int = 6
-    far: float = PARTED
+    far: float = 0.01
 
     def begin(self, state: State) -> None:
         """Let the surface give way where sheets touch."""
@@ -231,4 +216,4 @@ class Schedule:
     @property
     def grown(self) -> int:
         """The number of rounds in which F grows."""
-        return sum(len(phase.shares) for phase in self.phases if isinstance(phase, Grow))
+        return sum(len(phase.shares) for phase in self.phases)

@@ -4,7 +4,6 @@ import math
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -80,8 +79,7 @@ class State:
         """Go on from the checkpoint that `save` has kept, where there is one."""
         if (saved := checkpoints.load(_CHECKPOINT)) is None:
             return
-        tensors: dict[str, Tensor] = saved[0]
-        state: dict[str, Any] = saved[1]
+        tensors, state = saved
         energy = self.energy
         energy.surface.places.place(tensors["parameters"].numpy(), tensors["cube_faces"].numpy())
         energy.surface.give_way(tensors["yielding"].numpy())

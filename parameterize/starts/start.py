@@ -1,5 +1,6 @@
 """What a start is: it makes a map of a surface, which the rounds then optimise; and what all starts share."""
 
+import logging
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -23,6 +24,8 @@ from ..optimization.surface_distance import SurfaceFit
 from ..progress import timed
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
+
+_log = logging.getLogger(__name__)
 
 Origin = Literal["network", "growth", "extension"]
 MOST_POINTS = (
@@ -129,4 +132,6 @@ def optimized(
     """Optimise a first map `control` (3, n_u, n_v, n_w) on the knots of `fit`."""
     with timed(task.seconds, "optimize"):
         made = optimize_coarse_first(control, fit, spline, schedule, checkpoints=checkpoints, **task.report)
-    return Attempt(*made, spline)
+    attempt = Attempt(*made, spline)
+    _log.info("the rounds end: %s; %s", attempt.course.ending, attempt.course.ending.sentence)
+    return attempt
