@@ -98,8 +98,8 @@ class SplineConfig:
     facing_margin: float = 3.0  # times `min_facing`: points below may fall under it in the next step and are watched
     gap: float = 1e-3  # sheets of a boundary that meets itself are pushed so far apart
     contact: float = 10.0  # share of `vertex` for the squared depth by which they miss that
-    rounds: int = 16  # at most
-    smoothing_tolerance: float = 1e-8  # of the solve for this, relative
+    rounds: int = 16  # at most, of a map that a trained network gives; other maps have some more
+    smoothing_tolerance: float = 1e-8  # of the solve for the smoothest F near unproved spans, relative
     smoothing_iterations: int = 5000  # of it, at most
     steps: int = 60  # a round, at most
     slides: int = 3  # of the boundary parameters after each step
@@ -116,7 +116,7 @@ class SplineConfig:
 
 @dataclass(frozen=True)
 class RefinementConfig:
-    """When knots are inserted after the spline stage, where, and how the map is optimised then.
+    """When knots are inserted after the spline stage; refinement.py says where, and how the map is optimised then.
 
     tolerance: of the root mean square distance between the surface and the spline's boundary, taken both ways, over the
     diagonal of the surface's bounding box.

@@ -22,12 +22,7 @@ from .state import MOST_WATCHED, State
 _log = logging.getLogger(__name__)
 
 FULL_PENALTY = 2500.0  # weight on det J once F has its shape: what the surface's data fold then unfolds against them
-RAMP = (
-    20.0,
-    100.0,
-    500.0,
-    FULL_PENALTY,
-)  # one a round, for a map that starts folded: it may still take its shape through folds
+RAMP = (20.0, 100.0, 500.0, FULL_PENALTY)  # one a round, for a map that starts folded: it takes its shape through folds
 PATIENT_ROUNDS = 2  # of a stage: after them anchors let go, and the penalty grows at unproved spans
 FIRM_ROUNDS = 4  # after these the surface gives way at unproved spans, which more weight alone has not unfolded
 GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
