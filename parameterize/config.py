@@ -80,7 +80,7 @@ class SplineConfig:
     control_points: int = 30
     degree: int = 3
     fit_cell: float = 0.035  # lattice of inverse samples
-    rounds: int = 16  # at most
+    rounds: int = 16  # at most, of a map that a trained network gives; other maps have some more
     steps: int = 60  # a round, at most
 
     @property
@@ -91,7 +91,7 @@ class SplineConfig:
 
 @dataclass(frozen=True)
 class RefinementConfig:
-    """When knots are inserted after the spline stage, where, and how the map is optimised then.
+    """When knots are inserted after the spline stage; refinement.py says where, and how the map is optimised then.
 
     tolerance: of the root mean square distance between the surface and the spline's boundary, taken both ways, over the
     diagonal of the surface's bounding box.

@@ -222,7 +222,7 @@ def _optimized_on(
     start, surface = volume.on_knots(finer), fit.on_knots(finer)
     form = DeterminantForm(start)
     nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < MIN_COEFFICIENT)
-    found, _ = optimize(
+    found, course = optimize(
         SplineMap.of(start),
         surface,
         config,
@@ -233,4 +233,5 @@ def _optimized_on(
         watched=form.numbers(nearly),
         **report,
     )
+    _log.info("the rounds end: %s; %s", course.ending, course.ending.sentence)
     return found, surface

@@ -10,11 +10,12 @@ from test_optimization_rounds import surface_fit
 from parameterize.optimization.endings import Course, Reason
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.optimized import Optimized
-from parameterize.optimization.phases import Grow, Polish, Schedule, Separate, Shape, Unfold
+from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.state import State
 from parameterize.optimization.term import Weights
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.spline_map import SplineMap
+from parameterize.starts.growth import Grow
 
 KNOTS = (open_uniform_knots(14, 3),) * 3
 

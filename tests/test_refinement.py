@@ -9,6 +9,7 @@ from parameterize.checkpoint import Checkpoints
 from parameterize.config import RefinementConfig, SplineConfig
 from parameterize.cube.cube import project_radially
 from parameterize.cube.cutting import subdivide_finely
+from parameterize.optimization.endings import Course, Reason
 from parameterize.optimization.optimized import Optimized
 from parameterize.optimization.phases import FIRM_ROUNDS, RAMP, Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize
@@ -106,7 +107,7 @@ def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypa
     def folded(start, *args, **options):
         pressed = start.control.copy()
         pressed[:, 0, 0, 0] += 0.5
-        return Optimized.of(start.with_control(pressed)), None
+        return Optimized.of(start.with_control(pressed)), Course({}, {}, Reason.STALLED)
 
     monkeypatch.setattr(refinement, "optimize", folded)
     found, fit, told = refined(first, tolerance=1e-9)

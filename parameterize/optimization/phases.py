@@ -21,12 +21,7 @@ from .state import MOST_WATCHED, State
 _log = logging.getLogger(__name__)
 
 FULL_PENALTY = 2500.0  # weight on det J once F has its shape: what the surface's data fold then unfolds against them
-RAMP = (
-    20.0,
-    100.0,
-    500.0,
-    FULL_PENALTY,
-)  # one a round, for a map that starts folded: it may still take its shape through folds
+RAMP = (20.0, 100.0, 500.0, FULL_PENALTY)  # one a round, for a map that starts folded: it takes its shape through folds
 PATIENT_ROUNDS = 2  # of a stage: after them anchors let go, and the penalty grows at unproved spans
 FIRM_ROUNDS = 4  # after these the surface gives way at unproved spans, which more weight alone has not unfolded
 GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
@@ -35,8 +30,6 @@ _STALLING = 8  # rounds in which the unproved spans are not halved: another star
 _SMOOTHING_ROUNDS = 2  # likewise; F is then smoothed there: no descent undoes some folds
 _MOST_SMOOTHED = 10  # spans that stay unproved: to smooth F near more of them would take its shape away
 _MENDINGS = 6  # attempts to restore certified control points around spans that fold again
-FAR = 0.02  # from the surface, root mean square: a folded map so far away has left the surface to unfold
-PARTED = 0.01  # likewise where sheets are pushed apart: a map so far away is worth no polish
 
 
 @dataclass(frozen=True)
@@ -44,12 +37,15 @@ class Phase(ABC):
     """Rounds with one aim.
 
     penalties: on det J, one for each round of the stage, then the last again. firm: rounds of the stage after which the
-    surface's data give way at unproved spans.
+    surface's data give way at unproved spans. shares: where F grows, of the weight of the surface's data, one a round.
+    steps: of Newton's method in a round, at most; None: as many as the options say.
     """
 
     name: ClassVar[str]
     penalties: tuple[float, ...] = (FULL_PENALTY,)
     firm: int = FIRM_ROUNDS
+    shares: tuple[float, ...] = ()
+    steps: int | None = None
 
     def penalty(self, number: int) -> float:
         """Return the weight of the penalties on det J in a round."""
@@ -69,22 +65,6 @@ class Phase(ABC):
     @abstractmethod
     def done(self, state: State) -> Reason | None:
         """Return why the phase is over; None where it goes on."""
-
-
-@dataclass(frozen=True)
-class Grow(Phase):
-    """F grows from a cube: the surface's data draw it with a larger share of their weight, `shares`, round by round.
-
-    steps: of Newton's method in a round, at most.
-    """
-
-    name = "grow"
-    shares: tuple[float, ...] = ()
-    steps: int = 1
-
-    def done(self, state: State) -> Reason | None:
-        """End when all shares have been taken."""
-        return Reason.GROWN if state.number >= len(self.shares) else None
 
 
 @dataclass(frozen=True)
@@ -109,8 +89,8 @@ class Unfold(Phase):
     """
 
     name = "unfold"
-    far: float = FAR
-    far_first: float = FAR
+    far: float = 0.02
+    far_first: float = 0.02
     first: int = 0
 
     def amended(self, state: State, found: Optimized) -> Optimized:
@@ -146,7 +126,7 @@ class Separate(Phase):
 
     name = "separate"
     rounds: int = 6
-    far: float = PARTED
+    far: float = 0.01
 
     def begin(self, state: State) -> None:
         """Let the surface give way where sheets touch."""
@@ -231,4 +211,4 @@ class Schedule:
     @property
     def grown(self) -> int:
         """The number of rounds in which F grows."""
-        return sum(len(phase.shares) for phase in self.phases if isinstance(phase, Grow))
+        return sum(len(phase.shares) for phase in self.phases)

@@ -4,10 +4,8 @@ import math
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
@@ -80,8 +78,7 @@ class State:
         """Go on from the checkpoint that `save` has kept, where there is one."""
         if (saved := checkpoints.load(_CHECKPOINT)) is None:
             return
-        arrays: dict[str, NDArray[Any]] = saved[0]
-        state: dict[str, Any] = saved[1]
+        arrays, state = saved
         energy = self.energy
         energy.surface.places.place(arrays["parameters"], arrays["cube_faces"])
         energy.surface.give_way(arrays["yielding"])

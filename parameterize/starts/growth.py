@@ -15,7 +15,9 @@ from ..arrays import Knots
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.flips import Layout
-from ..optimization.phases import FAR, PARTED, Grow, Polish, Schedule, Separate, Unfold
+from ..optimization.endings import Reason
+from ..optimization.phases import Phase, Polish, Schedule, Separate, Unfold
+from ..optimization.state import State
 from ..optimization.term import Weights
 from ..progress import timed
 from ..spline.bspline import greville
@@ -30,6 +32,17 @@ from .start import Attempt, Start, Task, optimized
 SHARES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 STEPS = 12  # of Newton's method in each of these rounds, at most: the next one moves F on anyway
 _COARSE = 1 / 3  # of the spans a direction in these rounds: F is smooth while it grows
+
+
+@dataclass(frozen=True)
+class Grow(Phase):
+    """F grows from a cube: the surface's data draw it with a larger share of their weight in each round."""
+
+    name = "grow"
+
+    def done(self, state: State) -> Reason | None:
+        """End when all shares have been taken."""
+        return Reason.GROWN if state.number >= len(self.shares) else None
 
 
 @dataclass(frozen=True)
@@ -66,8 +79,8 @@ class Growth(Start):
         grown, steps = len(SHARES), scaled_steps(STEPS, config.steps_factor)
         phases = (
             Grow(firm=self.firm, shares=SHARES, steps=steps),
-            Unfold(firm=self.firm, far=max(FAR, self.far), far_first=self.far, first=grown + 1),
-            Separate(firm=self.firm, far=max(PARTED, self.far)),
+            Unfold(firm=self.firm, far=max(Unfold.far, self.far), far_first=self.far, first=grown + 1),
+            Separate(firm=self.firm, far=max(Separate.far, self.far)),
             Polish(),
         )
         return Schedule(phases, grown + config.spline.rounds + MORE_ROUNDS, (steps,) * grown + USUAL_STEPS)

@@ -1,5 +1,6 @@
 """What a start is: it makes a map of a surface, which the rounds then optimise; and what all starts share."""
 
+import logging
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -23,6 +24,8 @@ from ..progress import timed
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
+
+_log = logging.getLogger(__name__)
 
 Origin = Literal["network", "growth", "extension"]
 MOST_POINTS = (
@@ -130,4 +133,6 @@ def optimized(
     spline = task.config.spline
     with timed(task.seconds, "optimize"):
         made = optimize_coarse_first(first, fit, spline, schedule, weights, checkpoints=checkpoints, **task.report)
-    return Attempt(*made, weights)
+    attempt = Attempt(*made, weights)
+    _log.info("the rounds end: %s; %s", attempt.course.ending, attempt.course.ending.sentence)
+    return attempt
