@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.display import Brief, above
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
@@ -27,7 +28,7 @@ from .forms.frame import UnitFrame
 from .forms.mass import Mass
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
-from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
+from .linear.krylov import generalized_residuals
 from .solver import prepared
 from .system import SolverOptions, System, assemble_data, build
 

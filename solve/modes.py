@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, lobpcg
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.display import Brief
 from parameterize.files import save_arrays
 from parameterize.spline.volume import BSplineVolume
@@ -20,7 +21,6 @@ from .field import SplineField
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import Problem
-from .linear.krylov import conjugate_gradients
 from .solver import discretized
 from .system import System
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from parameterize.threads import one_blas_thread
 
@@ -29,7 +30,7 @@ from .forms.form import check_law
 from .forms.mass import Mass
 from .forms.poisson import Poisson
 from .forms.problem import BoundaryValueProblem, Problem
-from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
+from .linear.krylov import generalized_residuals
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
 from .reactions import balance
 from .solution import Solution, SolveReport

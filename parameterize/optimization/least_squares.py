@@ -3,10 +3,11 @@
 import numpy as np
 
 from ..arrays import Array, Knots
+from ..conjugate_gradients import conjugate_gradients
 from ..spline.bspline import basis_derivatives
 from ..spline.spline_map import SplineMap
 from .bending import bending_operator, grams
-from .operators import ControlRows, conjugate_gradients, weighted_sum
+from .operators import ControlRows, weighted_sum
 from .tensor_product import FastDiagonalization
 
 
@@ -31,5 +32,5 @@ def fit_pairs(
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
     operator = weighted_sum([(1.0, rows.squared(weights[:, None, None] * np.eye(3))), (1.0, smooth)])
     right = rows.adjoint(weights[:, None] * points, np.zeros((3, *sizes)))
-    control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
-    return SplineMap(degree, knots, control)
+    found = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
+    return SplineMap(degree, knots, found.x)
