@@ -8,9 +8,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from .arrays import Array, Knots
+from .arrays import Knots
 from .checkpoint import Checkpoints
 from .config import SplineConfig
 from .optimization.endings import Course
@@ -20,7 +18,8 @@ from .optimization.rounds import optimize
 from .optimization.surface_distance import SurfaceFit
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
-from .spline.bspline import evaluate_grid, greville, interpolate_grid, open_uniform_knots
+from .spline.bspline import open_uniform_knots
+from .spline.spline_map import SplineMap
 
 
 def coarse_knots(config: SplineConfig, share: float) -> Knots:
@@ -30,7 +29,7 @@ def coarse_knots(config: SplineConfig, share: float) -> Knots:
 
 
 def optimize_coarse_first(
-    control: Array,
+    start: SplineMap,
     fit: SurfaceFit,
     config: SplineConfig,
     schedule: Schedule,
@@ -40,31 +39,22 @@ def optimize_coarse_first(
     progress: ProgressCallback,
     checkpoints: Checkpoints,
 ) -> tuple[Optimized, Course, SurfaceFit]:
-    """Run the first phase on the knots of `control` and `fit`, the others on all; return map, course and data there.
+    """Run the first phase on the knots of `start` and `fit`, the others on all; return map, course and data there.
 
-    control: (3, n_u, n_v, n_w) on `coarse_knots`. The first rounds have a checkpoint of their own. Where both sets of
+    start: on `coarse_knots`. The first rounds have a checkpoint of their own. Where both sets of
     knots are the same, all rounds are one run.
     """
     report: dict[str, Any] = {"history": history, "progress": progress}
-    knots, fine = fit.places.knots, (open_uniform_knots(config.control_points, config.degree),) * 3
-    if len(fine[0]) == len(knots[0]):
-        return *optimize(control, fine, fit, config, schedule, weights, checkpoints=checkpoints, **report), fit
-    longer = (len(fine[0]) / len(knots[0])) ** 1.5  # that a step takes on all of them, about
+    fine = (open_uniform_knots(config.control_points, config.degree),) * 3
+    if len(fine[0]) == len(start.knots[0]):
+        return *optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, **report), fit
+    longer = (len(fine[0]) / len(start.knots[0])) ** 1.5  # that a step takes on all of them, about
     begun = min(schedule.grown or PATIENT_ROUNDS, schedule.rounds - 1)  # at least one round is on all
     usual = schedule.usual_steps[:begun]
     usual += tuple(math.ceil(longer * steps) for steps in schedule.usual_steps[begun:])
     first = replace(schedule, rounds=begun, usual_steps=usual)
     kept = checkpoints.of_part("coarse")
-    found, earlier = optimize(control, knots, fit, config, first, weights, checkpoints=kept, **report)
-    control, fit = interpolated(found.control, knots, fine, config.degree), fit.on_knots(fine)
-    found, course = optimize(
-        control, fine, fit, config, schedule, weights, checkpoints=checkpoints, begun=begun, **report
-    )
+    found, earlier = optimize(start, fit, config, first, weights, checkpoints=kept, **report)
+    start, fit = found.spline.interpolated(fine), fit.on_knots(fine)
+    found, course = optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, begun=begun, **report)
     return found, course.after(earlier), fit
-
-
-def interpolated(control: Array, knots: Knots, finer: Knots, degree: int) -> Array:
-    """Return the control points (3, n_u, n_v, n_w) on other knots of the map that agrees at their Greville points."""
-    places = [greville(row, degree) for row in finer]
-    values = evaluate_grid((degree,) * 3, knots, np.moveaxis(control, 0, -1), places)
-    return np.ascontiguousarray(np.moveaxis(interpolate_grid(finer, degree, values), -1, 0))

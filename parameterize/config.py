@@ -57,7 +57,7 @@ class SplineConfig:
     control_points: int = 30
     degree: int = 3
     fit_cell: float = 0.035  # lattice of inverse samples
-    rounds: int = 16  # at most
+    rounds: int = 16  # at most, of a map that a trained network gives; other maps have some more
     steps: int = 60  # a round, at most
 
     @property
@@ -68,7 +68,7 @@ class SplineConfig:
 
 @dataclass(frozen=True)
 class RefinementConfig:
-    """When knots are inserted after the spline stage, where, and how the map is optimised then.
+    """When knots are inserted after the spline stage; refinement.py says where, and how the map is optimised then.
 
     tolerance: of the root mean square distance between the surface and the spline's boundary, taken both ways, over the
     diagonal of the surface's bounding box.
@@ -159,8 +159,6 @@ class Config:
         if n > MAX_CONTROL_POINTS:
             raise ValueError(f"at most {MAX_CONTROL_POINTS} control points per direction can be run, got {n}")
         return replace(self, spline=replace(self.spline, control_points=n))
-
-
 
 
 def scaled_steps(steps: int, factor: float) -> int:

@@ -27,6 +27,7 @@ from .progress import History, ProgressCallback
 from .quality.quality import arap_grid
 from .quality.two_sided import two_sided
 from .spline.bspline import breakpoints, midpoints
+from .spline.spline_map import SplineMap
 from .spline.volume import BSplineVolume
 
 _log = logging.getLogger(__name__)
@@ -133,7 +134,7 @@ class _Spots:
     @classmethod
     def of(cls, found: Optimized, fit: SurfaceFit) -> "_Spots":
         """Measure as the report will."""
-        volume = BSplineVolume((fit.places.degree,) * 3, fit.places.knots, np.moveaxis(found.control, 0, -1))
+        volume = found.spline.volume
         gaps = two_sided(volume, fit.points, fit.places.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
         unproved = found.certificate.unproved
@@ -221,9 +222,8 @@ def _optimized_on(
     start, surface = volume.on_knots(finer), fit.on_knots(finer)
     form = DeterminantForm(start)
     nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < MIN_COEFFICIENT)
-    found, _ = optimize(
-        np.ascontiguousarray(np.moveaxis(start.control_points, -1, 0)),
-        finer,
+    found, course = optimize(
+        SplineMap.of(start),
         surface,
         config,
         schedule,
@@ -233,4 +233,5 @@ def _optimized_on(
         watched=form.numbers(nearly),
         **report,
     )
+    _log.info("the rounds end: %s; %s", course.ending, course.ending.sentence)
     return found, surface

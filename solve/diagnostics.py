@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import INDEFINITE, LinearResult
 from parameterize.quality.quality import scaled_jacobian
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
@@ -17,7 +18,6 @@ from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import in_scaled
 from .forms.parser import Expression, ExpressionError
-from .linear.krylov import INDEFINITE, LinearResult
 from .solution import Solution
 
 # Parameters per direction: the ends, and between them places without a pattern that a periodic formula could share.

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.display import Brief, above
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
@@ -26,7 +27,7 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import Data, parse
 from .forms.frame import UnitFrame
 from .forms.mass import Mass
-from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
+from .linear.krylov import generalized_residuals
 from .options import IterationOptions, SolveOptions
 from .solver import prepared
 from .system import System, build

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, lobpcg
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.display import Brief
 from parameterize.files import save_arrays
 from parameterize.spline.volume import BSplineVolume
@@ -18,7 +19,6 @@ from parameterize.spline.volume import BSplineVolume
 from .diagnostics import ConvergenceError
 from .field import SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
-from .linear.krylov import conjugate_gradients
 from .options import SolveOptions
 from .solver import discretized
 from .system import System

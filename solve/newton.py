@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import INDEFINITE, conjugate_gradients
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
 
@@ -21,7 +22,7 @@ from .field import SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
 from .forms.problem import Problem
-from .linear.krylov import INDEFINITE, conjugate_gradients, generalized_residuals
+from .linear.krylov import generalized_residuals
 from .linear.preconditioner import fast_diagonalization
 from .options import SolveOptions
 from .solution import Solution, SolveReport

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
 
@@ -25,7 +26,7 @@ from .discretization.weak import WeakFace
 from .field import SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
-from .linear.krylov import LinearResult, conjugate_gradients, generalized_residuals
+from .linear.krylov import generalized_residuals
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
 from .options import IterationOptions, SolveOptions, check_device
 from .reactions import balance

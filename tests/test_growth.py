@@ -51,11 +51,11 @@ def test_the_first_map_is_a_cube_that_faces_the_surface():
     surface = bent_rod()
     layout = on_cube(surface, preset("fast").with_control_points(8))
     knots = (open_uniform_knots(8, 3),) * 3
-    control = first_cube(layout, knots, 3)
-    found = Optimized.of(control, knots, 3)
+    cube = first_cube(layout, knots, 3)
+    found = Optimized.of(cube)
     assert found.certificate.verdict == "certified"
     assert found.certificate.lower_bound == pytest.approx(1.0)
-    flat = np.moveaxis(control, 0, -1)
+    flat = cube.volume.control_points
     axes = np.stack([flat[-1, 0, 0] - flat[0, 0, 0], flat[0, -1, 0] - flat[0, 0, 0], flat[0, 0, -1] - flat[0, 0, 0]])
     assert axes @ axes.T == pytest.approx(np.eye(3))
     towards = ((layout.places - 0.5) @ axes * (layout.points - 0.5)).sum()

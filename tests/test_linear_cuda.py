@@ -5,11 +5,11 @@ torch = pytest.importorskip("torch")
 
 from volumes import scalar_system  # noqa: E402
 
+from parameterize.conjugate_gradients import conjugate_gradients  # noqa: E402
 from parameterize.spline.volume import FACE_NAMES  # noqa: E402
 from solve import Poisson, benchmark_volume, solve_problem  # noqa: E402
 from solve.discretization.space import trial_space  # noqa: E402
 from solve.linear.cuda import DeviceOperator, device_preconditioner, solve_on_device  # noqa: E402
-from solve.linear.krylov import conjugate_gradients  # noqa: E402
 from solve.linear.preconditioner import fast_diagonalization  # noqa: E402
 
 DEVICES = ["cpu", pytest.param("cuda", marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU"))]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from volumes import mapped, scalar_system
 
+from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.spline.volume import FACE_NAMES
 from solve import Elasticity, discretize
-from solve.linear.krylov import conjugate_gradients
 from solve.linear.preconditioner import NO_FACTOR, fast_diagonalization
 from solve.linear.shear import OFFSETS, SHIFTS, _factorize, _stencils, helps, incomplete_cholesky
 from solve.study import benchmark_volume

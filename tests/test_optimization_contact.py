@@ -7,8 +7,9 @@ import pytest
 from volumes import bent, mapped
 
 from parameterize.certificate.boundary import check_boundary
+from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.optimization.contact import contact_penalty
-from parameterize.optimization.operators import conjugate_gradients
+from parameterize.spline.spline_map import SplineMap
 
 GAP = 1e-3
 TURNS = 1.5
@@ -21,12 +22,12 @@ def spring(gap):
 
 
 def control_of(volume):
-    return np.moveaxis(volume.control_points, -1, 0).copy()
+    return SplineMap.of(volume).control
 
 
 @cache
 def contact(volume, gap=GAP):
-    return contact_penalty(volume.knots, 3, control_of(volume), gap)
+    return contact_penalty(SplineMap.of(volume), gap)
 
 
 def distances(volume):
@@ -61,11 +62,11 @@ def test_gradient_and_curvature_are_those_of_the_energy():
 
 def test_looking_near_the_last_contact_finds_what_looking_everywhere_does():
     before, control, everywhere = contact(spring(-1e-2)), control_of(spring(-8e-3)), contact(spring(-8e-3))
-    near = contact_penalty(spring(-8e-3).knots, 3, control, GAP, near=before.near)
+    near = contact_penalty(SplineMap.of(spring(-8e-3)), GAP, near=before.near)
     assert 0 < len(before.near) < 0.9 * 6 * 110**2
     assert np.array_equal(near.spans, everywhere.spans)
     assert near.energy_and_gradient(control)[0] == everywhere.energy_and_gradient(control)[0] > 0.0
-    nothing = contact_penalty(spring(-8e-3).knots, 3, control, GAP, near=before.near[:0])
+    nothing = contact_penalty(SplineMap.of(spring(-8e-3)), GAP, near=before.near[:0])
     assert nothing.energy_and_gradient(control)[0] == 0.0
 
 
@@ -74,13 +75,13 @@ def test_turns_that_overlap_are_parted():
     assert check_boundary(volume).injective is False
     control = control_of(volume)
     for _ in range(4):
-        penalty = contact_penalty(volume.knots, 3, control, GAP)
+        penalty = contact_penalty(SplineMap(3, volume.knots, control), GAP)
         _, gradient = penalty.energy_and_gradient(control)
         curvature = penalty.curvature(control)
-        step, _ = conjugate_gradients(
+        step = conjugate_gradients(
             lambda x, bend=curvature: bend(x) + 1e-6 * x, -gradient, lambda x: x, tolerance=1e-6, max_iterations=200
         )
-        control = control + step
+        control = control + step.x
     parted = type(volume)(volume.degrees, volume.knots, np.moveaxis(control, 0, -1))
     assert check_boundary(parted).injective is True
 
@@ -89,6 +90,6 @@ def test_samples_are_looked_at_in_parts_with_the_same_result(monkeypatch):
     volume = spring(-1e-2)
     whole = contact(volume)
     monkeypatch.setattr("parameterize.optimization.contact._CHUNK", 37)
-    parts = contact_penalty(volume.knots, 3, control_of(volume), GAP)
+    parts = contact_penalty(SplineMap.of(volume), GAP)
     assert np.array_equal(parts.spans, whole.spans) and len(parts.spans) > 2 * 37
     assert np.array_equal(parts.normals, whole.normals)

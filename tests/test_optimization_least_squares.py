@@ -25,9 +25,9 @@ def samples(count):
 
 def fit(parameters, points, fairness, weights=None):
     weights = np.full(len(points), 1.0 / len(points)) if weights is None else weights
-    control = fit_pairs(parameters, points, weights, KNOTS, DEGREE, fairness=fairness)
-    assert control.flags.c_contiguous
-    return BSplineVolume((DEGREE,) * 3, KNOTS, np.moveaxis(control, 0, -1))
+    found = fit_pairs(parameters, points, weights, KNOTS, DEGREE, fairness=fairness)
+    assert found.control.flags.c_contiguous
+    return found.volume
 
 
 def test_a_spline_is_found_again_from_its_samples():

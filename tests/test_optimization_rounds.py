@@ -18,6 +18,7 @@ from parameterize.optimization.term import RoundWeights, Weights
 from parameterize.progress import History
 from parameterize.quality.quality import arap
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
+from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
@@ -115,7 +116,9 @@ def test_the_number_of_threads_changes_no_bit(monkeypatch):
 def optimise_from(control, schedule=SCHEDULE, config=CONFIG, fit=None, **options):
     """Return the map, the course of the rounds, and the columns of their history."""
     history = History()
-    found, course = optimize(control, KNOTS, fit or surface_fit(), config, schedule, history=history, **options)
+    found, course = optimize(
+        SplineMap(3, KNOTS, control), fit or surface_fit(), config, schedule, history=history, **options
+    )
     return found, course, history.arrays()
 
 
@@ -131,10 +134,10 @@ def test_an_easy_shape_ends_certified_with_less_distortion():
     before = np.linalg.norm(fit.residuals(start), axis=1).mean()
     found, course, columns = optimise_from(start, fit=fit)
     assert found.certificate.verdict == "certified"
-    volume = as_volume(found.control)
+    volume = as_volume(found.spline.control)
     assert certify(volume).verdict == "certified"
     assert mean_arap(volume) < 0.75 * mean_arap(as_volume(start))
-    assert np.linalg.norm(fit.residuals(found.control), axis=1).mean() < 0.5 * before
+    assert np.linalg.norm(fit.residuals(found.spline.control), axis=1).mean() < 0.5 * before
     first = columns["loss"][: CONFIG.steps]
     assert set(columns["stage"]) == {"spline"} and (np.diff(first) < 0.0).all()
     assert course.ending is Reason.POLISHED
@@ -147,7 +150,7 @@ def test_a_folded_start_is_unfolded():
     assert certify(as_volume(start)).verdict == "folded"
     found, _, _ = optimise_from(start)
     assert found.certificate.verdict == "certified"
-    assert mean_arap(as_volume(found.control)) < mean_arap(as_volume(start))
+    assert mean_arap(as_volume(found.spline.control)) < mean_arap(as_volume(start))
 
 
 def test_smoothing_bends_least_next_to_the_spans_and_moves_nothing_else():
@@ -186,7 +189,7 @@ def test_interrupted_between_rounds_goes_on_to_the_same_result(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         optimise_from(start, progress=interrupt, checkpoints=Checkpoints(tmp_path, {}, resume=False), **options)
     resumed, again, others = optimise_from(start, checkpoints=Checkpoints(tmp_path, {}, resume=True), **options)
-    assert np.array_equal(resumed.control, whole.control)
+    assert np.array_equal(resumed.spline.control, whole.spline.control)
     assert np.array_equal(others["loss"], columns["loss"]) and np.array_equal(others["step"], columns["step"])
     assert (again.rounds, again.ending) == (course.rounds, course.ending)
     assert again.seconds.keys() == course.seconds.keys()
@@ -229,5 +232,5 @@ def test_what_was_certified_is_the_result_where_the_polish_folds_more(monkeypatc
     fit = surface_fit()
     fit.give_way(np.full(len(fit.points), 1e-6))  # so that the polish has something to take back
     found, course, _ = optimise_from(start, replace(SCHEDULE, rounds=12), fit=fit)
-    assert found.certificate.verdict == "certified" and np.array_equal(found.control, start)
+    assert found.certificate.verdict == "certified" and np.array_equal(found.spline.control, start)
     assert course.ending is Reason.FOLDS_AGAIN and course.rounds == {"shape": 1, "polish": 2}

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from parameterize.optimization.bending import bending_operator, grams
-from parameterize.optimization.operators import ControlRows, conjugate_gradients
+from parameterize.optimization.operators import ControlRows
 from parameterize.optimization.tensor_product import FastDiagonalization, GaussGrid, along
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
@@ -123,39 +123,6 @@ def test_fast_diagonalization_is_the_inverse(shift):
             term = along(rough[other] if other == axis else mass[other], term, other + 1)
         image = image + term
     assert np.allclose(solve(image), x, atol=1e-9)
-
-
-def spd(n, seed):
-    root = np.random.default_rng(seed).normal(size=(n, n))
-    return root @ root.T + np.eye(n)
-
-
-def test_conjugate_gradients_solve_in_at_most_n_steps():
-    matrix, x = spd(8, 0), np.arange(8.0)
-    found, count = conjugate_gradients(
-        lambda v: matrix @ v, matrix @ x, lambda r: r.copy(), tolerance=1e-10, max_iterations=20
-    )
-    assert np.allclose(found, x, atol=1e-8)
-    assert count <= 10
-
-
-def test_an_exact_preconditioner_needs_one_step():
-    matrix, x = spd(8, 1), np.ones(8)
-    found, count = conjugate_gradients(
-        lambda v: matrix @ v, matrix @ x, lambda r: np.linalg.solve(matrix, r), tolerance=1e-10, max_iterations=20
-    )
-    assert count == 1 and np.allclose(found, x)
-
-
-def test_conjugate_gradients_stop_where_told():
-    matrix = spd(30, 2)
-    right = np.ones(30)
-    _, count = conjugate_gradients(lambda v: matrix @ v, right, lambda r: r, tolerance=0.0, max_iterations=3)
-    assert count == 3
-    zero, count = conjugate_gradients(lambda v: matrix @ v, 0.0 * right, lambda r: r, tolerance=1e-3, max_iterations=3)
-    assert count == 0 and not zero.any()
-    loose, _ = conjugate_gradients(lambda v: matrix @ v, right, lambda r: r, tolerance=1e-2, max_iterations=99)
-    assert np.linalg.norm(matrix @ loose - right) <= 1e-2 * np.linalg.norm(right)
 
 
 def test_one_point_on_inner_spans():

@@ -9,6 +9,7 @@ from parameterize.checkpoint import Checkpoints
 from parameterize.config import RefinementConfig, SplineConfig
 from parameterize.cube.cube import project_radially
 from parameterize.cube.cutting import subdivide_finely
+from parameterize.optimization.endings import Course, Reason
 from parameterize.optimization.optimized import Optimized
 from parameterize.optimization.phases import FIRM_ROUNDS, RAMP, Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize
@@ -19,7 +20,7 @@ from parameterize.progress import History, ignore
 from parameterize.quality.two_sided import two_sided
 from parameterize.refinement import refine
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.spline_map import SplineMap
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 CONFIG = SplineConfig(control_points=6, steps=12)
@@ -50,7 +51,7 @@ def first():
     """A certified map, and its surface data."""
     fit, row = surface_fit(), greville(KNOTS[0], 3)
     control = np.stack(np.meshgrid(row, row, row, indexing="ij"))
-    found, _ = optimize(control, KNOTS, fit, CONFIG, SCHEDULE, history=History())
+    found, _ = optimize(SplineMap(3, KNOTS, control), fit, CONFIG, SCHEDULE, history=History())
     assert not any(found.faults)
     return found, fit
 
@@ -63,7 +64,7 @@ def refined(first, checkpoints=None, progress=ignore, **options):
 
 def distance(found, fit):
     """Between the surface and the boundary of F, both ways, over the diagonal."""
-    volume = BSplineVolume((3,) * 3, fit.places.knots, np.moveaxis(found.control, 0, -1))
+    volume = found.spline.volume
     return two_sided(volume, fit.points, fit.places.triangles).summary().rms / np.linalg.norm(
         np.ptp(fit.points, axis=0)
     )
@@ -90,7 +91,7 @@ def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
     assert told.stopped == "tolerance met" and len(told.levels) > 1
     assert distance(found, fit) == told.levels[-1].distance <= options["tolerance"]
     assert not any(found.faults)
-    assert tuple(found.control.shape[1:]) == told.levels[-1].control_points > (6, 6, 6)
+    assert tuple(found.spline.control.shape[1:]) == told.levels[-1].control_points > (6, 6, 6)
     for row in fit.places.knots:
         assert set(KNOTS[0]) < set(row)
 
@@ -98,15 +99,15 @@ def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
 def test_no_direction_gets_more_than_the_limit(first):
     found, fit, told = refined(first, tolerance=1e-9, max_control_points=7)
     assert told.stopped == "limit reached"
-    assert max(told.levels[-1].control_points) == 7 == max(found.control.shape[1:])
+    assert max(told.levels[-1].control_points) == 7 == max(found.spline.control.shape[1:])
     assert not any(found.faults) and distance(found, fit) < distance(*first)
 
 
 def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypatch, caplog):
-    def folded(control, knots, *args, **options):
-        pressed = control.copy()
+    def folded(start, *args, **options):
+        pressed = start.control.copy()
         pressed[:, 0, 0, 0] += 0.5
-        return Optimized.of(pressed, knots, 3), None
+        return Optimized.of(start.with_control(pressed)), Course({}, {}, Reason.STALLED)
 
     monkeypatch.setattr(refinement, "optimize", folded)
     found, fit, told = refined(first, tolerance=1e-9)
@@ -119,13 +120,13 @@ def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypa
 
 def test_spans_that_are_not_proved_are_halved_first(first, monkeypatch):
     """A fold is pressed into one corner: what lies there is halved, and nothing else."""
-    control, seen = first[0].control.copy(), []
+    control, seen = first[0].spline.control.copy(), []
     control[:, 0, 0, 0] += 0.5
-    found = Optimized.of(control, KNOTS, 3)
+    found = Optimized.of(SplineMap(3, KNOTS, control))
     assert set(map(tuple, found.certificate.unproved)) == {(0, 0, 0)}
 
-    def caught(control, knots, *args, **options):
-        seen.append(knots)
+    def caught(start, *args, **options):
+        seen.append(start.knots)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(refinement, "optimize", caught)
@@ -147,7 +148,7 @@ def test_interrupted_and_resumed_is_undisturbed(first, once, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         refined(first, Checkpoints(tmp_path, {}, resume=False), interrupt, **options)
     resumed, _, again = refined(first, Checkpoints(tmp_path, {}, resume=True), **options)
-    assert np.array_equal(resumed.control, undisturbed.control) and again == told
+    assert np.array_equal(resumed.spline.control, undisturbed.spline.control) and again == told
 
 
 def test_knots_once_chosen_are_those_of_the_checkpoint(first, once, monkeypatch):

@@ -12,9 +12,9 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Floats, IntArray, Knots
+from ..arrays import Array, Floats, IntArray
 from ..spline.sampled_boundary import SampledBoundary
-from ..spline.volume import BSplineVolume
+from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_normals
 from .operators import ControlRows, PiecewiseOperator
 from .sliding import SlidingParameters
@@ -74,16 +74,13 @@ class ContactPenalty:
         return self.first.adjoint(along, like) - self.second.adjoint(along, like)
 
 
-def contact_penalty(
-    knots: Knots, degree: int, control: Array, gap: float = _GAP, near: IntArray | None = None
-) -> ContactPenalty:
-    """Return the penalty for the boundary of F at these control points; it is empty where no two sheets are near.
+def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None = None) -> ContactPenalty:
+    """Return the penalty for the boundary of a map; it is empty where no two sheets are near.
 
-    gap: how far apart sheets must be, in units of the control points (3, n_u, n_v, n_w). near: look at these samples
+    gap: how far apart sheets must be, in units of its control points. near: look at these samples
     alone, those of a penalty a few steps before; looking at all of them takes longer than a Newton step.
     """
-    volume = BSplineVolume((degree,) * 3, knots, np.moveaxis(control, 0, -1))
-    boundary = SampledBoundary.on(volume, *[np.linspace(0.0, 1.0, _SAMPLES)] * 3)
+    boundary = SampledBoundary.on(spline.volume, *[np.linspace(0.0, 1.0, _SAMPLES)] * 3)
     normals = vertex_normals(boundary.points, boundary.triangles)
     asked = np.arange(len(boundary.points)) if near is None else near
     touching = asked
@@ -94,7 +91,8 @@ def contact_penalty(
         touching = asked[winding.winding_number(outside, _ACCURACY) > 0.5]
     near = _around(boundary.points, touching) if near is None else near
     touching, facing = _facing_samples(boundary.points, normals, touching)
-    first, second = (SlidingParameters(knots, degree, boundary.parameters[chosen]) for chosen in (touching, facing))
+    samples = (boundary.parameters[chosen] for chosen in (touching, facing))
+    first, second = (SlidingParameters(spline.knots, spline.degree, parameters) for parameters in samples)
     return ContactPenalty(
         first.rows,
         second.rows,

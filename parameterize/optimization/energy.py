@@ -10,13 +10,15 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..arrays import Array, IntArray, Knots
+from ..conjugate_gradients import conjugate_gradients
+from ..spline.spline_map import SplineMap
 from .bending import Fairness
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import DeterminantPenalty
 from .distortion import Distortion
 from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
-from .operators import conjugate_gradients, weighted_sum
+from .operators import weighted_sum
 from .spans import acting_on, with_neighbours
 from .surface_distance import SurfaceFit
 from .tensor_product import FastDiagonalization
@@ -61,7 +63,7 @@ class SplineEnergy:
         rough = self.fairness.with_stiffness()
         for matrix in rough:
             matrix[[0, -1], [0, -1]] += _PULL * self._round.surface / 6.0
-        return FastDiagonalization(rough, self.fairness.mass).in_single()
+        return FastDiagonalization(rough, self.fairness.mass, dtype=np.float32)
 
     def start_round(self, control: Array, penalty: float, share: float | None = None) -> None:
         """Take a penalty weight, and the limit of the distortion and the floors of det J that suit the control points.
@@ -88,7 +90,7 @@ class SplineEnergy:
 
     def watch_contact(self, control: Array) -> IntArray:
         """Push apart, from now on, the sheets of F's boundary that hardly are at `control`; return their spans."""
-        self._contact = contact_penalty(self._knots, self.degree, control)
+        self._contact = contact_penalty(SplineMap(self.degree, self._knots, control))
         return self._contact.spans
 
     def slide(self, control: Array) -> None:
@@ -102,7 +104,7 @@ class SplineEnergy:
             places.relax(_RELAXATIONS)
         self.watch_facing(control)
         if self._contact is not None:
-            self._contact = contact_penalty(self._knots, self.degree, control, near=self._contact.near)
+            self._contact = contact_penalty(SplineMap(self.degree, self._knots, control), near=self._contact.near)
 
     def give_way(self, spans: IntArray, factor: float) -> None:
         """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""
@@ -141,24 +143,24 @@ class SplineEnergy:
         Which side is folded over which plays no part in this, as it does where det J is penalised.
         """
         free = acting_on(with_neighbours(spans, self.determinants.weights.shape), self.degree)
-        moved, _ = conjugate_gradients(
+        moved = conjugate_gradients(
             lambda x: self.fairness.bend(x) * free,
             -(self.fairness.bend(control) * free),
             lambda x: x,
             tolerance=_SMOOTH_TOLERANCE,
             max_iterations=_SMOOTH_ITERATIONS,
-        )
+        ).x
         return control + moved
 
     def newton_direction(self, control: Array, right: Array, damping: float = 0.0) -> Array:
         """Solve roughly (Hessian + damping) x = right at `control`, the parameters of the surface held."""
         self.distortion.damping = damping
         terms = [(term.weight(self._round), term.curvature(control)) for term in (*self.inner, *self.outer)]
-        direction, _ = conjugate_gradients(
+        direction = conjugate_gradients(
             weighted_sum(terms),
             right.astype(np.float32),
             self._precondition,
             tolerance=_TOLERANCE,
             max_iterations=_ITERATIONS,
-        )
-        return direction.astype(np.float64)
+        ).x
+        return np.asarray(direction, dtype=np.float64)

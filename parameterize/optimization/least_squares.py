@@ -3,14 +3,18 @@
 import numpy as np
 
 from ..arrays import Array, Knots
+from ..conjugate_gradients import conjugate_gradients
 from ..spline.bspline import basis_derivatives
+from ..spline.spline_map import SplineMap
 from .bending import bending_operator, grams
-from .operators import ControlRows, conjugate_gradients, weighted_sum
+from .operators import ControlRows, weighted_sum
 from .tensor_product import FastDiagonalization
 
 
-def fit_pairs(parameters: Array, points: Array, weights: Array, knots: Knots, degree: int, *, fairness: float) -> Array:
-    """Control points (3, n_u, n_v, n_w) that minimise sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
+def fit_pairs(
+    parameters: Array, points: Array, weights: Array, knots: Knots, degree: int, *, fairness: float
+) -> SplineMap:
+    """Return the map that minimises sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
 
     parameters (m, 3) in the unit cube, points (m, 3), weights (m,) that sum to 1: the discrete form of the paper's
     least squares on G(F(x)) = x. Where no sample lies, the smoothing term alone decides.
@@ -28,5 +32,5 @@ def fit_pairs(parameters: Array, points: Array, weights: Array, knots: Knots, de
     precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
     operator = weighted_sum([(1.0, rows.squared(weights[:, None, None] * np.eye(3))), (1.0, smooth)])
     right = rows.adjoint(weights[:, None] * points, np.zeros((3, *sizes)))
-    control, _ = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
-    return control
+    found = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
+    return SplineMap(degree, knots, found.x)

@@ -16,17 +16,12 @@ def cofactors_and_determinants(matrices: Floats) -> tuple[Floats, Floats]:
     """Return the cofactors (3, 3, m), whose transpose over det J is the inverse of J, and the determinants (m,)."""
     cofactors = np.empty_like(matrices)
     for row in range(3):
-        cross(matrices[(row + 1) % 3], matrices[(row + 2) % 3], cofactors[row])
+        a, b = matrices[(row + 1) % 3], matrices[(row + 2) % 3]
+        for c in range(3):
+            p, q = (c + 1) % 3, (c + 2) % 3
+            for i in range(matrices.shape[2]):
+                cofactors[row, c, i] = a[p, i] * b[q, i] - a[q, i] * b[p, i]
     return cofactors, dots(matrices[0], cofactors[0])
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def cross(a: Floats, b: Floats, out: Floats) -> None:
-    """Write the cross products of vectors (3, m) to `out` (3, m)."""
-    for c in range(3):
-        p, q = (c + 1) % 3, (c + 2) % 3
-        for i in range(out.shape[1]):
-            out[c, i] = a[p, i] * b[q, i] - a[q, i] * b[p, i]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

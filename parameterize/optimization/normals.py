@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Floats
 from ..cube.cube import axis_and_side
-from .matrices import cross, dots
+from .matrices import dots
 from .operators import ControlRows, PiecewiseOperator
 from .surface_distance import SurfaceFit
 from .term import RoundWeights
@@ -61,9 +61,7 @@ class FacingPenalty:
     def _slopes(self, control: Floats) -> tuple[Floats, Floats, Floats]:
         """Return (t_a x t_b) . n, last, after its derivatives in t_a and t_b: (3, k) each."""
         a, b = (rows(control).T for rows in self.tangents)
-        by_a, by_b = np.empty_like(self.normals), np.empty_like(self.normals)
-        cross(b, self.normals, by_a)
-        cross(self.normals, a, by_b)
+        by_a, by_b = np.cross(b, self.normals, axis=0), np.cross(self.normals, a, axis=0)
         return by_a, by_b, dots(a, by_a)
 
     def _pull(self, factor: Floats, by_a: Floats, by_b: Floats, like: Floats) -> Floats:

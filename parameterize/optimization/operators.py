@@ -1,4 +1,4 @@
-"""Linear operators on control points: sums made of pieces of work, sparse rows, and conjugate gradients.
+"""Linear operators on control points: sums made of pieces of work, and sparse rows.
 
 Control points are held as (3, n_u, n_v, n_w), component first. Pieces of work run on all threads; their results are
 added in their order, so that the number of threads changes no bit.
@@ -15,7 +15,6 @@ import numpy as np
 from ..arrays import Floats, IntArray
 from ..threads import in_parallel
 
-Operator = Callable[[Floats], Floats]
 _ROWS = 4096  # in a piece of work
 
 
@@ -48,29 +47,6 @@ def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOpera
         return total
 
     return PiecewiseOperator([piece for _, operator in terms for piece in operator.pieces], add)
-
-
-def conjugate_gradients(
-    operator: Operator, right: Floats, precondition: Operator, *, tolerance: float, max_iterations: int
-) -> tuple[Floats, int]:
-    """Solve operator(x) = right from x = 0 until |r| <= tolerance |right|; returns x and the iterations done."""
-    x = np.zeros_like(right)
-    residual = right.copy()
-    goal = tolerance * float(np.linalg.norm(right))
-    direction = precondition(residual)
-    product = float(np.vdot(residual, direction))
-    for iteration in range(max_iterations):
-        if float(np.linalg.norm(residual)) <= goal:
-            return x, iteration
-        image = operator(direction)
-        step = product / float(np.vdot(direction, image))
-        x += step * direction
-        residual -= step * image
-        scaled = precondition(residual)
-        new_product = float(np.vdot(residual, scaled))
-        direction = scaled + (new_product / product) * direction
-        product = new_product
-    return x, max_iterations
 
 
 @dataclass(frozen=True, eq=False)

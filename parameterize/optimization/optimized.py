@@ -1,34 +1,31 @@
-"""A map as the rounds find it: control points, and what is proved of them."""
+"""A map as the rounds find it, and what is proved of it."""
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from ..arrays import Array, Knots
 from ..certificate.boundary import check_boundary
 from ..certificate.jacobian import Certificate, certify
-from ..spline.volume import BSplineVolume
+from ..spline.spline_map import SplineMap
 
 
 @dataclass(frozen=True, eq=False)
 class Optimized:
-    """Control points (3, n_u, n_v, n_w) at volume 1, and what is proved of them.
+    """A map at volume 1, and what is proved of it.
 
     injective: True where the boundary is proved not to meet itself, False where it was found to, None where that is not
     decided; it is asked of certified maps alone.
     """
 
-    control: Array
+    spline: SplineMap
     certificate: Certificate
     injective: bool | None
 
     @classmethod
-    def of(cls, control: Array, knots: Knots, degree: int) -> "Optimized":
-        """Certify control points and, where that succeeds, check their boundary."""
-        volume = BSplineVolume((degree,) * 3, knots, np.moveaxis(control, 0, -1))
+    def of(cls, spline: SplineMap) -> "Optimized":
+        """Certify a map and, where that succeeds, check its boundary."""
+        volume = spline.volume
         certificate = certify(volume)
         injective = check_boundary(volume).injective if certificate.verdict == "certified" else None
-        return cls(control, certificate, injective)
+        return cls(spline, certificate, injective)
 
     @property
     def meets_itself(self) -> bool:

@@ -21,12 +21,7 @@ from .state import MOST_WATCHED, State
 _log = logging.getLogger(__name__)
 
 FULL_PENALTY = 2500.0  # weight on det J once F has its shape: what the surface's data fold then unfolds against them
-RAMP = (
-    20.0,
-    100.0,
-    500.0,
-    FULL_PENALTY,
-)  # one a round, for a map that starts folded: it may still take its shape through folds
+RAMP = (20.0, 100.0, 500.0, FULL_PENALTY)  # one a round, for a map that starts folded: it takes its shape through folds
 PATIENT_ROUNDS = 2  # of a stage: after them anchors let go, and the penalty grows at unproved spans
 FIRM_ROUNDS = 4  # after these the surface gives way at unproved spans, which more weight alone has not unfolded
 GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
@@ -35,8 +30,6 @@ _STALLING = 8  # rounds in which the unproved spans are not halved: another star
 _SMOOTHING_ROUNDS = 2  # likewise; F is then smoothed there: no descent undoes some folds
 _MOST_SMOOTHED = 10  # spans that stay unproved: to smooth F near more of them would take its shape away
 _MENDINGS = 6  # attempts to restore certified control points around spans that fold again
-FAR = 0.02  # from the surface, root mean square: a folded map so far away has left the surface to unfold
-PARTED = 0.01  # likewise where sheets are pushed apart: a map so far away is worth no polish
 
 
 @dataclass(frozen=True)
@@ -44,12 +37,15 @@ class Phase(ABC):
     """Rounds with one aim.
 
     penalties: on det J, one for each round of the stage, then the last again. firm: rounds of the stage after which the
-    surface's data give way at unproved spans.
+    surface's data give way at unproved spans. shares: where F grows, of the weight of the surface's data, one a round.
+    steps: of Newton's method in a round, at most; None: as many as the options say.
     """
 
     name: ClassVar[str]
     penalties: tuple[float, ...] = (FULL_PENALTY,)
     firm: int = FIRM_ROUNDS
+    shares: tuple[float, ...] = ()
+    steps: int | None = None
 
     def penalty(self, number: int) -> float:
         """Return the weight of the penalties on det J in a round."""
@@ -58,7 +54,7 @@ class Phase(ABC):
     def begin(self, state: State) -> None:
         """Weigh data and anchors for the next round: anchors hold a map that starts close to the surface at first."""
         if state.near and state.number < PATIENT_ROUNDS:
-            state.energy.anchors.aim(state.control, hold=True)
+            state.energy.anchors.aim(state.spline.control, hold=True)
         else:
             state.energy.anchors.release()
 
@@ -69,22 +65,6 @@ class Phase(ABC):
     @abstractmethod
     def done(self, state: State) -> Reason | None:
         """Return why the phase is over; None where it goes on."""
-
-
-@dataclass(frozen=True)
-class Grow(Phase):
-    """F grows from a cube: the surface's data draw it with a larger share of their weight, `shares`, round by round.
-
-    steps: of Newton's method in a round, at most.
-    """
-
-    name = "grow"
-    shares: tuple[float, ...] = ()
-    steps: int = 1
-
-    def done(self, state: State) -> Reason | None:
-        """End when all shares have been taken."""
-        return Reason.GROWN if state.number >= len(self.shares) else None
 
 
 @dataclass(frozen=True)
@@ -109,8 +89,8 @@ class Unfold(Phase):
     """
 
     name = "unfold"
-    far: float = FAR
-    far_first: float = FAR
+    far: float = 0.02
+    far_first: float = 0.02
     first: int = 0
 
     def amended(self, state: State, found: Optimized) -> Optimized:
@@ -118,8 +98,8 @@ class Unfold(Phase):
         unproved, patience = found.certificate.unproved, max(self.firm, state.halved + _SMOOTHING_ROUNDS)
         if state.number < patience or not 0 < len(unproved) <= _MOST_SMOOTHED:
             return found
-        control = state.energy.smoothed(found.control, unproved)
-        smoothed = Optimized.of(control, state.knots, state.energy.degree)
+        control = state.energy.smoothed(found.spline.control, unproved)
+        smoothed = Optimized.of(found.spline.with_control(control))
         _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.certificate.unproved))
         return smoothed if smoothed.faults < found.faults else found
 
@@ -146,11 +126,11 @@ class Separate(Phase):
 
     name = "separate"
     rounds: int = 6
-    far: float = PARTED
+    far: float = 0.01
 
     def begin(self, state: State) -> None:
         """Let the surface give way where sheets touch."""
-        state.energy.give_way(state.energy.watch_contact(state.control), _CONTACT_WAY)
+        state.energy.give_way(state.energy.watch_contact(state.spline.control), _CONTACT_WAY)
         super().begin(state)
 
     def done(self, state: State) -> Reason | None:
@@ -174,28 +154,29 @@ class Polish(Phase):
         """Give the data more weight, unless the last round has folded F again; draw F's edges to the surface."""
         energy = state.energy
         if state.rounds["separate"]:
-            energy.watch_contact(state.control)
+            energy.watch_contact(state.spline.control)
         if state.settled:
             energy.take_back(GIVING_WAY)
-        energy.anchors.aim(state.control, hold=False)
+        energy.anchors.aim(state.spline.control, hold=False)
 
     def amended(self, state: State, found: Optimized) -> Optimized:
         """Move what folds again back to where it was certified; return the map found where that brings nothing."""
         energy, folded, mended = state.energy, found.certificate.unproved, found
-        degree, held = energy.degree, np.zeros(energy.determinants.weights.shape, dtype=bool)
+        held = np.zeros(energy.determinants.weights.shape, dtype=bool)
         for _ in range(_MENDINGS):
             unproved = mended.certificate.unproved
             if not 0 < len(unproved) <= MOST_WATCHED:
                 break
             held |= with_neighbours(unproved, held.shape)
-            back = acting_on(held, degree)
-            mended = Optimized.of(np.where(back, state.best.control, found.control), state.knots, degree)
+            back = acting_on(held, energy.degree)
+            control = np.where(back, state.best.spline.control, found.spline.control)
+            mended = Optimized.of(found.spline.with_control(control))
         if mended is found or mended.rank > state.best.rank:
             return found
         places = energy.surface.places
         before = places.parameters, places.cube_faces
-        energy.slide(mended.control)
-        if energy.surface.mean_square(mended.control) >= state.best_square:
+        energy.slide(mended.spline.control)
+        if energy.surface.mean_square(mended.spline.control) >= state.best_square:
             places.place(*before)
             return found
         energy.determinants.activate(folded)
@@ -230,4 +211,4 @@ class Schedule:
     @property
     def grown(self) -> int:
         """The number of rounds in which F grows."""
-        return sum(len(phase.shares) for phase in self.phases if isinstance(phase, Grow))
+        return sum(len(phase.shares) for phase in self.phases)

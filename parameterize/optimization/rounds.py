@@ -6,20 +6,20 @@ certified; what folds is weighed anew.
 
 import logging
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import IntArray
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
 from ..progress import History, Progress, ProgressCallback, ignore, timed
 from ..spline.bspline import breakpoints
+from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .endings import Course, Reason
 from .energy import SplineEnergy
 from .newton import FIRST_GAIN, LEAST_STEPS, Point, StoppingRule, descend
 from .optimized import Optimized
-from .phases import GIVING_WAY, PATIENT_ROUNDS, Grow, Phase, Schedule
+from .phases import GIVING_WAY, PATIENT_ROUNDS, Phase, Schedule
 from .spans import edge_spans
 from .state import State
 from .surface_distance import SurfaceFit
@@ -31,8 +31,7 @@ _SPAN_MOST = 125.0  # of these factors together
 
 
 def optimize(
-    control: Array,
-    knots: Knots,
+    start: SplineMap,
     surface: SurfaceFit,
     config: SplineConfig,
     schedule: Schedule,
@@ -44,64 +43,52 @@ def optimize(
     begun: int = 0,
     watched: IntArray | None = None,
 ) -> tuple[Optimized, Course]:
-    """Minimise from `control` (3, n_u, n_v, n_w), volume 1, phase after phase, in rounds: descend, certify, weigh anew.
+    """Minimise the energy from a map at volume 1, phase after phase, in rounds: descend, certify, weigh anew.
 
     Return a map, and how the rounds went. It is the last certified map whose boundary is proved not to meet itself,
     else the last one where that is not decided, else the last certified one, else the one with the fewest unproved
     spans.
 
-    begun: of how many rounds `control` is the result, on other knots; watched (k, 3): spans that nearly fold there.
+    begun: of how many rounds `start` is the result, on other knots; watched (k, 3): spans that nearly fold there.
     A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with one_blas_thread():
-        energy = SplineEnergy(knots, surface, weights)
-        energy.determinants.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in knots)))
+        energy = SplineEnergy(start.knots, surface, weights)
+        energy.determinants.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in start.knots)))
         if watched is not None:
             energy.determinants.activate(watched)
-        first = Optimized.of(control, knots, config.degree)
+        first = Optimized.of(start)
         places = surface.places.parameters, surface.places.cube_faces
-        state = State(energy, knots, control, first, places, energy.anchors.near(control), number=begun, halved=begun)
+        state = State(energy, start, first, places, energy.anchors.near(start.control), number=begun, halved=begun)
         state.restore(checkpoints, history)
-
-        def one_round(phase: Phase) -> None:
-            with timed(state.seconds, phase.name):
-                _round(state, phase, schedule, _StepReport(state.number, config.steps, schedule, history, progress))
-            state.save(checkpoints, history)
-
-        ending = _run(state, schedule, one_round)
+        for phase in schedule.phases:
+            while (reason := phase.done(state)) is None and state.number < schedule.rounds:
+                with timed(state.seconds, phase.name):
+                    _round(state, phase, schedule, _StepReport(state.number, config.steps, schedule, history, progress))
+                state.save(checkpoints, history)
+            ending = reason or Reason.OUT_OF_ROUNDS
+            if ending.ends_the_rounds:
+                break
         surface.places.place(*state.best_places)
-    _log.info("%s: %s", ending, ending.sentence)
     return state.best, Course(state.rounds, state.seconds, ending)
-
-
-def _run(state: State, schedule: Schedule, one_round: Callable[[Phase], None]) -> Reason:
-    """Go through the phases, each round by round until it is over; return why the last one of them was."""
-    for phase in schedule.phases:
-        while (reason := phase.done(state)) is None:
-            if state.number >= schedule.rounds:
-                return Reason.OUT_OF_ROUNDS
-            one_round(phase)
-        if reason.ends_the_rounds:
-            return reason
-    raise AssertionError("the last phase does not end the rounds")
 
 
 def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport") -> None:
     """Weigh, descend, certify; then watch the spans not proved and let the surface give way near them."""
-    energy, number, grows = state.energy, state.number, isinstance(phase, Grow)
-    share, steps = (phase.shares[number], phase.steps) if isinstance(phase, Grow) else (None, report.most)
+    energy, number = state.energy, state.number
+    grows, steps = bool(phase.shares), phase.steps or report.most
     phase.begin(state)
-    energy.start_round(state.control, phase.penalty(number), share)
+    energy.start_round(state.spline.control, phase.penalty(number), phase.shares[number] if grows else None)
     rule = StoppingRule(steps, schedule.gain if number else FIRST_GAIN)
-    control = descend(energy, state.control, rule, report)
-    found = Optimized.of(control, state.knots, energy.degree)
+    control = descend(energy, state.spline.control, rule, report)
+    found = Optimized.of(state.spline.with_control(control))
     state.last_square = energy.surface.mean_square(control)
     found = phase.amended(state, found)
     verdict, unproved = found.certificate.verdict, found.certificate.unproved
     meets = ", the boundary meets itself" if found.meets_itself else ""
     _log.info("round %d, %s: %s, %d spans unproved%s", number, phase.name, verdict, len(unproved), meets)
-    state.control, state.unproved_before, state.unproved = found.control, state.unproved, len(unproved)
+    state.spline, state.unproved_before, state.unproved = found.spline, state.unproved, len(unproved)
     state.certified |= not grows and verdict == "certified"
     if number == 0 or grows or found.rank <= state.best.rank:
         state.keep(found)
@@ -131,11 +118,12 @@ class _StepReport:
 
     def __call__(self, point: Point) -> None:
         """Report where a step has led to."""
-        done, usual = self.number * self.most + self.step, self.schedule.usual_steps
-        self.history.add("spline", done, point.total, point.folded, {"surface": point.outer[0]})
-        seconds, self.begun = time.perf_counter() - self.begun, time.perf_counter()
-        total, left = max(self.number + 1, len(usual)) * self.most, seconds * self._expected_steps()
-        self.progress(Progress("spline", done + 1, total, point.total, point.folded, left))
+        done, loss = self.number * self.most + self.step, point.total
+        self.history.add("spline", done, loss, point.folded, {"surface": point.outer[0]})
+        before, self.begun = self.begun, time.perf_counter()
+        steps = max(self.number + 1, len(self.schedule.usual_steps)) * self.most
+        left = (self.begun - before) * self._expected_steps()
+        self.progress(Progress("spline", done + 1, steps, loss, point.folded, left))
         self.step += 1
 
     def _expected_steps(self) -> int:

@@ -4,14 +4,13 @@ import math
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..progress import History
+from ..spline.spline_map import SplineMap
 from .energy import SplineEnergy
 from .optimized import Optimized
 
@@ -25,8 +24,7 @@ class State:
     """Where the rounds stand between two of them; squares are mean squared distances from the surface."""
 
     energy: SplineEnergy
-    knots: Knots
-    control: Array
+    spline: SplineMap
     best: Optimized
     best_places: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their cube faces (N,)
     near: bool  # whether F was close to the surface all along the cube's edges to begin with
@@ -49,20 +47,20 @@ class State:
     @property
     def settled(self) -> bool:
         """Whether the last round has ended with the best map, not with one that folds again."""
-        return np.array_equal(self.control, self.best.control)
+        return np.array_equal(self.spline.control, self.best.spline.control)
 
     def keep(self, found: Optimized) -> None:
         """Take a map, with the surface's parameters as they are, for the best one."""
         places = self.energy.surface.places
         self.best, self.best_places = found, (places.parameters, places.cube_faces)
-        self.best_square = self.energy.surface.mean_square(found.control)
+        self.best_square = self.energy.surface.mean_square(found.spline.control)
 
     def save(self, checkpoints: Checkpoints, history: History) -> None:
         """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
         surface, anchors = self.energy.surface, self.energy.anchors.fit
         arrays = {
-            "control": self.control,
-            "best": self.best.control,
+            "control": self.spline.control,
+            "best": self.best.spline.control,
             "best_parameters": self.best_places[0],
             "best_cube_faces": self.best_places[1],
             "parameters": surface.places.parameters,
@@ -80,15 +78,14 @@ class State:
         """Go on from the checkpoint that `save` has kept, where there is one."""
         if (saved := checkpoints.load(_CHECKPOINT)) is None:
             return
-        arrays: dict[str, NDArray[Any]] = saved[0]
-        state: dict[str, Any] = saved[1]
+        arrays, state = saved
         energy = self.energy
         energy.surface.places.place(arrays["parameters"], arrays["cube_faces"])
         energy.surface.give_way(arrays["yielding"])
         energy.anchors.restore(arrays["anchors"], arrays["anchors_yielding"])
         energy.determinants.weigh(arrays["span_weights"])
-        self.control = arrays["control"]
-        self.best = Optimized.of(arrays["best"], self.knots, energy.degree)
+        self.spline = self.spline.with_control(arrays["control"])
+        self.best = Optimized.of(self.spline.with_control(arrays["best"]))
         self.best_places = arrays["best_parameters"], arrays["best_cube_faces"]
         for name in _NUMBERS:
             setattr(self, name, state[name])

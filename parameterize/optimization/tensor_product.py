@@ -5,11 +5,11 @@ See operators.py for how control points are held, and how pieces of work are add
 
 import math
 from collections.abc import Callable
-from copy import copy
 from typing import Any
 
 import numba
 import numpy as np
+from numpy.typing import DTypeLike
 from scipy.linalg import eigh
 
 from ..arrays import Array, Floats, IntArray
@@ -220,19 +220,16 @@ def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
 class FastDiagonalization:
     """Inverse of A_0 x M x M + M x A_1 x M + M x M x A_2 + shift * M x M x M (Lynch, Rice, Thomas 1964).
 
-    matrices: three symmetric A_d (n, n); mass: three M_d. Three generalised eigenproblems, then products only.
+    matrices: three symmetric A_d (n, n); mass: three M_d; dtype: of what the inverse is applied to. Three generalised
+    eigenproblems, then products only.
     """
 
-    def __init__(self, matrices: tuple[Array, ...], mass: tuple[Array, ...], shift: float = 0.0) -> None:
-        (u, v, w), self._vectors = zip(*(eigh(a, m) for a, m in zip(matrices, mass, strict=True)), strict=True)
-        self._inverse: Floats = 1.0 / (u[:, None, None] + v[:, None] + w + shift)
-
-    def in_single(self) -> "FastDiagonalization":
-        """Return the same in single precision."""
-        other = copy(self)
-        other._vectors = tuple(vectors.astype(np.float32) for vectors in self._vectors)
-        other._inverse = self._inverse.astype(np.float32)
-        return other
+    def __init__(
+        self, matrices: tuple[Array, ...], mass: tuple[Array, ...], shift: float = 0.0, dtype: DTypeLike = np.float64
+    ) -> None:
+        (u, v, w), vectors = zip(*(eigh(a, m) for a, m in zip(matrices, mass, strict=True)), strict=True)
+        self._vectors = [matrix.astype(dtype) for matrix in vectors]
+        self._inverse: Floats = (1.0 / (u[:, None, None] + v[:, None] + w + shift)).astype(dtype)
 
     def __call__(self, residual: Floats) -> Floats:
         """Apply the inverse: (3, n_u, n_v, n_w) -> the same shape."""

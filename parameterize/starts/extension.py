@@ -25,8 +25,8 @@ class Extension(Start):
         with timed(task.seconds, "fit"), one_blas_thread():
             layout = surface_on_cube(task, turn=0)
             fit = task.fit(layout, COARSE)
-            control = first_spline(*extended(layout, CELL), fit)
-        return optimized(control, fit, schedule(spline), task, checkpoints)
+            first = first_spline(*extended(layout, CELL), fit)
+        return optimized(first, fit, schedule(spline), task, checkpoints)
 
 
 EXTENSION = Extension("extension", "extension", "extending the surface's layout into the solid")

@@ -5,13 +5,14 @@ import numpy as np
 from ..arrays import Array
 from ..optimization.least_squares import fit_pairs
 from ..optimization.surface_distance import SurfaceFit
+from ..spline.spline_map import SplineMap
 
 COARSE = 5 / 9  # of the spans a direction, in the first rounds: enough for the shape, at a fraction of the time
 _BOUNDARY_SHARE = 0.2  # weight of the surface's samples; those inside have the rest of 1, and so decide where F folds
 _FAIRNESS = 1e-7  # of the fit: holds what no sample determines, and hardly moves the rest
 
 
-def first_spline(inside: Array, places: Array, fit: SurfaceFit) -> Array:
+def first_spline(inside: Array, places: Array, fit: SurfaceFit) -> SplineMap:
     """Fit by least squares to pairs (k, 3) of places and points inside, and the boundary's (section 4.3.2, step 2)."""
     weights = [
         np.full(len(inside), (1.0 - _BOUNDARY_SHARE) / max(len(inside), 1)),

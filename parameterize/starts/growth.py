@@ -11,14 +11,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..arrays import Array, Knots
+from ..arrays import Knots
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.layout import CubeLayout
-from ..optimization.phases import FAR, PARTED, Grow, Polish, Schedule, Separate, Unfold
+from ..optimization.endings import Reason
+from ..optimization.phases import Phase, Polish, Schedule, Separate, Unfold
+from ..optimization.state import State
 from ..optimization.term import Weights
 from ..progress import timed
 from ..spline.bspline import greville
+from ..spline.spline_map import SplineMap
+from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_weights
 from ..threads import one_blas_thread
 from .on_cube import MORE_ROUNDS, USUAL_STEPS, surface_on_cube
@@ -28,6 +32,17 @@ from .start import Attempt, Start, Task, optimized
 SHARES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 STEPS = 12  # of Newton's method in each of these rounds, at most: the next one moves F on anyway
 _COARSE = 1 / 3  # of the spans a direction in these rounds: F is smooth while it grows
+
+
+@dataclass(frozen=True)
+class Grow(Phase):
+    """F grows from a cube: the surface's data draw it with a larger share of their weight in each round."""
+
+    name = "grow"
+
+    def done(self, state: State) -> Reason | None:
+        """End when all shares have been taken."""
+        return Reason.GROWN if state.number >= len(self.shares) else None
 
 
 @dataclass(frozen=True)
@@ -51,8 +66,8 @@ class Growth(Start):
         with timed(task.seconds, "fit"), one_blas_thread():
             layout = surface_on_cube(task, self.turn)
             fit = task.fit(layout, _COARSE)
-            control = first_cube(layout, fit.places.knots, fit.places.degree)
-        return optimized(control, fit, self.schedule(task.config), task, checkpoints, self.weights)
+            first = first_cube(layout, fit.places.knots, fit.places.degree)
+        return optimized(first, fit, self.schedule(task.config), task, checkpoints, self.weights)
 
     @property
     def weights(self) -> Weights:
@@ -64,8 +79,8 @@ class Growth(Start):
         grown, steps = len(SHARES), scaled_steps(STEPS, config.steps_factor)
         phases = (
             Grow(firm=self.firm, shares=SHARES, steps=steps),
-            Unfold(firm=self.firm, far=max(FAR, self.far), far_first=self.far, first=grown + 1),
-            Separate(firm=self.firm, far=max(PARTED, self.far)),
+            Unfold(firm=self.firm, far=max(Unfold.far, self.far), far_first=self.far, first=grown + 1),
+            Separate(firm=self.firm, far=max(Separate.far, self.far)),
             Polish(),
         )
         return Schedule(phases, grown + config.spline.rounds + MORE_ROUNDS, (steps,) * grown + USUAL_STEPS)
@@ -80,9 +95,9 @@ STIFF = Growth(
 LAST = replace(STIFF, name="last growth", doing="growing a stiffer map, farther from the surface,", turn=2, far=0.05)
 
 
-def first_cube(layout: CubeLayout, knots: Knots, degree: int) -> Array:
-    """Return control points (3, n_u, n_v, n_w) of the unit cube, turned so that it faces the surface as laid out."""
+def first_cube(layout: CubeLayout, knots: Knots, degree: int) -> SplineMap:
+    """Return the map onto the unit cube, turned so that it faces the surface as laid out."""
     weights = vertex_weights(layout.points, layout.faces, layout.n_own)
     rotation, _ = Rotation.align_vectors(layout.points - 0.5, layout.places - 0.5, weights)
     points = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1) - 0.5
-    return np.ascontiguousarray(np.moveaxis(0.5 + points @ rotation.as_matrix().T, -1, 0))
+    return SplineMap.of(BSplineVolume((degree,) * 3, knots, 0.5 + points @ rotation.as_matrix().T))

@@ -55,8 +55,8 @@ class Network(Start):
             fit = task.fit(_layout(mapped, trainer.corners, task), COARSE)
             inside = interior_points(vertices, faces, spline.fit_cell)
             places = map_points(network, inside).clip(0.0, 1.0)
-            control = first_spline(inside, places, fit)
-        return optimized(control, fit, schedule(spline), task, checkpoints)
+            first = first_spline(inside, places, fit)
+        return optimized(first, fit, schedule(spline), task, checkpoints)
 
 
 NETWORK = Network("network", "network", "training the network")

@@ -1,5 +1,6 @@
 """What a start is: it makes a map of a surface, which the rounds then optimise; and what all starts share."""
 
+import logging
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -20,8 +21,11 @@ from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
 from ..progress import timed
+from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
+
+_log = logging.getLogger(__name__)
 
 Origin = Literal["network", "growth", "extension"]
 MOST_POINTS = (
@@ -91,7 +95,7 @@ class Attempt:
     @cached_property
     def distance(self) -> float:
         """Root mean square distance of the surface's points from the map, at volume 1."""
-        return math.sqrt(self.fit.mean_square(self.found.control))
+        return math.sqrt(self.fit.mean_square(self.found.spline.control))
 
     @property
     def rank(self) -> tuple[int, bool, bool, float]:
@@ -116,15 +120,17 @@ class Start(ABC):
 
 
 def optimized(
-    control: Array,
+    first: SplineMap,
     fit: SurfaceFit,
     schedule: Schedule,
     task: Task,
     checkpoints: Checkpoints,
     weights: Weights = Weights(),  # noqa: B008 - frozen
 ) -> Attempt:
-    """Optimise a first map `control` (3, n_u, n_v, n_w) on the knots of `fit`."""
+    """Optimise a first map on the knots of `fit`."""
     spline = task.config.spline
     with timed(task.seconds, "optimize"):
-        made = optimize_coarse_first(control, fit, spline, schedule, weights, checkpoints=checkpoints, **task.report)
-    return Attempt(*made, weights)
+        made = optimize_coarse_first(first, fit, spline, schedule, weights, checkpoints=checkpoints, **task.report)
+    attempt = Attempt(*made, weights)
+    _log.info("the rounds end: %s; %s", attempt.course.ending, attempt.course.ending.sentence)
+    return attempt

@@ -13,9 +13,9 @@ import torch
 from torch import Tensor
 
 from parameterize.arrays import Array
+from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 
 from ..discretization.operator import Operator
-from .krylov import LinearResult, conjugate_gradients
 from .preconditioner import FastDiagonalization
 
 LAYER_BYTES = 2**28  # of one field on a layer of points of u

@@ -11,7 +11,7 @@ from iga_nn.__main__ import run_and_exit
 from iga_nn.report import viewer
 from iga_nn.workflow import mpi_job
 from iga_nn.workflow.output_folder import RunFolder
-from solve.linear.krylov import conjugate_gradients
+from parameterize.conjugate_gradients import conjugate_gradients
 
 RunFolder.draw = lambda *_, **__: None
 viewer.scene_of = lambda *_, **__: None
