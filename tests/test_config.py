@@ -78,7 +78,7 @@ def numbers_in(value):
 def test_few_numbers_are_left_to_the_user():
     options = asdict(preset("fast"))
     assert sum(numbers_in(options[part]) for part in ("network", "train", "stages")) <= 25
-    assert numbers_in(options) <= 196
+    assert numbers_in(options) <= 60
 
 
 def option_names(value):
