@@ -54,7 +54,7 @@ stress: $(DEV)
 	$(BIN)/python examples/benchmarks/stress.py
 
 fuzz: $(DEV)
-	OMP_NUM_THREADS=1 $(BIN)/python tests/fuzzing.py --files 100000
+	OMP_NUM_THREADS=1 $(BIN)/python tests/support/fuzzing.py --files 100000
 
 # In an environment of its own. --strict: a package that the service does not answer for is a failure, not a success.
 audit: $(DEV)

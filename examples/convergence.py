@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 import iga_nn
 from iga_nn.figures.curves import draw_study
-from iga_nn.levels import Study, as_csv, as_table
+from iga_nn.level_table import Study, as_csv, as_table
 from solve.study import benchmark_volume
 
 PROBLEM = iga_nn.Poisson(exact="exp(x+z)*sin(y)")

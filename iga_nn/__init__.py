@@ -51,7 +51,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "preset": "parameterize.config",
     "resultant": "solve",
     "run": "iga_nn.workflow.pipeline",
-    "run_batch": "iga_nn.batch.run",
+    "run_batch": "iga_nn.batch.run_batch",
     "sample": "iga_nn.samples",
     "solve": "solve:solve_problem",
 }

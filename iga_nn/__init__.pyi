@@ -24,7 +24,7 @@ from solve import newton as newton
 from solve import resultant as resultant
 from solve import solve_problem
 
-from .batch.run import run_batch as run_batch
+from .batch.run_batch import run_batch as run_batch
 from .errors import InputError as InputError
 from .io.formats import export as export
 from .io.formats import load_volume as load_volume

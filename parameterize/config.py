@@ -1,6 +1,7 @@
 """Options of a parameterization: frozen dataclasses, and the presets.
 
-Lengths are in units of the domain scaled to volume 1. Loss weights are those of the paper's Table 1.
+Lengths are in units of the domain scaled to volume 1. Constants that no user sets stand beside the code
+that reads them.
 """
 
 from __future__ import annotations
@@ -8,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import inf
 from numbers import Integral, Real
-from typing import Literal
+from typing import Literal, get_args
 
 MAX_CONTROL_POINTS = 100  # per direction
 
-Target = Literal["S(2)", "S(1)", "cube"]
+StageName = Literal["S(2)", "S(1)", "cube", "corners", "edges"]
 
 
 @dataclass(frozen=True)
@@ -22,55 +23,31 @@ class NetworkConfig:
     width: int = 128
     modules: int = 4
     frequencies: int = 10
-    scale: float = 1.0  # k of the encoding before training
-
-
-@dataclass(frozen=True)
-class StageWeights:
-    """One row of the paper's Table 1."""
-
-    bij: float = 1e6
-    arap: float = 1.0
-    fair: float = 2e-3
-    dist: float = 1e3
-    norm: float = 10.0
-    star: float = 1e3
-    cor: float = 0.0
-    edge: float = 0.0
+    scale: float = 1.0  # k of the encoding before the training
 
 
 @dataclass(frozen=True)
 class StageConfig:
-    """One training stage: its name, the shape to reach, its length and its weights."""
+    """A training stage, by its name in `training/stages.py`, and its number of steps."""
 
-    name: str
-    target: Target
+    name: StageName
     steps: int
-    weights: StageWeights
-    given_corner_weight: float = 1e2  # used from the first stage on where the user gives corners (section 5.4)
 
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """What the four stages share."""
+    """Options of the training that all stages share."""
 
     learning_rate: float = 1e-3  # of Adam
-    matrix_rate: float = 0.015  # of Muon, for the hidden layers' matrices; Adam trains these, too, where it is 0
-    final_share: float = 0.02  # of the rates, reached by cosine decay at the end of each stage
-    easy_loss: float | None = (
-        3.5  # where the first stage ends with more, distortion left out, the map is grown instead;
-    )
-    # 0: every map is grown, and nothing is trained; None: none is grown before it is trained to the end
+    matrix_rate: float = 0.015  # of Muon, for the hidden layers' matrices; with 0 Adam trains these, too
+    final_share: float = 0.02  # of both rates, reached by cosine decay at the end of each stage
+    # Loss without distortion after the first stage above which the map is grown instead. 0: every map is grown, and
+    # nothing is trained; None: every map is trained to the end first.
+    easy_loss: float | None = 3.5
     cell: float = 0.12  # edge h of the interior cells (section 4.4.2)
-    triangles: int = 700  # surface triangles sampled a step; all of them where there are fewer
-    min_det: float = 0.1  # alpha of the bijectivity term
-    wrong_side: float = 100.0  # weight of normals that point inwards, within the normal term
-    whiten: bool = True  # start from the affine map that makes the domain as wide in all directions, not the identity
-    det_floor: float = 0.5  # share of `min_det` at which the distortion term holds smaller determinants
-    edge_direction: float = 1e-3  # weight of the paths' directions, within the edge term
+    triangles: int = 700  # surface triangles sampled in a step; all of them where there are fewer
+    whiten: bool = True  # start from the affine map that makes the domain equally wide in all directions
     race: float = 0.45  # share of the first stage towards the cube that is trained twice: as G is, and turned
-    race_steps: int = 8  # the last ones of these, whose distortions are compared
-    race_gain: float = 0.05  # share by which the turned G must be better, in hollows and then in distortion
 
 
 @dataclass(frozen=True)
@@ -103,48 +80,6 @@ class RefinementConfig:
 
 
 @dataclass(frozen=True)
-class LayoutConfig:
-    """How the surface is cut and laid out on the cube; a share is one of a mesh edge's length."""
-
-    path_snap: float = 0.1  # share: crossings nearer to a vertex than this take the vertex, so paths leave no slivers
-    stray: float = 20.0  # a path costs so many times more at the distance `stray_cell` from its cube edge
-    stray_cell: float = 0.05
-    orders: int = 24  # in which the paths are traced, at most
-    sweeps: int = 600  # of relaxation, at most
-    patience: int = 60  # sweeps after which one more ring of neighbours may move
-    pushes: int = 100  # sweeps that push the corners of flipped triangles alone, at most
-    unflipped: float = 1e-2  # share of the median triangle that one so pushed takes
-    held_rounds: int = 20  # in which points are held so that no further triangle flips, at most
-    same: float = 1e-7  # share: final cuts this close to a vertex take the vertex
-    nudge: float = 1e-4  # by which vertices move where a mesh edge runs through a corner of the cube
-    nudges: int = 10  # at most
-    settle_steps: int = 8  # Gauss-Newton steps of the final cuts along their edges
-    settle_damping: float = 1e-3  # of these, against parallel directions
-    settle_margin: float = 1e-2  # share that a cut keeps from the ends of its edge
-    undo_rounds: int = 10  # in which such steps are undone at flipped triangles, at most
-    least_share: float = 0.25  # that the line which halves a surface keeps from the ends of the edges it divides
-    squeezed: float = 1e8  # energy of the first layout on the sphere (at rest some 50) above which others are tried
-    along: float = 10.0  # weight of edges that lead away from that line, in addition, in the first of the others
-    sharpness: tuple[int, ...] = (2, 4, 8, 16, 32, 64)  # in the next ones: the higher, the straighter edges count
-    one_way: tuple[int, ...] = (4, 16)  # likewise in the last ones, where edges count from their far end alone
-    sphere_steps: int = 300  # of Newton's method for the layout on the sphere, at most
-    usual_sphere_steps: int = 30  # of most surfaces: tells the time left
-    sphere_damping: float = 1e-8  # of these, as a share of the mean diagonal entry
-    sphere_gain: float = 1e-3  # the steps end once one lowers the energy by less than this share
-    turns: int = 200  # of the cube in that layout, drawn at random
-    finals: int = 5  # the best of them, which are turned further
-    turn_steps: int = 60  # of each of these, at most
-    turn_size: float = 0.1  # of the first of these steps, as an angle
-    other_turn: float = 0.3  # a turn that differs from a better one by a larger angle counts as another
-    edge_width: float = 0.15  # from the cube's edges, within which the surface should not be hollow
-    edge_pieces: int = 24  # of each cube edge: one that lies in a hollow is not made up for by ridges beside it
-    hollow: float = 1.0  # times its bend that such a piece counts in addition
-
-
-LAYOUT = LayoutConfig()
-
-
-@dataclass(frozen=True)
 class Config:
     """All options of `parameterize.parameterize`.
 
@@ -157,7 +92,6 @@ class Config:
     stages : tuple of StageConfig
     spline : SplineConfig
         Fit and optimisation, `control_points` a direction and `degree` among them.
-    layout : LayoutConfig
     refinement : RefinementConfig or None
         Where knots are inserted after the spline stage; None: the control points of `spline` are all there are.
     starts : int
@@ -179,7 +113,6 @@ class Config:
     train: TrainConfig
     stages: tuple[StageConfig, ...]
     spline: SplineConfig
-    layout: LayoutConfig = LAYOUT
     starts: int = 5
     refinement: RefinementConfig | None = None
     steps_factor: float = 1.0
@@ -233,19 +166,12 @@ def scaled_steps(steps: int, factor: float) -> int:
     return max(1, round(factor * steps))
 
 
-def _stages(steps: tuple[int, int, int, int, int]) -> tuple[StageConfig, ...]:
-    """Return the stages of section 4.3.1 with the weights of Table 1; S(2) and S(1) are the paper's first stage."""
-    free, tight = StageWeights(), StageWeights(dist=1e4, cor=1e3)
-    return (
-        StageConfig("S(2)", "S(2)", steps[0], free),
-        StageConfig("S(1)", "S(1)", steps[1], free),
-        StageConfig("cube", "cube", steps[2], free),
-        StageConfig("corners", "cube", steps[3], tight),
-        StageConfig("edges", "cube", steps[4], replace(tight, edge=1e4)),
-    )
+def _stages(*steps: int) -> tuple[StageConfig, ...]:
+    """Return the five stages with these numbers of steps."""
+    return tuple(map(StageConfig, get_args(StageName), steps))
 
 
-_FAST = Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages((90, 60, 90, 30, 60)), SplineConfig())
+_FAST = Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages(90, 60, 90, 30, 60), SplineConfig())
 PRESETS = {
     "fast": _FAST,
     "grown": replace(_FAST, name="grown", train=replace(_FAST.train, easy_loss=0.0)),
@@ -262,7 +188,7 @@ PRESETS = {
             whiten=False,
             race=0.0,
         ),
-        _stages((600, 400, 1000, 500, 1000)),
+        _stages(600, 400, 1000, 500, 1000),
         SplineConfig(),
         starts=1,  # without `whiten` every start would be the same
     ),

@@ -14,17 +14,17 @@ from scipy.sparse.linalg import cg
 
 from .arrays import Array, IntArray
 from .cube.cube import VARYING_AXES
-from .cube.flips import Layout
+from .cube.layout import CubeLayout
 
 _OFFSET = np.array([0.512345, 0.498765, 0.543211])  # in cells: no line of the lattice runs along faces of a model
 _TOLERANCE = 1e-6  # of the linear solves, relative: a fit to the places follows, and is far coarser
 _NEAREST = 1e-3  # in cells: the surface counts as no nearer to a lattice point
 
 
-def extended(layout: Layout, cell: float) -> tuple[Array, Array]:
+def extended(layout: CubeLayout, cell: float) -> tuple[Array, Array]:
     """Return the points (k, 3) of a lattice inside the surface, `cell` apart, and their places (k, 3) in the cube."""
-    low = layout.vertices.min(axis=0) - cell * _OFFSET
-    shape = np.ceil((layout.vertices.max(axis=0) - low) / cell).astype(np.int64) + 1
+    low = layout.points.min(axis=0) - cell * _OFFSET
+    shape = np.ceil((layout.points.max(axis=0) - low) / cell).astype(np.int64) + 1
     lines = [_crossings(layout, axis, low, cell, shape) for axis in range(3)]
     inside = _inside(lines[0])
     matrix, right = _harmonic_system(lines, inside)
@@ -89,9 +89,9 @@ def _line_numbers(across: IntArray, axis: int, shape: IntArray) -> IntArray:
     return np.asarray(across[:, 0] * shape[VARYING_AXES[axis][1]] + across[:, 1])
 
 
-def _crossings(layout: Layout, axis: int, low: Array, cell: float, shape: IntArray) -> _Crossings:
+def _crossings(layout: CubeLayout, axis: int, low: Array, cell: float, shape: IntArray) -> _Crossings:
     """Return where the lattice's lines along an axis cross the surface."""
-    corners = (layout.vertices[layout.faces] - low) / cell  # (m, 3, 3)
+    corners = (layout.points[layout.faces] - low) / cell  # (m, 3, 3)
     flat = corners[:, :, VARYING_AXES[axis]]
     first = np.ceil(flat.min(axis=1)).astype(np.int64)
     counts = np.maximum(np.floor(flat.max(axis=1)).astype(np.int64) - first + 1, 0)  # lines over each triangle's box

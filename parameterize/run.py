@@ -254,9 +254,9 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
 def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSplineVolume, BoundaryMap]:
     """Return the volume and its boundary map; parameters are first brought close to this volume's closest points."""
     surface, spline = task.surface, task.config.spline
-    places = fit.places.settled(found.spline.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
+    places = fit.places.at_closest_points(found.spline.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
     points = surface.from_unit(found.spline.volume.control_points)
     volume = BSplineVolume((spline.degree,) * 3, places.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
-    boundary = boundary_map(volume, own, places.triangles, places.parameters, task.config.layout)
+    boundary = boundary_map(volume, own, places.triangles, places.parameters)
     return volume, replace(boundary, part_faces=surface.faces, groups=surface.groups)

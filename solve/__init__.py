@@ -33,6 +33,8 @@ from .march import march as march
 from .modes import Modes as Modes
 from .modes import modes as modes
 from .newton import newton as newton
+from .options import SolveOptions as SolveOptions
+from .options import check_device as check_device
 from .quantities import Extremes as Extremes
 from .reactions import Balance as Balance
 from .solution import Solution as Solution
@@ -40,10 +42,10 @@ from .solution import SolveReport as SolveReport
 from .solver import check_problem as check_problem
 from .solver import discretize as discretize
 from .solver import solve_problem as solve_problem
+from .solver import solve_with as solve_with
 from .study import Convergence as Convergence
 from .study import ConvergenceRow as ConvergenceRow
 from .study import benchmark_volume as benchmark_volume
 from .study import convergence as convergence
 from .study import rates as rates
 from .system import System as System
-from .system import check_device as check_device

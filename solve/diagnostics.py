@@ -15,9 +15,9 @@ from .discretization.operator import MatrixFree
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.space import TrialSpace
 from .field import Points
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import in_scaled
 from .forms.parser import Expression, ExpressionError
-from .forms.problem import BoundaryValueProblem
 from .solution import Solution
 
 # Parameters per direction: the ends, and between them places without a pattern that a periodic formula could share.

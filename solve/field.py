@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
-from parameterize.quality.distances import SampledBoundary, nearest_on_boundary
+from parameterize.quality.distances import nearest_on_boundary
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
+from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
 FARTHEST = 1e4  # of the volume's size: from there rounding hides which point of it is nearest

@@ -16,23 +16,22 @@ from parameterize.display import Brief, above
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
 
+from .assembly import assemble_data
 from .diagnostics import ConvergenceError
 from .discretization.operator import Operator, assemble
 from .discretization.projection import projected
 from .discretization.quadrature import GaussRule
 from .discretization.space import TrialSpace, embedded
 from .field import SplineField
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import Data, parse
-from .forms.elasticity import Elasticity
 from .forms.frame import UnitFrame
 from .forms.mass import Mass
-from .forms.poisson import Poisson
-from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import generalized_residuals
+from .options import IterationOptions, SolveOptions
 from .solver import prepared
-from .system import SolverOptions, System, assemble_data, build
+from .system import System, build
 
-Equation = Poisson | Elasticity | Problem
 SCHEMES = ("bdf2", "trapezoidal")
 EULER = 1.0  # the factors of capacity / dt that a step adds to the matrix
 FACTORS = {"bdf2": 1.5, "trapezoidal": 2.0}
@@ -76,7 +75,7 @@ class March(Brief):
 
 def march(
     volume: BSplineVolume,
-    problem: Equation | Callable[[float], Equation],
+    problem: BoundaryValueProblem | Callable[[float], BoundaryValueProblem],
     start: SplineField | Data,
     *,
     dt: float,
@@ -89,7 +88,7 @@ def march(
     refine: int = 0,
     degree: int | None = None,
     threads: int | None = None,
-    quadrature: str = "spline",
+    quadrature: str = SolveOptions.quadrature,
     tolerance: float = 1e-10,
     max_iterations: int = 1000,
 ) -> March:
@@ -146,12 +145,19 @@ def march(
     True
     """
     _check(dt, steps, scheme, capacity, every)
-    limits = SolverOptions(tolerance=tolerance, max_iterations=max_iterations)
+    options = SolveOptions(
+        refine=refine,
+        degree=degree,
+        threads=threads,
+        quadrature=quadrature,
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+    )
     at = problem if callable(problem) else lambda _: problem
-    placed, space, threads = prepared(volume, at(first), refine, degree, threads)
+    placed, space = prepared(volume, at(first), options)
     with one_blas_thread():
-        data = _Data(volume, at, placed, space, threads, quadrature, callable(problem))
-        path = _Path(data, scheme, capacity / dt, limits, _started(data, start, first), first)
+        data = _Data(volume, at, placed, space, options, callable(problem))
+        path = _Path(data, scheme, capacity / dt, _started(data, start, first), first)
         times, fields, iterations = [first], [path.field], []
         for number in range(1, steps + 1):
             iterations.append(path.step(first + number * dt))
@@ -183,8 +189,7 @@ class _Data:
     problem_at: Callable[[float], Any]
     placed: BoundaryValueProblem
     space: TrialSpace
-    threads: int
-    quadrature: str
+    options: SolveOptions
     varies: bool
 
     def at(self, time: float) -> tuple[Array, Array]:
@@ -199,16 +204,16 @@ class _Data:
         if (problem.dirichlet, problem.natural) != (self.placed.dirichlet, self.placed.natural):
             raise ValueError(f"the problem of time {time:g} has data on other faces than that of the first time")
         given = problem.on(self.volume)
-        _, load, known = assemble_data(self.volume, given, self.space, self.threads, self.quadrature)
+        _, load, known = assemble_data(self.volume, given, self.space, self.options)
         return load, known
 
     def system(self, shift: float) -> System:
         """Return the system of the law plus `shift` times the mass."""
-        return build(self.volume, self.placed, self.space, self.threads, self.quadrature, shift)
+        return build(self.volume, self.placed, self.space, self.options, shift)
 
     def mass(self, rule: GaussRule) -> Operator:
         """Return the mass matrix of all coefficients, by the rule of a system: one that differs would be a source."""
-        found, _ = assemble(self.volume, self.space, Mass(), rule=rule, threads=self.threads)
+        found, _ = assemble(self.volume, self.space, Mass(), rule=rule, threads=self.options.thread_count)
         assert isinstance(found, Operator)
         return found
 
@@ -234,9 +239,9 @@ def _started(data: _Data, start: SplineField | Data, time: float) -> Array:
 class _Path:
     """Where a march is: time and coefficients (c, n_u, n_v, n_w), the last ones and those before."""
 
-    def __init__(self, data: _Data, scheme: str, rate: float, limits: SolverOptions, start: Array, time: float) -> None:
+    def __init__(self, data: _Data, scheme: str, rate: float, start: Array, time: float) -> None:
         """rate: capacity over dt."""
-        self.data, self.scheme, self.rate, self.limits = data, scheme, rate, limits
+        self.data, self.scheme, self.rate = data, scheme, rate
         self.time, self.last, self.load = time, start, data.at(time)[0]
         self.before: Array | None = None
         self.system = data.system(FACTORS[scheme] * rate)
@@ -256,7 +261,7 @@ class _Path:
         window = (slice(None), *self.data.space.window)
         right = np.ascontiguousarray((right - system.matrix.apply(known))[window])
         guess = self.last if self.before is None else 2.0 * self.last - self.before
-        found = _solved(system, right, np.ascontiguousarray(guess[window]), self.limits)
+        found = _solved(system, right, np.ascontiguousarray(guess[window]), self.data.options)
         if not found.converged:
             raise ConvergenceError(
                 f"march: no convergence at time {time:g}, residual {found.residuals[-1]:.1e} after {found.iterations} "
@@ -279,11 +284,11 @@ class _Path:
         return self.system, load + 0.5 * self.rate * mass(4.0 * self.last - self.before)
 
 
-def _solved(system: System, right: Array, guess: Array, limits: SolverOptions) -> LinearResult:
+def _solved(system: System, right: Array, guess: Array, options: IterationOptions) -> LinearResult:
     """Return the solution of a step's system, sought from a guess; arrays (c, m_u, m_v, m_w)."""
 
     def precondition(residual: Array) -> Array:
         return np.stack([block(part) for block, part in zip(system.blocks, residual, strict=True)])
 
     solver = conjugate_gradients if system.problem.form.symmetric else generalized_residuals
-    return solver(system.matrix.apply_free, right, precondition, limits.tolerance, limits.max_iterations, guess)
+    return solver(system.matrix.apply_free, right, precondition, options.tolerance, options.max_iterations, guess)

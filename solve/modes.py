@@ -18,9 +18,8 @@ from parameterize.spline.volume import BSplineVolume
 
 from .diagnostics import ConvergenceError
 from .field import SplineField
-from .forms.elasticity import Elasticity
-from .forms.poisson import Poisson
-from .forms.problem import Problem
+from .forms.boundary_value_problem import BoundaryValueProblem
+from .options import SolveOptions
 from .solver import discretized
 from .system import System
 
@@ -88,14 +87,14 @@ class Modes(Brief):
 
 def modes(
     volume: BSplineVolume,
-    law: Elasticity | Poisson | Problem,
+    law: BoundaryValueProblem,
     density: float = 1.0,
     n: int = 6,
     *,
     refine: int = 0,
     degree: int | None = None,
     threads: int | None = None,
-    quadrature: str = "spline",
+    quadrature: str = SolveOptions.quadrature,
     tolerance: float = 1e-4,
     max_iterations: int = 200,
 ) -> Modes:
@@ -147,7 +146,8 @@ def modes(
     if not law.form.symmetric:
         raise ValueError(f"{type(law.form).__name__} is not symmetric: its modes need not be real, and are not sought")
     shift = _stiffness(volume, law) if is_free(law) else 0.0
-    system = discretized(volume, law, shift, refine=refine, degree=degree, threads=threads, quadrature=quadrature)
+    options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature)
+    system = discretized(volume, law, options, shift)
     system = replace(system, known=np.zeros_like(system.known))
     rigid = RIGID.get(len(system.known), len(system.known)) if shift else 0
     if n + rigid > len(system.load):
@@ -176,13 +176,13 @@ def check_modes(density: float, n: int, tolerance: float = 0.5, max_iterations: 
         raise ValueError(f"tolerance must be a number between 0 and 1, got {tolerance!r:.80}")
 
 
-def is_free(law: Elasticity | Poisson | Problem) -> bool:
+def is_free(law: BoundaryValueProblem) -> bool:
     """Return whether nothing may hold a body: regions can leave motions free."""
     on_faces = not law.dirichlet and (bool(law.conditions) or len(law.natural) == 6)
     return on_faces and not law.form.has_reaction
 
 
-def _stiffness(volume: BSplineVolume, law: Elasticity | Poisson | Problem) -> float:
+def _stiffness(volume: BSplineVolume, law: BoundaryValueProblem) -> float:
     """Return the law's factor in the middle of a volume over its length squared: of the size of eigenvalues."""
     x = volume.grid([0.5], [0.5], [0.5]).reshape(3, 1)
     length = np.ptp(volume.control_points.reshape(-1, 3), axis=0).max()

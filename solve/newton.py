@@ -13,18 +13,20 @@ from parameterize.conjugate_gradients import INDEFINITE, conjugate_gradients
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
 
+from .assembly import assemble_data
 from .diagnostics import ConvergenceError, judge
 from .discretization.errors import error_norms
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .field import SplineField
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
-from .forms.problem import BoundaryValueProblem, Problem
+from .forms.problem import Problem
 from .linear.krylov import generalized_residuals
 from .linear.preconditioner import fast_diagonalization
+from .options import SolveOptions
 from .solution import Solution, SolveReport
 from .solver import prepared
-from .system import SolverOptions, assemble_data
 
 ENOUGH = 0.8  # share of the forces along a step that may be left at its end
 SHORTEST = 2.0**-12  # of a step
@@ -43,7 +45,7 @@ def newton(
     refine: int = 0,
     degree: int | None = None,
     threads: int | None = None,
-    quadrature: str = "spline",
+    quadrature: str = SolveOptions.quadrature,
     tolerance: float = 1e-10,
     max_iterations: int = 30,
     linear_iterations: int = 1000,
@@ -96,16 +98,23 @@ def newton(
     >>> report.l2_relative < 1e-3, report.iterations < 8
     (True, True)
     """
-    SolverOptions(tolerance=tolerance, max_iterations=max_iterations)
+    options = SolveOptions(
+        refine=refine,
+        degree=degree,
+        threads=threads,
+        quadrature=quadrature,
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+    )
     if not (isinstance(load_steps, Integral) and load_steps >= 1):
         raise ValueError(f"load_steps must be a whole number, at least 1, got {load_steps!r:.80}")
     if weak := [c.role for c in problem.conditions if c.is_essential and not c.is_strong]:
         raise ValueError(f"{weak[0]}: newton holds all of u on whole faces of the cube only: write a region such as u0")
-    placed, space, threads = prepared(volume, problem, refine, degree, threads)
+    placed, space = prepared(volume, problem, options)
     if len(placed.natural) == 6 and not placed.form.has_reaction:
         raise ValueError("newton: data of all six faces leave the solution open: give one face to boundary or robin")
     with one_blas_thread():
-        balance = _Balance.of(volume, placed, space, threads, quadrature, tolerance, max_iterations, linear_iterations)
+        balance = _Balance.of(volume, placed, space, options, linear_iterations)
         full = np.zeros_like(balance.load)
         if start is not None:
             full = embedded(start.coefficients, start.degrees, start.knots, space)
@@ -127,19 +136,18 @@ class _Balance:
     load: Array
     known: Array
     is_fixed: NDArray[np.bool_]
-    tolerance: float
-    most: int
-    most_linear: int
+    options: SolveOptions
+    linear_iterations: int
 
     @classmethod
     def of(
-        cls, volume: BSplineVolume, problem: Any, space: TrialSpace, threads: int, quadrature: str, *limits: Any
+        cls, volume: BSplineVolume, problem: Any, space: TrialSpace, options: SolveOptions, linear_iterations: int
     ) -> "_Balance":
-        """Return the balance of a problem; limits: tolerance, iterations, iterations of the linear solver."""
-        operator, load, known = assemble_data(volume, _Loads(problem), space, threads, quadrature)  # type: ignore[arg-type]
+        """Return the balance of a problem; linear_iterations: of the linear solver, in a step of Newton's method."""
+        operator, load, known = assemble_data(volume, _Loads(problem), space, options)  # type: ignore[arg-type]
         is_fixed = np.ones(load.shape, dtype=bool)
         is_fixed[:, *space.window] = False
-        return cls(Forces.of(operator, volume, problem.form), load, known, is_fixed, *limits)
+        return cls(Forces.of(operator, volume, problem.form), load, known, is_fixed, options, linear_iterations)
 
     def found(self, full: Array, share: float, history: list[float]) -> Array:
         """Return the coefficients that balance a share of the loads, from others; residuals go to the history.
@@ -157,9 +165,9 @@ class _Balance:
             history.append(float(np.linalg.norm(rest[~self.is_fixed])) / size if size else 0.0)
             log.info("share %.3g of the loads, step %d: residual %.1e", share, made, history[-1])
             is_reached = np.abs(missing).max() <= REACHED * np.abs(self.known).max(initial=0.0)
-            if history[-1] <= self.tolerance and is_reached:
+            if history[-1] <= self.options.tolerance and is_reached:
                 return full
-            if made == self.most:
+            if made == self.options.max_iterations:
                 raise ConvergenceError(_failed(history, f"after {made} iterations"))
             step = self._step(full, rest, missing, history[-1])
             searched = self._searched(full, step, inner, load, bool(is_reached))
@@ -175,7 +183,7 @@ class _Balance:
         window = (slice(None), *tangent.space.window)
         right = -np.ascontiguousarray((rest + tangent.apply(missing))[window])
         step = missing.copy()
-        step[window] = _solved(tangent, right, form.symmetric, float(np.clip(residual, *INNER)), self.most_linear)
+        step[window] = _solved(tangent, right, form.symmetric, float(np.clip(residual, *INNER)), self.linear_iterations)
         return step
 
     def _searched(

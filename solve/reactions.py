@@ -15,8 +15,8 @@ from .discretization.operator import MatrixFree
 from .discretization.space import TrialSpace
 from .discretization.weak import WeakFace
 from .field import Points
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.condition import WITH_FACTOR
-from .forms.problem import BoundaryValueProblem
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,6 @@ def balance(problem: BoundaryValueProblem, matrix: MatrixFree, coefficients: Arr
 def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array) -> dict[str, Array]:
     """Return what holds the coefficients that the trial space fixes, by face or by the condition that names it."""
     fixed = np.zeros(residual.shape[1:], dtype=bool)
-    own = slice(0, space.owned[space.comm.rank].stop - space.owned[space.comm.rank].start)
     found: dict[str, Array] = {}
     for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
         here = np.zeros_like(fixed)
@@ -111,7 +110,7 @@ def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array)
             here[tuple((-1 if name[1] == "1" else 0) if a == axis else slice(None) for a in range(3))] = True
         here &= ~fixed
         fixed |= here
-        force = space.total((residual * here)[:, own].sum(axis=(1, 2, 3)))
+        force = space.total((residual * here)[:, space.own].sum(axis=(1, 2, 3)))
         role = next((c.role for c in problem.conditions if c.is_strong and name in c.region.faces), name)
         found[role] = found.get(role, 0.0) + force
     return found

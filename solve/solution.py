@@ -13,8 +13,8 @@ from parameterize.spline.volume import BSplineVolume
 
 from .discretization.errors import Errors
 from .field import SplineField
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Quantity
-from .forms.problem import BoundaryValueProblem
 from .quantities import Extremes, all_extremes, at_points, extremes, on_grid
 from .reactions import Balance
 

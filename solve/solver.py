@@ -1,8 +1,6 @@
 """One entrance for all problems: check, discretize, solve."""
 
 import functools
-import inspect
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,15 +8,18 @@ import numpy as np
 from parameterize.compilation import compilation_told
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume, demand_volume
-from parameterize.threads import default_threads
 
+from .assembly import assemble_data, balanced
 from .discretization.quadrature import gauss_rule, map_planes
-from .discretization.space import TrialSpace, agreed, trial_space
+from .discretization.slab import shared_space
+from .discretization.space import TrialSpace, trial_space
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
-from .forms.problem import BoundaryValueProblem, Problem
+from .forms.problem import Problem
+from .options import SolveOptions, check_device
 from .solution import Solution
-from .system import SolverOptions, System, assemble_data, balanced, build, check_device
+from .system import System, build
 
 
 def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution:
@@ -87,13 +88,13 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     >>> solution.report.dofs, solution.report.l2_relative < 1e-3
     (343, True)
     """
-    own = [field.name for field in fields(SolverOptions)]
-    options = [*list(inspect.signature(discretize).parameters)[2:], *own]
-    if unknown := [name for name in how if name not in options]:
-        raise TypeError(f"{unknown[0]}: is no option of a solve; the options are {', '.join(options)}")
-    of_solver = {name: how.pop(name) for name in own if name in how}
-    check_device(SolverOptions(**of_solver).device, problem)
-    return discretize(volume, problem, **how).solve(**of_solver)
+    return solve_with(volume, problem, SolveOptions.of(how))
+
+
+def solve_with(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> Solution:
+    """Return what `solve_problem` does, of options as one object."""
+    check_device(options.device, problem)
+    return discretized(volume, problem, options).solve_with(options)
 
 
 def discretize(
@@ -103,7 +104,7 @@ def discretize(
     refine: int = 0,
     degree: int | None = None,
     threads: int | None = None,
-    quadrature: str = "spline",
+    quadrature: str = SolveOptions.quadrature,
     comm: Any = None,
 ) -> System:
     """Return the linear system of a problem, for loops of one's own.
@@ -125,48 +126,32 @@ def discretize(
     >>> system.operator.shape, system.load.shape
     ((125, 125), (125,))
     """
-    return discretized(volume, problem, refine=refine, degree=degree, threads=threads, quadrature=quadrature, comm=comm)
+    options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature, comm=comm)
+    return discretized(volume, problem, options)
 
 
 def discretized(
-    volume: BSplineVolume,
-    problem: Poisson | Elasticity | Problem,
-    shift: float = 0.0,
-    *,
-    refine: int = 0,
-    degree: int | None = None,
-    threads: int | None = None,
-    quadrature: str = "spline",
-    comm: Any = None,
+    volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions, shift: float = 0.0
 ) -> System:
     """Return what `discretize` does, with `shift` times the mass added to the matrix: then nothing need hold a body."""
-    placed, space, threads = prepared(volume, problem, refine, degree, threads, comm)
+    placed, space = prepared(volume, problem, options)
     if shift == 0.0:
         problem.demand_held()
-    return build(volume, placed, space, threads, quadrature, shift)
+    return build(volume, placed, space, options, shift)
 
 
 def prepared(
-    volume: BSplineVolume,
-    problem: BoundaryValueProblem,
-    refine: int = 0,
-    degree: int | None = None,
-    threads: int | None = None,
-    comm: Any = None,
-) -> tuple[BoundaryValueProblem, TrialSpace, int]:
-    """Check what is discretized; return the problem placed in the volume, the trial space, and how many threads."""
+    volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions
+) -> tuple[BoundaryValueProblem, TrialSpace]:
+    """Check what is discretized; return the problem placed in the volume, and the trial space."""
     demand_volume(volume)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads must be at least 1, got {threads}; leave it out for {default_threads()}")
-    placed, space = problem.on(volume), trial_space(volume, refine, degree, problem.dirichlet)
+    placed, space = problem.on(volume), trial_space(volume, options.refine, options.degree, problem.dirichlet)
     if any(part.stop <= part.start for part in space.free):
         raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
-    _warm_up(volume.degrees, degree, placed.form.components == 1 and placed.form.symmetric)
-    if comm is not None:
-        space = space.slab(comm)
-    return placed, space, threads or (default_threads() if comm is None else 1)
+    _warm_up(volume.degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
+    return placed, shared_space(space, options.comm)
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
@@ -176,15 +161,13 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
     Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
     """
     problem.demand_held()
-    problem, space = problem.on(volume), trial_space(volume, dirichlet=problem.dirichlet)
-    if comm is not None:
-        space = space.slab(comm)
-    _, load, _ = assemble_data(volume, problem, space, quadrature="gauss")
+    problem, space = problem.on(volume), shared_space(trial_space(volume, dirichlet=problem.dirichlet), comm)
+    _, load, _ = assemble_data(volume, problem, space, SolveOptions(threads=1, quadrature="gauss"))
     if problem.fixes_nothing and not problem.form.has_reaction:
         space.add(load)
         balanced(load[:, *space.window], space)
     if problem.exact is not None:
-        with agreed(space.comm):
+        with space.agreed():
             for _, _, x in map_planes(volume, gauss_rule(space)):
                 problem.exact_at(x)
 
@@ -200,4 +183,4 @@ def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool)
     cube = BSplineVolume(degrees, tuple(knots), np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1))  # type: ignore[arg-type]
     problem = Poisson(exact="x*x") if is_scalar else Elasticity(exact=("x*x", "y", "z"))
     with compilation_told():
-        build(cube, problem, trial_space(cube, 1, degree)).solve()
+        build(cube, problem, trial_space(cube, 1, degree), SolveOptions(threads=1)).solve()

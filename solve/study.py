@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,11 +10,10 @@ from parameterize.display import Shown
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
-from .forms.elasticity import Elasticity
-from .forms.poisson import Poisson
-from .forms.problem import Problem
+from .forms.boundary_value_problem import BoundaryValueProblem
+from .options import SolveOptions
 from .solution import SolveReport
-from .solver import solve_problem
+from .solver import solve_with
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ class Convergence(list[ConvergenceRow], Shown):
 
 def convergence(
     volume: BSplineVolume,
-    problem: Poisson | Elasticity | Problem,
+    problem: BoundaryValueProblem,
     refine: Iterable[int] = range(3),
     degree: int | None = None,
     *,
@@ -97,8 +95,8 @@ def convergence(
     levels = list(refine) if isinstance(refine, Iterable) else []
     if not levels:
         raise ValueError(f"refine must be levels such as range(3), got {refine!r:.80}")
-    solve = partial(solve_problem, volume, problem, degree=degree, certified=certified, tolerance=tolerance)
-    reports = [solve(refine=level).report for level in levels]
+    options = SolveOptions(degree=degree, certified=certified, tolerance=tolerance)
+    reports = [solve_with(volume, problem, replace(options, refine=level)).report for level in levels]
     found = rates(reports)
     l2, h1 = ([None, *found.get(name, [None] * len(reports))] for name in ("l2", "h1"))
     return Convergence(ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports))

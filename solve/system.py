@@ -5,7 +5,6 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -13,73 +12,29 @@ from scipy.sparse.linalg import LinearOperator
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
 
+from .assembly import assemble_data, balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
-from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
 from .discretization.errors import error_norms, missing_mean
 from .discretization.estimate import error_estimate
-from .discretization.on_regions import demand_area, demand_supports, weak_faces
+from .discretization.on_regions import demand_supports
 from .discretization.operator import FormOperator, Operator, assemble, with_mass
-from .discretization.quadrature import rule_of
-from .discretization.space import TrialSpace, agreed, embedded, longest_edge
+from .discretization.space import TrialSpace, embedded, longest_edge
 from .discretization.weak import WeakFace
-from .field import Points, SplineField
-from .forms.form import check_law
+from .field import SplineField
+from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
-from .forms.poisson import Poisson
-from .forms.problem import BoundaryValueProblem, Problem
 from .linear.krylov import generalized_residuals
 from .linear.preconditioner import FastDiagonalization, fast_diagonalization
+from .options import IterationOptions, SolveOptions, check_device
 from .reactions import balance
 from .solution import Solution, SolveReport
 
-DEVICES = ("cpu", "cuda")
-SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which a user's law is checked
-
 LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
-LARGEST_IMBALANCE = 0.01  # of the data's size; what quadrature leaves of data in balance is far below
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SolverOptions:
-    """Hold what the linear solver is told: keywords of `iga_nn.solve`, which describes them.
-
-    Raises ValueError where a tolerance or a number of iterations is out of range.
-    """
-
-    tolerance: float = 1e-10
-    max_iterations: int = 1000
-    certified: str | None = None
-    device: str = "cpu"
-    start: SplineField | None = None
-    estimate: bool | None = None
-    strict: bool = False
-
-    def __post_init__(self) -> None:
-        if not (isinstance(self.tolerance, Real) and 0.0 < self.tolerance < 1.0):
-            raise ValueError(f"tolerance must be a number between 0 and 1, got {self.tolerance!r:.80}")
-        if not (isinstance(self.max_iterations, Integral) and self.max_iterations >= 1):
-            raise ValueError(f"max_iterations must be a whole number, at least 1, got {self.max_iterations!r:.80}")
-
-
-def check_device(device: str, problem: BoundaryValueProblem) -> None:
-    """Raise ValueError for a device that is unknown or absent, or that cannot solve the problem."""
-    if device not in DEVICES:
-        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
-    if device != "cpu":
-        if not isinstance(problem, Poisson):
-            raise ValueError(f"{type(problem).__name__.lower()} runs on device='cpu' only, got device={device!r}")
-        if problem.robin:
-            raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
-        if problem.conditions:
-            raise ValueError(f"regions run on device='cpu' only, got device={device!r}")
-        from .linear.cuda import check_available  # torch comes in here only
-
-        check_available(device)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +119,7 @@ class System:
 
     def _spline(self, full: Array) -> SplineField:
         """Return the spline of coefficients (c, n_u, n_v, n_w), those of all processes together."""
-        own = self.space.owned[self.space.comm.rank]
-        whole = self.space.gather(full[:, : own.stop - own.start])
+        whole = self.space.gather(full[:, self.space.own])
         coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
 
@@ -188,17 +142,20 @@ class System:
         how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`.
         Raises ConvergenceError where the linear solver fails before its first iteration, else only for `strict`.
         """
-        options = SolverOptions(**how)
+        return self.solve_with(IterationOptions.of(how))
+
+    def solve_with(self, options: IterationOptions) -> Solution:
+        """Return what `solve` does, of options as one object."""
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
-        for notice in solution.report.notices if self.space.comm.rank == 0 else ():
+        for notice in solution.report.notices if self.space.rank == 0 else ():
             log.warning("%s", notice)
         if options.strict and not solution.report.converged:
             raise ConvergenceError(solution.report.notices[-1], solution)
         return solution
 
-    def _solve(self, options: SolverOptions) -> Solution:
+    def _solve(self, options: IterationOptions) -> Solution:
         volume, problem, space = self.volume, self.problem, self.space
         dofs = len(self.known) * space.dofs
         clock, sent = [time.process_time()], space.traffic()
@@ -252,7 +209,7 @@ class System:
             return None
         return float(self.space.total((self.right * free).sum()))
 
-    def _iterate(self, options: SolverOptions) -> LinearResult:
+    def _iterate(self, options: IterationOptions) -> LinearResult:
         """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
         operator, limits = self.matrix, (options.tolerance, options.max_iterations)
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
@@ -280,8 +237,7 @@ def build(
     volume: BSplineVolume,
     problem: BoundaryValueProblem,
     space: TrialSpace,
-    threads: int = 1,
-    quadrature: str = "spline",
+    options: SolveOptions,
     shift: float = 0.0,
 ) -> System:
     """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
@@ -290,7 +246,7 @@ def build(
     """
     start = time.process_time()
     with one_blas_thread():
-        operator, load, known = assemble_data(volume, problem, space, threads, quadrature)
+        operator, load, known = assemble_data(volume, problem, space, options)
         if shift == 0.0:
             weak = [face for face in operator.faces.values() if isinstance(face, WeakFace)]
             demand_supports(problem, space, weak, float(np.ptp(volume.control_points, axis=(0, 1, 2)).max()))
@@ -310,76 +266,3 @@ def build(
         right = balanced(right, space) if inverses[0].singular else right
         setup = time.process_time() - start
     return System(volume, problem, space, operator, known, inverses, right, loads, setup)
-
-
-def assemble_data(
-    volume: BSplineVolume,
-    problem: BoundaryValueProblem,
-    space: TrialSpace,
-    threads: int = 1,
-    quadrature: str = "spline",
-) -> tuple[Operator | FormOperator, Array, Array]:
-    """Return operator and load, the data on faces included, and the coefficients that are fixed."""
-    form, couples = problem.form, False
-    if isinstance(problem, Problem):
-        samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
-        couples = check_law(form, Points.of(samples, (SAMPLES, SAMPLES, SAMPLES)))
-    operator, load = assemble(
-        volume,
-        space,
-        form,
-        problem.source_at,
-        rule_of(volume, space, form.tensor, quadrature),
-        component=0 if form.components == 1 and form.symmetric and not couples else None,
-        threads=threads,
-    )
-    with agreed(space.comm):
-        if problem.conditions:
-            terms: dict[str, Any] = _on_regions(volume, problem, space, load)
-        else:
-            terms = _on_faces(volume, problem, space, load)
-    known = boundary_coefficients(volume, space.whole, problem.boundary_at, form.components)
-    return replace(operator, faces=terms), load, known[:, space.rows].copy()
-
-
-def _on_faces(
-    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, load: Array
-) -> dict[str, FaceRule]:
-    """Add the data on the images of the cube's faces to a load, and return the faces that have Robin's term."""
-    robin = {}
-    for name in FACE_NAMES:
-        if name in space.dirichlet or not has_face(space, name):
-            continue
-        face = face_rule(volume, space, name)
-        alpha, data = problem.on_face(name, face.points, face.normal)
-        if alpha is not None:
-            robin[name] = replace(face, measure=alpha * face.measure)
-        for density, total in zip(data, load, strict=True):
-            total[face.layer] += face.integrate(density)
-    return robin
-
-
-def _on_regions(
-    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, load: Array
-) -> dict[str, WeakFace]:
-    """Add the data on regions of the boundary to a load, and return the faces that have terms."""
-    faces = weak_faces(volume, problem, space)
-    demand_area(volume, problem, space, faces)
-    for face in faces:
-        face.add_load(load)
-    return {face.name: face for face in faces}
-
-
-def balanced(load: Array, space: TrialSpace) -> Array:
-    """Return the free coefficients' load (1, ...) less its mean: of problems that leave the solution's constant open.
-
-    The basis functions sum to one, so the load is then orthogonal to constants.
-    Raises ValueError where the load's sum, the integral of source and fluxes, is not nearly zero.
-    """
-    total, size = float(space.total(load.sum())), float(space.total(np.abs(load).sum()))
-    if abs(total) > LARGEST_IMBALANCE * size:
-        raise ValueError(
-            f"incompatible Neumann data: source plus flux integrate to {total:.4g}, must be 0 where no Dirichlet face, "
-            "no Robin face and no reaction fixes the solution"
-        )
-    return load - total / space.dofs

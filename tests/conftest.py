@@ -118,7 +118,7 @@ def few_distances(monkeypatch: pytest.MonkeyPatch) -> None:
     """Measure distances at few points of the boundary: they are half of what so short a run takes."""
     from small_run import FEW
 
-    from parameterize.quality.distances import SampledBoundary
+    from parameterize.spline.sampled_boundary import SampledBoundary
 
     monkeypatch.setattr(SampledBoundary.of.__func__, "__defaults__", FEW)
 

@@ -10,7 +10,7 @@ import pytest
 from distributed import LocalCluster
 from example_files import load
 from mesh_files import obj
-from small_run import small_surface
+from small_run import BATCH_WORKER, small_surface
 
 from iga_nn.batch import cluster
 from iga_nn.errors import InputError
@@ -48,7 +48,7 @@ def test_workers_that_never_come_are_not_waited_for_without_end(monkeypatch):
 def test_the_slurm_script_runs_a_batch_on_the_workers_of_a_cluster(in_folder):
     surface = small_surface()
     Path("pillow.obj").write_text(obj(surface.vertices, surface.faces))
-    preload = {"distributed.worker.preload": [str(Path(__file__).with_name("batch_worker.py"))]}
+    preload = {"distributed.worker.preload": [str(BATCH_WORKER)]}
     with cluster._environment({}), dask.config.set(preload | {"temporary-directory": str(in_folder)}):
         code = load("slurm").main(
             ["pillow.obj", "nowhere.obj", "--out", "out", "--jobs", "1", "--refine", "0", "--quiet"],

@@ -8,10 +8,10 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from iga_nn.batch import cluster
-from iga_nn.batch.run import run_tasks
+from iga_nn.batch.run_batch import run_tasks
 from iga_nn.batch.task import Task
 from iga_nn.options import MapOptions, WorkerOptions
-from iga_nn.workflow.watched import Ended
+from iga_nn.workflow.worker_run import Ended
 
 
 def test_progress_is_called_by_one_thread_at_a_time(in_folder, monkeypatch):

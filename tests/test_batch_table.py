@@ -20,7 +20,7 @@ from iga_nn.batch.surfaces import Entry
 from iga_nn.batch.table import Batch, Row, page
 from iga_nn.cli.answer import batch_exit_code
 from iga_nn.options import PoissonOptions
-from iga_nn.workflow.watched import Ended
+from iga_nn.workflow.worker_run import Ended
 
 
 def row(name, folder=Path("out"), how=None):
@@ -74,8 +74,8 @@ def test_a_row_has_the_figures_of_its_report(batch, done):
 def test_states_and_counts(batch):
     assert [each.state for each in batch.rows] == ["refused", "certified", "not certified", "waiting"]
     assert batch.summary == "4 surfaces: 1 certified, 1 not certified, 1 refused, 1 waiting"
-    assert batch.rows[0].told() == "b<i>.obj: refused, not a surface, sorry"
-    assert batch.rows[1].told().startswith("cube.obj: certified, ARAP mean ")
+    assert batch.rows[0].as_line() == "b<i>.obj: refused, not a surface, sorry"
+    assert batch.rows[1].as_line().startswith("cube.obj: certified, ARAP mean ")
 
 
 def test_the_csv_has_all_digits_and_the_json_all_verdicts(batch):

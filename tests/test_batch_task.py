@@ -8,7 +8,7 @@ import pytest
 from iga_nn.batch import task as batch_task
 from iga_nn.batch.task import Task, compute
 from iga_nn.options import MapOptions, PoissonOptions
-from iga_nn.workflow import watched
+from iga_nn.workflow import worker_run
 
 
 @pytest.fixture
@@ -16,8 +16,8 @@ def told(monkeypatch):
     messages = []
     worker = SimpleNamespace(log_event=lambda topic, message: messages.append((topic, message)))
     monkeypatch.setattr("distributed.get_worker", lambda: worker)
-    monkeypatch.setattr(watched, "INTERVAL", 0.0)
-    monkeypatch.setattr(watched, "SHARE", float("inf"))
+    monkeypatch.setattr(worker_run, "INTERVAL", 0.0)
+    monkeypatch.setattr(worker_run, "SHARE", float("inf"))
     return messages
 
 

@@ -4,14 +4,13 @@ import csv
 import io
 import os
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import dask
 import pytest
 from example_files import cells, load
 from mesh_files import obj
-from small_run import small_surface
+from small_run import BATCH_WORKER, small_surface
 
 import iga_nn
 import solve
@@ -198,8 +197,10 @@ def test_what_went_on_from_a_checkpoint_has_no_time(formula):
 
 
 def test_a_solve_that_does_not_converge_is_a_status(formula, monkeypatch):
-    stopped = partial(solve.solve_problem, max_iterations=1)
-    monkeypatch.setattr("iga_nn.workflow.solving.solve_problem", stopped)
+    def stopped(volume, problem, options):
+        return solve.solve_with(volume, problem, replace(options, max_iterations=1))
+
+    monkeypatch.setattr("iga_nn.workflow.solving.solve_with", stopped)
     assert g1.main(formula) == 1
     row = table(Path("out"))["duck"]
     assert "did not converge" in row["status"] and row["iterations_refine_0"] == "1"
@@ -233,7 +234,7 @@ def test_models_run_in_processes_of_their_own(tmp_path):
     (tmp_path / "duck.obj").write_text(obj(surface.vertices, surface.faces))
     (tmp_path / "pig.obj").write_text("no surface\n")
     arguments = ["--models", str(tmp_path), "--out", str(tmp_path / "out"), "--only", "pig", "duck"]
-    with dask.config.set({"distributed.worker.preload": [str(Path(__file__).with_name("batch_worker.py"))]}):
+    with dask.config.set({"distributed.worker.preload": [str(BATCH_WORKER)]}):
         assert g1.main([*arguments, "--steps-factor", "0.003"]) == 1
     found = table(tmp_path / "out")
     assert list(found) == ["duck", "pig"]

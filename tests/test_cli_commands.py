@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 from contextlib import contextmanager
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,8 +113,10 @@ def test_folded_map_is_solved_with_a_warning_and_exit_code_3(formula_training, i
 
 
 def test_solve_that_does_not_converge_is_exit_code_4(monkeypatch, in_folder):
-    stopped = partial(solve.solve_problem, max_iterations=1)
-    monkeypatch.setattr("iga_nn.workflow.solving.solve_problem", stopped)
+    def stopped(volume, problem, options):
+        return solve.solve_with(volume, problem, replace(options, max_iterations=1))
+
+    monkeypatch.setattr("iga_nn.workflow.solving.solve_with", stopped)
     benchmark_volume(6).save("volume.npz")
     assert main(["solve", "poisson", "volume.npz", "--refine", "0", "--out", "out"]) == 4
     section = json.loads(Path("out/report.json").read_text())["poisson"]
@@ -609,7 +611,7 @@ def test_checkpoint_of_another_run_is_said(formula_training, in_folder, capsys):
 def test_a_refused_checkpoint_costs_no_file(formula_training, in_folder, capsys, monkeypatch):
     formula_training()
     with monkeypatch.context() as patched:
-        patched.setattr("iga_nn.workflow.solving.solve_problem", lambda *_, **__: 1 / 0)
+        patched.setattr("iga_nn.workflow.solving.solve_with", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             main(["run", "poisson", "cube"])
     before = sorted(Path("cube").iterdir())

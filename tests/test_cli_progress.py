@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from iga_nn.batch.run import Running
+from iga_nn.batch.run_batch import Running
 from iga_nn.batch.surfaces import Entry
 from iga_nn.batch.table import Batch, Row
 from iga_nn.cli import progress
@@ -57,7 +57,7 @@ def test_a_run_has_a_line_for_every_stage():
 
 @pytest.mark.parametrize("quiet", [True, False])
 def test_a_line_for_each_surface_that_ends(quiet, capsys):
-    log = logging.getLogger("iga_nn.batch.run")
+    log = logging.getLogger("iga_nn.batch.run_batch")
     with progress.shown_batch(quiet) as show:
         assert (show is None) == quiet
         log.info("bean: certified")

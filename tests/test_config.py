@@ -1,9 +1,14 @@
+import ast
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, is_dataclass, replace
+from pathlib import Path
 
 import pytest
 
+import iga_nn
+import parameterize
 from parameterize.config import PRESETS, preset
+from parameterize.training.stages import STAGES
 
 
 @pytest.mark.parametrize("name", sorted(PRESETS))
@@ -11,8 +16,9 @@ def test_presets_follow_the_papers_stages(name):
     config = preset(name)
     assert config.name == name
     assert [s.name for s in config.stages] == ["S(2)", "S(1)", "cube", "corners", "edges"]
-    assert [s.weights.cor > 0.0 for s in config.stages] == [False, False, False, True, True]
-    assert [s.weights.edge > 0.0 for s in config.stages] == [False, False, False, False, True]
+    weights = [STAGES[s.name].weights for s in config.stages]
+    assert [row.cor > 0.0 for row in weights] == [False, False, False, True, True]
+    assert [row.edge > 0.0 for row in weights] == [False, False, False, False, True]
     assert json.loads(json.dumps(asdict(config)))["spline"]["control_points"] == 30
 
 
@@ -58,3 +64,38 @@ def test_with_control_points():
     for other, says in ((3, "needs at least 4 control points, got 3"), (8.5, "must be a whole number, got 8.5")):
         with pytest.raises(ValueError, match=says):
             config.with_control_points(other)
+
+
+def numbers_in(value):
+    """How many numbers a table of options holds, those in its parts counted; a switch is none."""
+    if isinstance(value, dict):
+        return sum(map(numbers_in, value.values()))
+    if isinstance(value, list | tuple):
+        return sum(map(numbers_in, value))
+    return int(isinstance(value, int | float) and not isinstance(value, bool))
+
+
+def test_few_numbers_are_left_to_the_user():
+    options = asdict(preset("fast"))
+    assert sum(numbers_in(options[part]) for part in ("network", "train", "stages")) <= 25
+    assert numbers_in(options) <= 196
+
+
+def option_names(value):
+    """The names of all fields of a dataclass and of the dataclasses in it."""
+    for field in fields(value):
+        yield field.name
+        part = getattr(value, field.name)
+        for inner in part if isinstance(part, tuple) else (part,):
+            if is_dataclass(inner):
+                yield from option_names(inner)
+
+
+def test_every_option_is_read_somewhere():
+    read = set()
+    for package in (parameterize, iga_nn):
+        for path in Path(package.__file__).parent.rglob("*.py"):
+            if path.name != "config.py":
+                tree = ast.parse(path.read_text(encoding="utf-8"))
+                read |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    assert set(option_names(preset("fast").refined(1e-3, 40))) <= read

@@ -76,13 +76,13 @@ def test_parameters_that_coincide_with_edges_and_corners(seed):
     assert_valid(boundary_map(identity_volume(), vertices, faces, parameters), vertices, faces)
 
 
-def test_cut_vertices_settle_where_the_volume_puts_them():
+def test_cut_vertices_are_fitted_where_the_volume_puts_them():
     vertices, parameters, faces = placed_ball(2)
-    settled = boundary_map(identity_volume(), vertices, faces, parameters)
-    off = np.linalg.norm(settled.vertices - settled.parameters, axis=1)  # the volume is the identity
+    fitted = boundary_map(identity_volume(), vertices, faces, parameters)
+    off = np.linalg.norm(fitted.vertices - fitted.parameters, axis=1)  # the volume is the identity
     assert off[: len(vertices)].max() < 1e-12
     cut = cut_along_rays(parameters, faces, 0.0)
     plain = cut.carry(vertices)
-    unsettled = np.linalg.norm(plain - onto_cube(cut.carry(parameters)), axis=1)
-    assert off[len(vertices) :].mean() < unsettled[len(vertices) :].mean()
-    assert off.max() <= unsettled.max()
+    unfitted = np.linalg.norm(plain - onto_cube(cut.carry(parameters)), axis=1)
+    assert off[len(vertices) :].mean() < unfitted[len(vertices) :].mean()
+    assert off.max() <= unfitted.max()

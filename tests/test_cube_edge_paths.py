@@ -5,12 +5,18 @@ from shapes import ball, rounded_cube, turned
 
 from parameterize.cube.cube import CORNERS, EDGES
 from parameterize.cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
+from parameterize.cube.layout import CubeLayout
 
 
 def near_cube(seed, power=8.0, noise=0.005):
     points, faces = rounded_cube(1200, power)
     rng = np.random.default_rng(seed)
     return turned(points, rng.uniform(-0.08, 0.08, 3)) + noise * rng.normal(size=points.shape), faces
+
+
+def mapped_surface(mapped, faces):
+    """The layout of a surface that is its own map."""
+    return CubeLayout(mapped, faces, mapped, len(mapped))
 
 
 def nearest_face(points):
@@ -31,8 +37,8 @@ def test_paths_bound_six_discs_with_the_right_corners(seed):
     mapped, faces = near_cube(seed)
     corners = choose_corners(mapped)
     assert np.linalg.norm(mapped[corners] - CORNERS, axis=1).max() < 0.3
-    surface = cut_surface(mapped, faces, corners)
-    position, cut_faces = surface.cut.carry(mapped), surface.cut.faces
+    surface = cut_surface(mapped_surface(mapped, faces), corners)
+    position, cut_faces = surface.layout.places, surface.layout.faces
     for label in range(6):
         patch = cut_faces[surface.face_labels == label]
         edges = np.unique(np.sort(patch[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
@@ -48,20 +54,21 @@ def test_paths_bound_six_discs_with_the_right_corners(seed):
 
 def test_paths_are_disjoint_walks_along_mesh_edges():
     mapped, faces = near_cube(0)
-    surface = cut_surface(mapped, faces, choose_corners(mapped))
-    edges = {tuple(e) for e in np.sort(surface.cut.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).tolist()}
+    corners = choose_corners(mapped)
+    surface = cut_surface(mapped_surface(mapped, faces), corners)
+    edges = {tuple(e) for e in np.sort(surface.layout.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).tolist()}
     inner = []
     for (i, j), path in zip(EDGES, surface.paths, strict=True):
-        assert path[0] == surface.corners[i] and path[-1] == surface.corners[j]
+        assert path[0] == corners[i] and path[-1] == corners[j]
         assert all(tuple(sorted(pair)) in edges for pair in zip(path[:-1].tolist(), path[1:].tolist(), strict=True))
         inner += path[1:-1].tolist()
-    assert len(set(inner)) == len(inner) and not set(inner) & set(surface.corners.tolist())
+    assert len(set(inner)) == len(inner) and not set(inner) & set(corners.tolist())
 
 
 def test_edge_targets_follow_the_edges_by_arc_length():
     mapped, faces = near_cube(2)
-    surface = cut_surface(mapped, faces, choose_corners(mapped))
-    position = surface.cut.carry(mapped)
+    surface = cut_surface(mapped_surface(mapped, faces), choose_corners(mapped))
+    position = surface.layout.places
     vertices, targets, following = edge_targets(position, surface.paths)
     start = 0
     for (i, j), path in zip(EDGES, surface.paths, strict=True):
@@ -95,13 +102,13 @@ def test_no_way_between_the_corners_is_said():
     faces = ConvexHull(CORNERS).simplices.astype(np.int64)
     swapped = np.array([1, 0, 2, 3, 4, 5, 6, 7])  # needs both diagonals of the face u0; a mesh has one
     with pytest.raises(PathError, match="no path left"):
-        cut_surface(CORNERS, faces, swapped)
+        cut_surface(mapped_surface(CORNERS, faces), swapped)
 
 
 def test_mirrored_corners_are_refused():
     mapped, faces = near_cube(0)
     corners = choose_corners(mapped)
     turned_cube = corners[[0, 2, 4, 6, 1, 3, 5, 7]]  # (u, v, w) -> (v, w, u): a rotation
-    assert len(cut_surface(mapped, faces, turned_cube).paths) == 12
+    assert len(cut_surface(mapped_surface(mapped, faces), turned_cube).paths) == 12
     with pytest.raises(PathError, match="mirrored"):
-        cut_surface(mapped, faces, corners[[4, 5, 6, 7, 0, 1, 2, 3]])
+        cut_surface(mapped_surface(mapped, faces), corners[[4, 5, 6, 7, 0, 1, 2, 3]])

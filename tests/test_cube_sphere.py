@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from shapes import ball
 
-from parameterize.config import LAYOUT
-from parameterize.cube.sphere import _relaxed, _tangents, _Triangles, lay_on_sphere
+from parameterize.cube.sphere import _STEPS, _relaxed, _tangents, _Triangles, lay_on_sphere
 
 
 def turned_over(directions, faces):
@@ -47,26 +46,26 @@ def rod(rings=60, around=8, length=12.0):
 @pytest.mark.parametrize("shape", [ball, horseshoe, thorn])
 def test_no_triangle_is_turned_over_and_the_mesh_stays(shape):
     vertices, faces = shape(1200)
-    layout = lay_on_sphere(vertices, faces, LAYOUT)
+    layout = lay_on_sphere(vertices, faces)
     assert not turned_over(layout.places, layout.faces).any()
     assert np.linalg.norm(layout.places, axis=1) == pytest.approx(1.0)
-    assert np.array_equal(layout.vertices[: len(vertices)], vertices)
-    again = lay_on_sphere(vertices, faces, LAYOUT)
+    assert np.array_equal(layout.points[: len(vertices)], vertices)
+    again = lay_on_sphere(vertices, faces)
     assert np.array_equal(again.places, layout.places)
 
 
 def test_the_sphere_keeps_its_areas():
     vertices, faces = ball(800)
-    layout = lay_on_sphere(vertices, faces, LAYOUT)
-    before, after = (np.linalg.det(x[layout.faces]) for x in (layout.vertices, layout.places))
+    layout = lay_on_sphere(vertices, faces)
+    before, after = (np.linalg.det(x[layout.faces]) for x in (layout.points, layout.places))
     assert np.median(after / before) == pytest.approx(1.0, abs=0.02)
     assert np.percentile(after / before, [1, 99]) == pytest.approx([1.0, 1.0], abs=0.1)
 
 
 def test_a_thorn_gets_the_room_that_its_area_asks_for():
     vertices, faces = thorn()
-    layout = lay_on_sphere(vertices, faces, LAYOUT)
-    points = layout.vertices[layout.faces]
+    layout = lay_on_sphere(vertices, faces)
+    points = layout.points[layout.faces]
     cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     area, room = np.linalg.norm(cross, axis=1), np.linalg.det(layout.places[layout.faces])
     tip = points[:, :, 0].mean(axis=1) > 3.0
@@ -76,9 +75,9 @@ def test_a_thorn_gets_the_room_that_its_area_asks_for():
 
 def test_a_long_rod_is_not_squeezed_to_nothing_at_its_ends():
     vertices, faces = rod()
-    layout = lay_on_sphere(vertices, faces, LAYOUT)
+    layout = lay_on_sphere(vertices, faces)
     assert not turned_over(layout.places, layout.faces).any()
-    points = layout.vertices[layout.faces]
+    points = layout.points[layout.faces]
     area = np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=1)
     room = np.linalg.det(layout.places[layout.faces])
     tenth = np.minimum(points[:, :, 2].mean(axis=1) / 1.2, 9.0).astype(int)
@@ -88,8 +87,8 @@ def test_a_long_rod_is_not_squeezed_to_nothing_at_its_ends():
 
 def test_first_and_second_derivatives():
     vertices, faces = horseshoe(60)
-    layout = lay_on_sphere(vertices, faces, LAYOUT)
-    triangles, places = _Triangles(layout.vertices, layout.faces), layout.places
+    layout = lay_on_sphere(vertices, faces)
+    triangles, places = _Triangles(layout.points, layout.faces), layout.places
     rng, h = np.random.default_rng(0), 1e-4
     step = rng.normal(size=(len(places), 2))
     tangents = _tangents(places)
@@ -115,7 +114,7 @@ def test_the_energy_falls_and_no_step_turns_a_triangle_over():
     rough /= np.linalg.norm(rough, axis=1, keepdims=True)
     assert not turned_over(rough, faces).any()
     triangles = _Triangles(vertices, faces)
-    relaxed = _relaxed(rough, triangles, LAYOUT)
+    relaxed = _relaxed(rough, triangles)
     assert triangles.energies(relaxed).sum() < triangles.energies(rough).sum()
     assert not turned_over(relaxed, faces).any()
 
@@ -125,9 +124,9 @@ def test_a_needle_is_laid_out_whole_without_a_warning(rings, around, length):
     """Its plain layout shrinks to less than the numbers can tell apart: to triangles of no area."""
     vertices, faces = rod(rings, around, length)
     with np.errstate(all="raise", under="ignore"):
-        layout = lay_on_sphere(vertices, faces, LAYOUT)
+        layout = lay_on_sphere(vertices, faces)
     assert not turned_over(layout.places, layout.faces).any()
-    energies = _Triangles(layout.vertices, layout.faces).energies(layout.places)
+    energies = _Triangles(layout.points, layout.faces).energies(layout.places)
     assert np.isfinite(energies).all()
     assert energies.sum() < 2.0 * 8.0 * np.pi * length  # 8 pi is that of a sphere
 
@@ -143,15 +142,15 @@ def test_triangles_that_the_numbers_cannot_tell_apart_have_infinite_energy_and_n
     touched = np.isin(faces, faces[0]).sum(axis=1) >= 2
     assert np.isinf(energies[touched]).all()
     assert np.isfinite(energies[~np.isin(faces, faces[0]).any(axis=1)]).all()
-    assert np.array_equal(_relaxed(squeezed, triangles, LAYOUT), squeezed)
+    assert np.array_equal(_relaxed(squeezed, triangles), squeezed)
 
 
 def test_each_step_is_told_and_may_be_the_last():
     vertices, faces = horseshoe(400)
     told = []
-    lay_on_sphere(vertices, faces, LAYOUT, told.append)
+    lay_on_sphere(vertices, faces, told.append)
     assert [now.step for now in told] == list(range(1, len(told) + 1)) and len(told) > 2
-    assert {(now.stage, now.steps) for now in told} == {("layout", LAYOUT.sphere_steps)}
+    assert {(now.stage, now.steps) for now in told} == {("layout", _STEPS)}
     assert np.all(np.diff([now.loss for now in told]) < 0.0)
     assert all(now.seconds_left > 0.0 for now in told)
 
@@ -159,4 +158,4 @@ def test_each_step_is_told_and_may_be_the_last():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        lay_on_sphere(vertices, faces, LAYOUT, stop)
+        lay_on_sphere(vertices, faces, stop)

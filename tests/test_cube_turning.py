@@ -1,24 +1,25 @@
 """The cube's edges are turned out of hollows and towards ridges."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from shapes import ball, rounded_cube
 
-from parameterize.config import LAYOUT
 from parameterize.cube.cube import project_radially
-from parameterize.cube.flips import Layout
-from parameterize.cube.turning import _angle_between, _bends, _hollowness, best_turn
+from parameterize.cube.layout import CubeLayout
+from parameterize.cube.turning import _HOLLOW, _OTHER_TURN, _angle_between, _bends, _hollowness, best_turn
 
 
 def laid(vertices, faces):
     centred = vertices - vertices.mean(axis=0)
-    return Layout(vertices, faces, centred / np.linalg.norm(centred, axis=1, keepdims=True))
+    return CubeLayout(vertices, faces, centred / np.linalg.norm(centred, axis=1, keepdims=True), len(vertices))
 
 
 def turned(layout, seed, number=0):
-    rotation = best_turn(layout, LAYOUT, np.random.default_rng(seed), number)
-    return Layout(layout.vertices, layout.faces, layout.places @ rotation.T)
+    rotation = best_turn(layout, np.random.default_rng(seed), number)
+    return replace(layout, places=layout.places @ rotation.T)
 
 
 def test_a_hollow_counts_positive_and_a_ridge_negative():
@@ -35,9 +36,9 @@ def test_the_edges_of_a_cube_are_found_again():
     layout = laid(points, faces)
     found = turned(layout, 0)
     middles, along, bends = _bends(layout)
-    best = _hollowness(middles, along, bends, LAYOUT)
+    best = _hollowness(middles, along, bends)
     middles, along, bends = _bends(found)
-    assert _hollowness(middles, along, bends, LAYOUT) == pytest.approx(best, rel=0.01) and best < 0.0
+    assert _hollowness(middles, along, bends) == pytest.approx(best, rel=0.01) and best < 0.0
     ridge = np.sort(np.abs(points - 0.5), axis=1)[:, 1] > 0.47  # on the edges of the rounded cube
     place = np.sort(np.abs(project_radially(found.places[ridge])), axis=1)[:, 1]
     assert np.median(place) > 0.47
@@ -47,9 +48,9 @@ def test_ridges_do_not_make_up_for_a_hollow_on_the_same_edge():
     """Of two layouts with the same sum of bends, that one is better whose edges lie in no hollow."""
     middles = np.array([[-0.5, -0.5, -0.4], [-0.5, -0.5, 0.4]])  # both on one edge of the cube, far apart
     along = np.array([[0.0, 0.0, 1.0]] * 2)
-    even, uneven = (_hollowness(middles, along, np.array(bends), LAYOUT) for bends in ([-1.0, -1.0], [1.0, -3.0]))
+    even, uneven = (_hollowness(middles, along, np.array(bends)) for bends in ([-1.0, -1.0], [1.0, -3.0]))
     assert even == pytest.approx(-2.0, rel=1e-6)
-    assert uneven == pytest.approx(-2.0 + LAYOUT.hollow, rel=1e-6)
+    assert uneven == pytest.approx(-2.0 + _HOLLOW, rel=1e-6)
 
 
 def test_the_same_generator_gives_the_same_turn():
@@ -66,8 +67,8 @@ def test_a_higher_number_gives_another_turn_that_is_no_better():
     middles, along, bends = _bends(layout)
     found = [turned(layout, 1, number).places for number in (0, 1, 100)]
     turns = [Rotation.align_vectors(directions, layout.places)[0] for directions in found]
-    costs = [_hollowness(middles @ turn.as_matrix().T, along @ turn.as_matrix().T, bends, LAYOUT) for turn in turns]
-    assert _angle_between(turns[1], turns[0]) > LAYOUT.other_turn
+    costs = [_hollowness(middles @ turn.as_matrix().T, along @ turn.as_matrix().T, bends) for turn in turns]
+    assert _angle_between(turns[1], turns[0]) > _OTHER_TURN
     assert costs[0] < costs[1] <= costs[2]
 
 
@@ -76,7 +77,7 @@ def test_where_the_best_rotations_lead_to_one_turn_others_follow():
     layout = laid(*rounded_cube(2000, 30.0))
     first, second = (turned(layout, 0, number).places for number in range(2))
     away = Rotation.align_vectors(first, second)[0]
-    assert _angle_between(away, Rotation.identity()) > LAYOUT.other_turn
+    assert _angle_between(away, Rotation.identity()) > _OTHER_TURN
 
 
 def test_a_quarter_turn_of_the_cube_is_no_other_turn():

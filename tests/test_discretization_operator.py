@@ -46,7 +46,7 @@ def case(request):
     stretched = smooth.control_points * [1.0, 2.0, 0.5] + 0.02 * rng.standard_normal(smooth.control_points.shape)
     volume = BSplineVolume.uniform(stretched[:, : own + 1], own) if own == 3 else BSplineVolume.uniform(stretched, own)
     space = trial_space(volume, degree=degree)
-    rule = operator_rule(space)
+    rule = operator_rule(space, "spline")
 
     def source(x, y, z):
         return x * y + np.sin(z)

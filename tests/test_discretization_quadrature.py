@@ -43,7 +43,7 @@ def test_plane_weights_add_up_to_the_cube(space):
 @pytest.mark.parametrize(("rough", "points"), [(False, 2 * 4 + 1), (True, 11)])
 def test_the_operators_rule_has_half_the_dimension_of_the_splines_it_integrates(space, rough, points):
     """Dimension 2 p + (p + 1) (n - 1) of S^(2p-1)_(p-2), and 2 p + 1 + (p + 2) (n - 1) of S^(2p)_(p-2), n = 4 spans."""
-    assert operator_rule(space, rough=rough).shape == (points, points, points)
+    assert operator_rule(space, "spline", rough).shape == (points, points, points)
 
 
 def test_other_rules_of_the_operator_have_gauss_points(space):
@@ -56,7 +56,7 @@ def test_other_rules_of_the_operator_have_gauss_points(space):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_directions_that_are_only_continuous_keep_one_gauss_point_more(degree):
     space = trial_space(benchmark_volume(4, degree=1), degree=degree)
-    assert operator_rule(space).shape == gauss_rule(space).shape == (4 * (degree + 1),) * 3
+    assert operator_rule(space, "spline").shape == gauss_rule(space).shape == (4 * (degree + 1),) * 3
 
 
 def knots_on(breaks, degree, inner=1):

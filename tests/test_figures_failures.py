@@ -70,16 +70,16 @@ def test_the_figures_of_a_solve_and_of_a_study_cost_themselves_alone(all_drawn, 
     benchmark_volume(2).save("map.npz")
     monkeypatch.setattr(DRAW["study.png"], broken)
     monkeypatch.setattr(DRAW["named_faces.png"], broken)
-    report, _ = look(pipeline.solve_to("map.npz", "out", problem=PoissonOptions(neumann=("u1",))).folder)
+    report, _ = look(pipeline.solve_to("map.npz", "out", statement=PoissonOptions(neumann=("u1",))).folder)
     assert set(report["not_drawn"]) == {"convergence.png", "named_faces.png"}
-    outcome, _ = pipeline.study_to("map.npz", "study", options=StudyOptions(refine=("0", "1")))
+    outcome, _ = pipeline.study_to("map.npz", "study", study_options=StudyOptions(refine=("0", "1")))
     assert set(look(outcome.folder)[0]["not_drawn"]) == {"study.png"}
 
 
 def test_the_figure_of_modes_costs_itself_alone(all_drawn, in_folder, monkeypatch):
     benchmark_volume(2).save("map.npz")
     monkeypatch.setattr(DRAW["modes.png"], broken)
-    outcome, _ = pipeline.modes_to("map.npz", "modes", options=ModesOptions(number=1, fix=("u0",)))
+    outcome, _ = pipeline.modes_to("map.npz", "modes", modes_options=ModesOptions(number=1, fix=("u0",)))
     report, _ = look(outcome.folder)
     assert set(report["not_drawn"]) == {"modes.png"} and len(report["modes"]["frequencies"]) == 1
 

@@ -42,7 +42,7 @@ def test_a_bent_rod_lies_on_the_cube_without_a_flip():
     assert not flipped(layout.places, layout.faces).any()
     assert is_closed(layout.faces)
     assert np.abs(layout.places - 0.5).max(axis=1) == pytest.approx(0.5)
-    assert np.array_equal(layout.vertices[: len(surface.vertices)], surface.unit_vertices)
+    assert np.array_equal(layout.points[: len(surface.vertices)], surface.unit_vertices)
     others = on_cube(surface, config, seed=1)
     assert not np.allclose(others.places[:100], layout.places[:100])
 
@@ -51,15 +51,15 @@ def test_the_first_map_is_a_cube_that_faces_the_surface():
     surface = bent_rod()
     layout = on_cube(surface, preset("fast").with_control_points(8))
     knots = (open_uniform_knots(8, 3),) * 3
-    cube = first_cube(layout, len(surface.vertices), knots, 3)
+    cube = first_cube(layout, knots, 3)
     found = Optimized.of(cube)
     assert found.certificate.verdict == "certified"
     assert found.certificate.lower_bound == pytest.approx(1.0)
     flat = cube.volume.control_points
     axes = np.stack([flat[-1, 0, 0] - flat[0, 0, 0], flat[0, -1, 0] - flat[0, 0, 0], flat[0, 0, -1] - flat[0, 0, 0]])
     assert axes @ axes.T == pytest.approx(np.eye(3))
-    towards = ((layout.places - 0.5) @ axes * (layout.vertices - 0.5)).sum()
-    assert towards > ((layout.places - 0.5) @ (axes @ np.diag([-1.0, -1.0, 1.0])) * (layout.vertices - 0.5)).sum()
+    towards = ((layout.places - 0.5) @ axes * (layout.points - 0.5)).sum()
+    assert towards > ((layout.places - 0.5) @ (axes @ np.diag([-1.0, -1.0, 1.0])) * (layout.points - 0.5)).sum()
 
 
 def test_the_rounds_in_which_it_grows_come_first():

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-HERE = Path(__file__).resolve().parent
+TESTS = Path(__file__).resolve().parent
+SUPPORT = TESTS / "support"
 
 PROGRAM = """
 import os, signal, time
@@ -45,7 +46,7 @@ IGNORING = "import os, signal, sys; signal.signal(signal.{name}, signal.SIG_IGN)
 def ignoring(name: str, program: str) -> str:
     """What a program prints that is started as `nohup .. &` of a script starts it: with that signal ignored."""
     code = IGNORING.format(name=name, command=[sys.executable, "-c", program])
-    places = os.pathsep.join(str(place) for place in (HERE.parent, HERE))
+    places = os.pathsep.join(str(place) for place in (TESTS.parent, TESTS, SUPPORT))
     environment = os.environ | {"PYTHONPATH": places}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=50)
     return done.stderr + done.stdout

@@ -9,12 +9,12 @@ import pytest
 
 import iga_nn
 
-PLACES = os.pathsep.join(str(Path(iga_nn.__file__).parents[1] / place) for place in (".", "tests"))
+PLACES = os.pathsep.join(str(Path(iga_nn.__file__).parents[1] / place) for place in (".", "tests/support"))
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
 def killing(moments):
-    command = [sys.executable, str(Path(__file__).with_name("killing.py")), "--moments", str(moments)]
+    command = [sys.executable, str(Path(__file__).parent / "support" / "killing.py"), "--moments", str(moments)]
     environment = os.environ | {"PYTHONPATH": PLACES, "OMP_NUM_THREADS": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     print(done.stdout)  # noqa: T201 - the log is what the long test is run for

@@ -13,7 +13,7 @@ from iga_nn.live.queue import Jobs, safe_name
 from iga_nn.live.worker import Step
 from iga_nn.models import resolve
 from iga_nn.options import MapOptions, PoissonOptions
-from iga_nn.workflow.watched import Ended
+from iga_nn.workflow.worker_run import Ended
 from parameterize.progress import Progress
 
 AT = Progress("cube", 3, 10, 0.5, 0, 7.0)
@@ -97,7 +97,7 @@ def test_a_problem_is_solved_on_a_finished_volume_and_again_on_the_same(tmp_path
     assert [job.name for job in jobs] == ["my cube.obj", "my cube.npz", "my cube.npz"]
     assert third.volume == third.path and third.path.read_bytes() == b"volume"
     assert third.path.with_name("boundary.npz").read_bytes() == b"part"  # regions are found on it
-    assert third.problem.exact == "y" and third.results != third.path
+    assert third.statement.exact == "y" and third.results != third.path
     jobs.close()
 
 

@@ -139,6 +139,6 @@ def test_a_relaxation_that_leaves_flips_is_dropped(monkeypatch):
     monkeypatch.setattr(SlidingParameters, "unflip", lambda self: None)
     monkeypatch.setattr("parameterize.cube.flips.untangle", lambda *_: np.roll(start, 7, axis=0))
     places = parameters_at(tangled, triangles)
-    found = places.settled(control, as_volume(control)(tangled), 2, 5)
+    found = places.at_closest_points(control, as_volume(control)(tangled), 2, 5)
     assert flipped(tangled, triangles).any()
     assert np.allclose(found.parameters, tangled)

@@ -92,5 +92,5 @@ def test_weights_sum_to_one_and_follow_the_area():
     weights = vertex_weights(needle, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), 4)
     area = np.array([0.5, 1.0, 1.0, 0.5])  # two large triangles, 1-2-0 and 1-2-3, share an edge
     assert weights == pytest.approx(0.125 + 0.5 * area / area.sum(), abs=1e-6)
-    weights = vertex_weights(needle, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), own=3)
+    weights = vertex_weights(needle, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), n_own=3)
     assert weights == pytest.approx([1 / 6, 1 / 6, 1 / 6, 0] + 0.5 * area / area.sum(), abs=1e-6)

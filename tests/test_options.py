@@ -33,7 +33,7 @@ OTHERS = {
 
 def told(options):
     """What a solve is told of the options; `run` and `solve` ask for the same."""
-    return options.problem(), options.solver(), options.refine
+    return options.problem(), options.solve_options(), options.refine
 
 
 @pytest.mark.parametrize(("options", "others"), OTHERS.items(), ids=lambda given: getattr(given, "section", ""))

@@ -10,10 +10,12 @@ from shapes import CORNERS, CUBE_FACES
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.jacobian import certify
 from parameterize.cube.boundary_map import BoundaryMap
-from parameterize.quality.distances import Distances, SampledBoundary, nearest_on_boundary, to_mesh
+from parameterize.quality.distances import Distances, nearest_on_boundary
 from parameterize.quality.quality import arap, arap_grid, measure, scaled_jacobian
 from parameterize.spline.bspline import collocation, greville, open_uniform_knots
+from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.nearest import distance_to_mesh
 
 
 def greville_grid(n, degree=3):
@@ -156,7 +158,7 @@ def test_cube_inside_a_larger_cube():
     larger = (1.0 + 2.0 * gap) * CORNERS - gap
     volume = affine(np.eye(3))
     sampled = SampledBoundary.of(volume, samples=5)
-    np.testing.assert_allclose(to_mesh(sampled.points, larger, CUBE_FACES), gap, rtol=1e-12)
+    np.testing.assert_allclose(distance_to_mesh(sampled.points, larger, CUBE_FACES), gap, rtol=1e-12)
     np.testing.assert_allclose(to_boundary(larger, volume, sampled), gap * 3.0**0.5, rtol=1e-12)
 
 
@@ -171,7 +173,7 @@ def test_foot_points_are_on_the_spline_not_on_its_triangles():
     volume = ball()
     on_it, coarse = (SampledBoundary.on(volume, *[np.linspace(0.0, 1.0, count)] * 3) for count in (23, 12))
     on_it = on_it.points
-    assert to_mesh(on_it, coarse.points, coarse.triangles).max() > 1e-3
+    assert distance_to_mesh(on_it, coarse.points, coarse.triangles).max() > 1e-3
     assert to_boundary(on_it, volume, coarse).max() < 1e-9
     outside = 1.1 * on_it / np.linalg.norm(on_it, axis=1, keepdims=True)
     np.testing.assert_allclose(to_boundary(outside, volume, coarse), 0.1, atol=2e-4)

@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 
-from iga_nn.levels import ESTIMATES, EXACT_ERRORS
+from iga_nn.level_table import ESTIMATES, EXACT_ERRORS
 from iga_nn.report import document as reports
 from solve.solution import NORMS
 

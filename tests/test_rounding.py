@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from iga_nn.batch.run import Running
+from iga_nn.batch.run_batch import Running
 from iga_nn.cli.answer import verdict_in_words
 from iga_nn.cli.commands import main
 from iga_nn.cli.progress import describe, tell_batch
@@ -40,14 +40,14 @@ def test_numbers_by_hand(value, digits, text):
 def test_the_memory_of_a_small_solve_is_said(caplog):
     volume, options = benchmark_volume(2), PoissonOptions(refine=(0,))
     with caplog.at_level(logging.INFO, "iga_nn"):
-        cost_estimate.tell_memory(volume, options.problem(), options)
+        cost_estimate.tell_memory(volume, options.problem(), options.solve_options())
     assert caplog.messages == ["estimate: below 0.1 GB of memory"]
 
 
 def test_little_free_memory_is_said(monkeypatch, caplog):
     volume, options = benchmark_volume(2), PoissonOptions(refine=(0,))
     monkeypatch.setattr(cost_estimate, "available_memory_mb", lambda _: 0.001)
-    cost_estimate.tell_memory(volume, options.problem(), options)
+    cost_estimate.tell_memory(volume, options.problem(), options.solve_options())
     assert "below 0.01 GB are free" in caplog.text
 
 

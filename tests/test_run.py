@@ -12,6 +12,7 @@ from small_run import STEPS, small_surface, tiny_config
 from parameterize.certificate.jacobian import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig
+from parameterize.cube import boundary_map, edge_paths
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.cube.cube import CORNERS
 from parameterize.cube.cutting import subdivide_finely
@@ -57,16 +58,18 @@ def test_end_to_end(surface, undisturbed):
     assert isinstance(result.boundary, BoundaryMap) and len(result.boundary.cube_faces) == len(result.boundary.faces)
 
 
-def test_the_options_of_the_layout_reach_every_step(surface, undisturbed, caplog, monkeypatch):
-    config = tiny_config()
-    unsettled = parameterize(
-        surface, replace(config, layout=replace(config.layout, settle_steps=0)), seed=3, device="cpu"
-    )
-    assert np.array_equal(unsettled.volume.control_points, undisturbed.volume.control_points)
-    assert not np.array_equal(unsettled.boundary.parameters, undisturbed.boundary.parameters)
+def test_cut_vertices_are_fitted_to_the_volume_and_leave_it_as_it_is(surface, undisturbed, monkeypatch):
+    monkeypatch.setattr(boundary_map, "_FITTING_STEPS", 0)
+    plain = parameterize(surface, tiny_config(), seed=3, device="cpu")
+    assert np.array_equal(plain.volume.control_points, undisturbed.volume.control_points)
+    assert not np.array_equal(plain.boundary.parameters, undisturbed.boundary.parameters)
+
+
+def test_where_the_edges_cannot_be_traced_training_and_layout_say_so(surface, monkeypatch, caplog):
+    monkeypatch.setattr(edge_paths, "_ORDERS", 0)
     monkeypatch.setattr("parameterize.starts.network._FEW_FLIPS", -1.0)
-    spline = replace(config.spline, rounds=1)
-    parameterize(surface, replace(config, layout=replace(config.layout, orders=0), spline=spline), seed=3, device="cpu")
+    config = tiny_config()
+    parameterize(surface, replace(config, spline=replace(config.spline, rounds=1)), seed=3, device="cpu")
     assert "training ends before stage edges: no path left" in caplog.text
     assert "the first layout has flipped triangles: no path left" in caplog.text
 

@@ -2,10 +2,10 @@ import igl
 import numpy as np
 import pytest
 
-from parameterize.quality.distances import SampledBoundary
 from parameterize.spline import location
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.location import bezier_nets, locate
+from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume
 
 

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from shapes import ball
 from small_run import STEPS, small_surface, tiny_config
 
-from parameterize.config import LAYOUT, NetworkConfig
-from parameterize.cube.flips import Layout
+from parameterize.config import NetworkConfig
+from parameterize.cube.layout import CubeLayout
 from parameterize.cube.turning import best_turn, hollowness
 from parameterize.run import parameterize
 from parameterize.training import trainer
@@ -65,23 +65,25 @@ def test_a_turned_network_maps_to_the_turned_places():
 def test_the_best_turn_makes_the_hollowness_least():
     points, faces = ball(600)
     points = points * (1.0 + 0.3 * np.sin(5.0 * points[:, :1]) * points[:, 1:2])
-    layout = Layout(points, faces, points / np.linalg.norm(points, axis=1, keepdims=True))
-    turn = best_turn(layout, LAYOUT, np.random.default_rng(0))
-    assert hollowness(replace(layout, places=layout.places @ turn.T), LAYOUT) < hollowness(layout, LAYOUT)
+    layout = CubeLayout(points, faces, points / np.linalg.norm(points, axis=1, keepdims=True), len(points))
+    turn = best_turn(layout, np.random.default_rng(0))
+    assert hollowness(replace(layout, places=layout.places @ turn.T)) < hollowness(layout)
 
 
 @pytest.mark.usefixtures("turns_are_promising")
-def test_a_turn_that_does_not_win_leaves_no_trace():
+def test_a_turn_that_does_not_win_leaves_no_trace(monkeypatch):
+    monkeypatch.setattr(trainer, "_RACE_GAIN", NEVER)
     seen = Seen()
-    raced, plain = run(race_gain=NEVER, progress=seen), run(race=0.0)
+    raced, plain = run(progress=seen), run(race=0.0)
     assert np.array_equal(raced.volume.control_points, plain.volume.control_points)
     assert np.array_equal(raced.history["loss"], plain.history["loss"])
     assert seen.count("cube", 1) == 2 and seen.count("cube", RACED) == 2 and seen.count("cube", RACED + 1) == 1
 
 
 @pytest.mark.usefixtures("turns_are_promising")
-def test_a_turn_that_wins_goes_on():
-    raced, plain = run(race_gain=ALWAYS), run(race=0.0)
+def test_a_turn_that_wins_goes_on(monkeypatch):
+    monkeypatch.setattr(trainer, "_RACE_GAIN", ALWAYS)
+    raced, plain = run(), run(race=0.0)
     assert not np.array_equal(raced.volume.control_points, plain.volume.control_points)
     cube = raced.history["stage"] == "cube"
     assert raced.history["step"][cube].tolist() == list(range(STEPS[2]))
@@ -97,8 +99,9 @@ def test_no_turn_is_tried_where_the_edges_lie_well_already(monkeypatch):
 
 
 @pytest.mark.usefixtures("turns_are_promising")
-def test_a_run_killed_in_the_race_resumes_to_the_same_bits(tmp_path):
-    whole, seen = run(race_gain=ALWAYS), Seen()
+def test_a_run_killed_in_the_race_resumes_to_the_same_bits(tmp_path, monkeypatch):
+    monkeypatch.setattr(trainer, "_RACE_GAIN", ALWAYS)
+    whole, seen = run(), Seen()
 
     def interrupt(state):
         seen(state)
@@ -106,6 +109,6 @@ def test_a_run_killed_in_the_race_resumes_to_the_same_bits(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(race_gain=ALWAYS, progress=interrupt, folder=tmp_path)
-    resumed = run(race_gain=ALWAYS, folder=tmp_path, resume=True)
+        run(progress=interrupt, folder=tmp_path)
+    resumed = run(folder=tmp_path, resume=True)
     assert np.array_equal(whole.volume.control_points, resumed.volume.control_points)

@@ -31,7 +31,7 @@ def test_run_returns_what_it_wrote(formula_training, in_folder):
 
 def test_volume_and_report_outlive_a_failing_solve(formula_training, in_folder, monkeypatch):
     formula_training()
-    monkeypatch.setattr("iga_nn.workflow.solving.solve_problem", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("iga_nn.workflow.solving.solve_with", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         iga_nn.run("poisson", "cube", "out")
     assert (in_folder / "out" / "volume.npz").exists()
@@ -48,7 +48,7 @@ def test_a_refused_solve_leaves_a_page_of_the_map(formula_training, in_folder):
         raise ValueError("exact is not finite at x=0.5")
 
     with pytest.MonkeyPatch.context() as patched, pytest.raises(InputError, match="not finite"):
-        patched.setattr("iga_nn.workflow.solving.solve_problem", refuse)
+        patched.setattr("iga_nn.workflow.solving.solve_with", refuse)
         iga_nn.run("poisson", "cube", "out")
     report = json.loads((in_folder / "out" / "report.json").read_text())
     assert report["not_solved"] == "exact is not finite at x=0.5" and "total" not in report["seconds"]
@@ -95,7 +95,7 @@ def test_a_solve_keeps_a_solution_that_no_report_tells_of(in_folder):
     held.parent.mkdir()
     held.write_bytes(b"my own")
     with pytest.raises(InputError, match="holds solution.npz without a report"):
-        pipeline.solve_to("mine.npz", "out", problem=PoissonOptions(refine=(0,)))
+        pipeline.solve_to("mine.npz", "out", statement=PoissonOptions(refine=(0,)))
     assert held.read_bytes() == b"my own"
 
 
@@ -106,7 +106,7 @@ def test_the_checkpoint_stays_until_all_is_solved(formula_training, in_folder, m
     checkpoint.touch()
     again = MapOptions(resume=True)
     with monkeypatch.context() as patched:
-        patched.setattr("iga_nn.workflow.solving.solve_problem", lambda *_, **__: 1 / 0)
+        patched.setattr("iga_nn.workflow.solving.solve_with", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             iga_nn.run("poisson", "cube", "out", mapping=again)
     assert checkpoint.exists()
@@ -146,22 +146,22 @@ def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, mo
 def test_the_faces_that_a_solve_names_are_shown_until_the_next_solve(in_folder):
     benchmark_volume(3).save("map.npz")
     mixed = PoissonOptions(neumann=("u1",), refine=(0,))
-    outcome = pipeline.solve_to("map.npz", "out", problem=mixed)
+    outcome = pipeline.solve_to("map.npz", "out", statement=mixed)
     picture = outcome.folder / "named_faces.png"
     if can_draw():
         assert picture.is_file()
     picture.touch()
     assert "faces by name</h2>" in (outcome.folder / "report.html").read_text() or not can_draw()
-    pipeline.solve_to("map.npz", "out", problem=PoissonOptions(refine=(0,)), force=True)
+    pipeline.solve_to("map.npz", "out", statement=PoissonOptions(refine=(0,)), force=True)
     assert not picture.exists()
 
 
 def test_a_device_that_cannot_solve_the_problem_costs_no_file(in_folder):
     benchmark_volume(3).save("map.npz")
-    pipeline.solve_to("map.npz", "out", problem=PoissonOptions(refine=(0,)))
+    pipeline.solve_to("map.npz", "out", statement=PoissonOptions(refine=(0,)))
     before = {file.name: file.read_bytes() for file in Path("out").iterdir()}
     with pytest.raises(InputError, match="elasticity runs on device='cpu' only"):
-        pipeline.solve_to("map.npz", "out", problem=ElasticityOptions(exact="x;0;0"), force=True, device="cuda")
+        pipeline.solve_to("map.npz", "out", statement=ElasticityOptions(exact="x;0;0"), force=True, device="cuda")
     assert {file.name: file.read_bytes() for file in Path("out").iterdir()} == before
 
 

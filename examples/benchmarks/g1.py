@@ -25,7 +25,7 @@ from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
 from iga_nn.batch.task import Task
 from iga_nn.errors import InputError
-from iga_nn.levels import csv_text
+from iga_nn.level_table import csv_text
 from iga_nn.models import DATA_FOLDER
 from iga_nn.options import MapOptions, PoissonOptions, WorkerOptions
 from iga_nn.report import document as reports

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from iga_nn.batch.task import Task
 from iga_nn.samples import GOLDEN_ANGLE, ball, outward_hull, write_obj
-from iga_nn.workflow.watched import Ended
+from iga_nn.workflow.worker_run import Ended
 from parameterize.surface.surface import MeshError, Surface, surface_from_arrays
 from parameterize.surface.topology import crossing_faces
 

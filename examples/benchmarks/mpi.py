@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from processes import as_markdown, cores, processor
 
-from iga_nn.levels import csv_text
+from iga_nn.level_table import csv_text
 from iga_nn.report.document import versions
 from parameterize.files import save_text
 from solve import Poisson, benchmark_volume, solve_problem

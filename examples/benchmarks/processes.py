@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from iga_nn.batch.run import Running, run_tasks
+from iga_nn.batch.run_batch import Running, run_tasks
 from iga_nn.batch.table import Batch, Row
 from iga_nn.batch.task import Task, compute
 from iga_nn.errors import InputError
 from iga_nn.options import WorkerOptions
 from iga_nn.workflow.output_folder import has_checkpoint
-from iga_nn.workflow.watched import Ended
+from iga_nn.workflow.worker_run import Ended
 from parameterize.files import save_text
 from parameterize.threads import default_threads
 

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from processes import as_markdown, processor
 
-from iga_nn.levels import csv_text
+from iga_nn.level_table import csv_text
 from iga_nn.report.document import versions
 from parameterize.files import save_text
 from solve import Elasticity, Poisson, Problem, benchmark_volume, solve_problem

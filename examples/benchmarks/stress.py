@@ -24,7 +24,7 @@ from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
 from iga_nn.batch.task import Task
 from iga_nn.errors import InputError
-from iga_nn.levels import csv_text
+from iga_nn.level_table import csv_text
 from iga_nn.options import MapOptions, WorkerOptions
 from iga_nn.report import document as reports
 from parameterize.files import save_text

@@ -16,7 +16,7 @@ from distributed import CancelledError, Client, Future, KilledWorker, LocalClust
 
 from ..errors import InputError, one_line
 from ..options import WorkerOptions
-from ..workflow.watched import Ended
+from ..workflow.worker_run import Ended
 from .task import LESS_MEMORY, Task, Work, compute, stop
 
 log = logging.getLogger(__name__)
@@ -43,19 +43,19 @@ Told = Callable[[int, str, float], None]  # number of a surface, its stage, the 
 
 
 @contextmanager
-def connected(options: WorkerOptions, most: int) -> Iterator[Client]:
+def connected(workers: WorkerOptions, most: int) -> Iterator[Client]:
     """Yield a client of the workers; those of this machine end with the block, and their files go with them.
 
     most: the number of surfaces, more workers are not started. Raises InputError where the scheduler does not answer.
     """
     with ExitStack() as stack:
-        if options.scheduler is not None:
+        if workers.scheduler is not None:
             try:
-                client = Client(options.scheduler, timeout=PATIENCE)
+                client = Client(workers.scheduler, timeout=PATIENCE)
             except (OSError, ValueError, TypeError) as error:
-                raise InputError(f"{options.scheduler}: no dask scheduler answers there ({one_line(error)})") from None
+                raise InputError(f"{workers.scheduler}: no dask scheduler answers there ({one_line(error)})") from None
         else:
-            client = Client(stack.enter_context(_local(options, most)))
+            client = Client(stack.enter_context(_local(workers, most)))
             client.register_plugin(_OwnOutput())
         yield stack.enter_context(client)
 
@@ -69,21 +69,21 @@ class _OwnOutput(WorkerPlugin):  # type: ignore[misc]
 
 
 @contextmanager
-def _local(options: WorkerOptions, most: int) -> Iterator[LocalCluster]:
+def _local(workers: WorkerOptions, most: int) -> Iterator[LocalCluster]:
     """Start worker processes on this machine.
 
     They listen on free ports of 127.0.0.1, without a dashboard, and ignore Ctrl-C: they are told to stop.
     """
-    threads = dict.fromkeys(THREAD_VARIABLES, str(options.threads_per_worker))
+    threads = dict.fromkeys(THREAD_VARIABLES, str(workers.threads_per_worker))
     with ExitStack() as stack:
         stack.enter_context(_environment(threads))
         scratch = stack.enter_context(TemporaryDirectory(prefix="iga-nn-", ignore_cleanup_errors=True))
         stack.enter_context(dask.config.set(CONFIG | {"temporary-directory": scratch}))
         with _interrupts_held():
             cluster = LocalCluster(
-                n_workers=min(options.workers, most),
+                n_workers=min(workers.workers, most),
                 threads_per_worker=1,  # surfaces at a time
-                memory_limit=memory_limit(options),
+                memory_limit=memory_limit(workers),
                 local_directory=scratch,
                 dashboard_address="127.0.0.1:0",
                 scheduler_kwargs={"dashboard": False, "allowed_failures": 0},
@@ -93,9 +93,9 @@ def _local(options: WorkerOptions, most: int) -> Iterator[LocalCluster]:
         yield cluster
 
 
-def memory_limit(options: WorkerOptions) -> int:
+def memory_limit(workers: WorkerOptions) -> int:
     """Return the bytes that a worker may take, 0 for any number. Raises InputError."""
-    text = options.memory_limit
+    text = workers.memory_limit
     try:
         limit = int(parse_bytes(text))
     except (ValueError, OverflowError):
@@ -133,7 +133,7 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def computed(
-    client: Client, tasks: Sequence[Task], options: WorkerOptions, tell: Told, work: Work = compute
+    client: Client, tasks: Sequence[Task], workers: WorkerOptions, tell: Told, work: Work = compute
 ) -> Generator[tuple[int, Ended], None, None]:
     """Yield the number of each task and how it ended, as they end; one that failed is tried again before that.
 
@@ -147,24 +147,24 @@ def computed(
     seen = time.monotonic()  # when there was a worker
     try:
         while waiting or running:
-            workers = sum(client.nthreads().values())
-            seen = time.monotonic() if workers or options.scheduler else seen
+            present = sum(client.nthreads().values())
+            seen = time.monotonic() if present or workers.scheduler else seen
             if time.monotonic() - seen > HOPELESS:
                 raise InputError("the workers of this machine do not start again; the same command goes on")
-            free = max(0, workers - len(running))
+            free = max(0, present - len(running))
             for number in waiting[:free]:
                 running[client.submit(work, tasks[number], number, batch, pure=False)] = number
             del waiting[:free]
             for future in _first_ended(list(running)):
                 number, how = running.pop(future), _ended(client, future)
-                if how.state == "failed" and tries[number] < options.retries:
+                if how.state == "failed" and tries[number] < workers.retries:
                     tries[number] += 1
                     waiting.append(number)
                     log.info("%s: %s; trying again", tasks[number].mesh, how.line)
                 else:
                     yield number, how
     except (OSError, CancelledError) as error:
-        where = options.scheduler or "the workers of this machine"
+        where = workers.scheduler or "the workers of this machine"
         raise InputError(f"{where}: the connection is lost ({one_line(error)}); the same command goes on") from None
     finally:
         if running:

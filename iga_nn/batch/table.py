@@ -13,13 +13,13 @@ from urllib.parse import quote
 from PIL import Image
 
 from ..errors import one_line
-from ..levels import csv_text
+from ..level_table import csv_text
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..report.html import filled
 from ..rounding import rounded
 from ..version import __version__
-from ..workflow.watched import Ended
+from ..workflow.worker_run import Ended
 from .surfaces import Entry, printable
 
 log = logging.getLogger(__name__)
@@ -80,7 +80,7 @@ class Row:
             known[f"distance_{key}"] = value
         return {name: known.get(name) for name in FIGURES}
 
-    def told(self) -> str:
+    def as_line(self) -> str:
         """Return the row as a line of the terminal."""
         figures = self.figures()
         facts: list[str] = [self.state, *filter(None, [self.line])]

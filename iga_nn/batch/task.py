@@ -10,7 +10,7 @@ from parameterize.progress import Progress
 from ..options import MapOptions, ProblemOptions
 from ..workflow import pipeline
 from ..workflow.output_folder import Outcome
-from ..workflow.watched import Ended, ended, logged, told
+from ..workflow.worker_run import Ended, ended, logged, throttled
 from .surfaces import Entry
 
 LESS_MEMORY = "give workers more --memory-limit, or lower --control-points or --refine"
@@ -22,11 +22,11 @@ _stopped: set[str] = set()  # batches that were interrupted
 class Task(Entry):
     """Hold a surface of a batch and all that its result depends on.
 
-    options: those of the problem to solve, None to parameterize the surface alone. vector: write curves as PDF, too.
+    statement: the problem to solve, None to parameterize the surface alone. vector: write curves as PDF, too.
     """
 
     mapping: MapOptions
-    options: ProblemOptions | None
+    statement: ProblemOptions | None
     vector: bool = False
 
 
@@ -47,8 +47,8 @@ def compute(task: Task, number: int, batch: str) -> Ended:
         worker.log_event(batch, {"number": number, "stage": now.stage, "share": share})
 
     def run() -> Outcome:
-        progress = told(tell, lambda: batch in _stopped)
-        given: dict[str, Any] = {"mapping": task.mapping, "problem": task.options, "vector": task.vector}
+        progress = throttled(tell, lambda: batch in _stopped)
+        given: dict[str, Any] = {"mapping": task.mapping, "statement": task.statement, "vector": task.vector}
         return pipeline.parameterize_to(task.mesh, task.folder, progress=progress, **given)
 
     with logged(logging.NullHandler()):  # warnings are in the report: a surface has one line on the terminal

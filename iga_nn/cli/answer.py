@@ -4,7 +4,7 @@ from itertools import zip_longest
 from typing import Any
 
 from ..batch.table import Batch
-from ..levels import ESTIMATES, EXACT_ERRORS, TITLES
+from ..level_table import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice, balance, extremes
 from ..report import document as reports
 from ..report.artifacts import PAGE

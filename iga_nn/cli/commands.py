@@ -1,4 +1,4 @@
-"""Defines the commands of `iga-nn` and their arguments; nothing is computed here.
+"""Defines the commands of `iga-nn`; nothing is computed here.
 
 A command imports what it runs when it runs: `--help` and `--version` load neither numpy nor the packages below.
 """
@@ -6,20 +6,15 @@ A command imports what it runs when it runs: `--help` and `--version` load neith
 from __future__ import annotations
 
 import os
-import re
 import sys
-from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, fields
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter, Token, UnusedCliTokensError, convert
+from cyclopts import App, CycloptsError, Parameter
 
-from ..errors import InputError, expected_errors, input_errors, one_line
+from ..errors import InputError, expected_errors, input_errors
 from ..options import (
-    PROBLEMS,
     ElasticityOptions,
     ElasticityStudyOptions,
     MapOptions,
@@ -32,28 +27,39 @@ from ..options import (
 )
 from ..version import __version__
 from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED, NOT_SOLVED
+from .arguments import (
+    ELASTICITY,
+    ELASTICITY_STUDY,
+    MAP,
+    MODES,
+    OUTPUT,
+    PAGE,
+    POISSON,
+    STUDY,
+    SURFACE,
+    WORKERS,
+    Json,
+    Mesh,
+    Mpi,
+    ObjFile,
+    OutputOptions,
+    Overwrite,
+    PageOptions,
+    Volume,
+    converted,
+)
 from .progress import shown_batch, shown_progress
+from .refusal import refusal
 
 if TYPE_CHECKING:
     from ..workflow.output_folder import Outcome
-
-# A suggestion that begins with another letter than the unknown option: --force, for --source, replaces results.
-_FAR_HINT = re.compile(r"(Unknown option: \W*(\w).*?) Did you mean --(?!\2).*")
-
-
-def _converted(kind: Any, tokens: Sequence[Token]) -> Any:
-    """Convert an argument as cyclopts does, but refuse a fraction for a whole number: it would be rounded."""
-    if int in (kind, *get_args(kind)) and (wrong := [token for token in tokens if "." in token.value]):
-        raise CycloptsError(msg=f"{wrong[0].keyword}: must be a whole number, got {wrong[0].value}")
-    return convert(kind, tokens)
-
 
 app = App(
     name="iga-nn",
     help="From a closed surface mesh to a solved PDE on a certified trivariate B-spline.",
     version=f"iga-nn {__version__}",
     suppress_keyboard_interrupt=False,
-    default_parameter=Parameter(negative=(), consume_multiple=1, converter=_converted),
+    default_parameter=Parameter(negative=(), consume_multiple=1, converter=converted),
 )
 run_app = App(name="run", help="Parameterize a surface and solve a problem on its volume.")
 solve_app = App(name="solve", help="Solve a problem on a volume.")
@@ -62,57 +68,6 @@ study_app = App(
 )
 for group in (run_app, solve_app, study_app):
     app.command(group)
-
-
-Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
-Volume = Annotated[
-    Path, Parameter(help="volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.")
-]
-ObjFile = Annotated[Path | None, Parameter(help="file to write; NAME.obj in the current folder by default.")]
-Overwrite = Annotated[bool, Parameter(help="replace that file where it has other content.")]
-Mpi = Annotated[
-    bool, Parameter(help="share the solve among the processes of `mpiexec -n 4 iga-nn solve ...`; docs/mpi.md.")
-]
-Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.")]
-
-
-@dataclass(frozen=True)
-class OutputOptions:
-    """Say where the results go, and what is printed.
-
-    Args:
-        out: output folder; the input's stem in the current folder by default.
-        force: replace a finished result in that folder.
-        vector: write plots of curves (loss history, errors over the mesh size) as PDF, too.
-        quiet: show no progress.
-    """
-
-    out: str | None = None
-    force: bool = False
-    vector: bool = False
-    quiet: bool = False
-    as_json: Json = False
-
-    @property
-    def folder(self) -> dict[str, Any]:
-        """Return what the pipeline takes of these options."""
-        return {"out": self.out, "force": self.force, "vector": self.vector}
-
-
-@dataclass(frozen=True)
-class PageOptions(MapOptions):
-    """Say how surfaces of the live page become volumes: what belongs to one surface is no option there."""
-
-    corners: Annotated[Path | None, Parameter(parse=False)] = None
-    resume: Annotated[bool, Parameter(parse=False)] = False
-
-
-for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions, ModesOptions):
-    Parameter(name="*")(kind)  # each field of these options, and of those derived from them, is a flag
-
-OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
-WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
-PAGE, MODES = PageOptions(), ModesOptions()
 
 
 @run_app.command(name="poisson")
@@ -139,12 +94,14 @@ def run_elasticity(
     return _run(mesh, output, mapping, elasticity)
 
 
-def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem: ProblemOptions | None = None) -> int:
+def _run(mesh: str, output: OutputOptions, mapping: MapOptions, statement: ProblemOptions | None = None) -> int:
     """Parameterize a surface, solve a problem on the volume, print the verdict and return the exit code."""
     from ..workflow import pipeline
 
     with shown_progress(output.quiet) as progress:
-        outcome = pipeline.parameterize_to(mesh, mapping=mapping, problem=problem, progress=progress, **output.folder)
+        outcome = pipeline.parameterize_to(
+            mesh, mapping=mapping, statement=statement, progress=progress, **output.folder
+        )
     return _finish(outcome, output)
 
 
@@ -164,7 +121,7 @@ def run_many(
     Args:
         surfaces: files, folders, patterns in quotes, names of samples and models, or g1 for the set G1.
     """
-    from ..batch.run import run_batch
+    from ..batch.run_batch import run_batch
     from ..report import document as reports
     from .answer import batch_exit_code
 
@@ -217,13 +174,13 @@ def solve_elasticity(
     return _solve(volume, output, elasticity, mpi)
 
 
-def _solve(volume: Path, output: OutputOptions, problem: ProblemOptions, mpi: bool, device: str = "cpu") -> int:
+def _solve(volume: Path, output: OutputOptions, statement: ProblemOptions, mpi: bool, device: str = "cpu") -> int:
     """Solve a problem on a volume, print the verdict and return the exit code."""
-    from ..workflow import pipeline, processes
+    from ..workflow import mpi_job, pipeline
 
     with shown_progress(output.quiet):
-        comm = processes.all_processes() if mpi else None
-        outcome = pipeline.solve_to(volume, problem=problem, device=device, comm=comm, **output.folder)
+        comm = mpi_job.all_processes() if mpi else None
+        outcome = pipeline.solve_to(volume, statement=statement, device=device, comm=comm, **output.folder)
     return DONE if outcome is None else _finish(outcome, output)
 
 
@@ -251,7 +208,7 @@ def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
     from .answer import exit_code
 
     with shown_progress(output.quiet):
-        outcome, table = pipeline.study_to(volume, options=study, **output.folder)
+        outcome, table = pipeline.study_to(volume, study_options=study, **output.folder)
     _print(reports.as_json(outcome.report["study"]) if output.as_json else f"{table}\nresults in {outcome.folder}")
     return exit_code(outcome.report)
 
@@ -268,7 +225,7 @@ def find_modes(volume: Volume, /, *, output: OutputOptions = OUTPUT, modes: Mode
     from .answer import exit_code
 
     with shown_progress(output.quiet):
-        outcome, table = pipeline.modes_to(volume, options=modes, **output.folder)
+        outcome, table = pipeline.modes_to(volume, modes_options=modes, **output.folder)
     verdict = reports.verdict(outcome.report, outcome.folder)
     _print(reports.as_json(verdict) if output.as_json else f"{table}\nresults in {outcome.folder}")
     return exit_code(outcome.report)
@@ -419,8 +376,8 @@ def serve_page(
     """
     from ..live.app import serve
 
-    options = MapOptions(**vars(mapping))
-    serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=options, poisson=poisson)
+    surfaces = MapOptions(**vars(mapping))
+    serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=surfaces, poisson=poisson)
 
 
 def main(argv: list[str]) -> int:
@@ -434,36 +391,18 @@ def main(argv: list[str]) -> int:
     except expected_errors() + (CycloptsError,) as error:
         from solve import ConvergenceError
 
-        print(f"iga-nn: {_refusal(error, argv)}", file=sys.stderr)
+        print(f"iga-nn: {refusal(error, argv)}", file=sys.stderr)
         return NOT_SOLVED if isinstance(error, ConvergenceError) else BAD_INPUT
     return code if isinstance(code, int) else DONE  # a command that only writes a file returns nothing
-
-
-def _refusal(error: Exception, argv: list[str]) -> str:
-    """Return what is wrong and what to do, in one line."""
-    if isinstance(error, UnusedCliTokensError):
-        return f"arguments that mean nothing here: {' '.join(error.unused_tokens or ())}; --help lists what there is"
-    if isinstance(error, CycloptsError):
-        return _FAR_HINT.sub(r"\1 --help lists the options.", one_line(error)) + _minus_hint(argv)
-    return one_line(error)
 
 
 def _processes(argv: list[str]) -> AbstractContextManager[None]:
     """Return the context in which the processes of an MPI job fail together, and one of them prints."""
     if "--mpi" not in argv:
         return nullcontext()
-    from ..workflow import processes
+    from ..workflow import mpi_job
 
-    return processes.together(processes.all_processes())
-
-
-def _minus_hint(argv: list[str]) -> str:
-    """Return the remedy where a formula was taken for an option; those declared as `Formula` take one."""
-    formulas = {field.name for kind in PROBLEMS.values() for field in fields(kind) if "Formula" in str(field.type)}
-    for option, value in pairwise(argv):
-        if option.removeprefix("--").replace("-", "_") in formulas and value.startswith("-"):
-            return f" A formula that starts with a minus is written {option}={value}"
-    return ""
+    return mpi_job.together(mpi_job.all_processes())
 
 
 def _finish(outcome: Outcome, output: OutputOptions) -> int:

@@ -18,13 +18,13 @@ from rich.table import Column
 from rich.text import Text
 
 from ..rounding import rounded
-from ..workflow.watched import logged
+from ..workflow.worker_run import logged
 
 if TYPE_CHECKING:
     from parameterize.progress import Progress, ProgressCallback
 
-    from ..batch.run import Progress as BatchProgress
-    from ..batch.run import Running
+    from ..batch.run_batch import Progress as BatchProgress
+    from ..batch.run_batch import Running
     from ..batch.table import Batch
 
 PLAIN_INTERVAL = 10.0  # seconds between two lines where the output is not a terminal

@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..levels import Study
+from ..level_table import Study
 from .evaluate import FACE_COLORS
 from .style import blank, positive, save
 

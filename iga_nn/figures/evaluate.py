@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 from solve.field import Points
-from solve.forms.problem import BoundaryValueProblem
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 

@@ -15,9 +15,9 @@ from parameterize.arrays import Array
 from parameterize.quality.quality import arap_on
 from parameterize.spline.volume import BSplineVolume
 from solve.field import Points, SplineField
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.forms.frame import UnitFrame
-from solve.forms.problem import BoundaryValueProblem
 from solve.quantities import grid_values
 
 from .evaluate import Grid, all_grids, error_at, flat

@@ -11,9 +11,9 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 from solve import Solution
 from solve.field import SplineField
-from solve.forms.problem import BoundaryValueProblem
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 
-from ..levels import EXACT_ERRORS, TITLES
+from ..level_table import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units
 from .cutaway import best_cut, without_octant
 from .evaluate import SECTIONS

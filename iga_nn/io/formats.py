@@ -20,12 +20,13 @@ from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
 from solve.field import SplineField
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, did_you_mean, input_errors
-from ..kinds import check_kind
 from ..new_file import check_new
-from ..options import PROBLEMS, Equation
+from ..options import PROBLEMS
 from ..report import document as reports
+from ..type_check import check_type
 from . import splinepy, view, vtk
 from .splinepy_gate import CHECKS, kind_of
 
@@ -94,7 +95,7 @@ def load_volume(path: str | Path) -> BSplineVolume:
     >>> iga_nn.load_volume("volume.npz").degrees
     (3, 3, 3)
     """
-    check_kind("path", path, str | Path)
+    check_type("path", path, str | Path)
     if path == "":
         raise InputError("no volume is named: give a volume.npz, or a file of another program")
     source = Path(path)
@@ -155,7 +156,7 @@ def export(
     'seen.vtu'
     """
     for name, value, kind in (("volume", volume, str | Path), ("to", to, str), ("out", out, str | Path | None)):
-        check_kind(name, value, kind)
+        check_type(name, value, kind)
     if to != "view" and (samples is not None or quantity):
         raise InputError(f"format {to!r}: samples and quantities are for --to view")
     if samples is not None and samples < 1:
@@ -185,7 +186,7 @@ def export(
     return target
 
 
-def _load_solution(path: Path, volume: BSplineVolume) -> "tuple[SplineField, Equation | None]":
+def _load_solution(path: Path, volume: BSplineVolume) -> tuple[SplineField, BoundaryValueProblem | None]:
     """Return a solution and the problem that the report beside it states, None where that is not known.
 
     Raises InputError where the solution does not belong to the volume: by its knots, or by the h of its report.
@@ -208,7 +209,7 @@ def _load_solution(path: Path, volume: BSplineVolume) -> "tuple[SplineField, Equ
     return field, _stated(name, section) if name else None
 
 
-def _stated(name: str, section: dict[str, Any]) -> "Equation | None":
+def _stated(name: str, section: dict[str, Any]) -> BoundaryValueProblem | None:
     """Return the problem of a report's section, None where its options are damaged, or of another version."""
     kind = PROBLEMS[name]
     known = {field.name for field in fields(kind)} & section.keys()

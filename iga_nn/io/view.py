@@ -23,9 +23,9 @@ from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve import Solution
 from solve.field import Points, SplineField
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.forms.frame import UnitFrame
-from solve.forms.problem import BoundaryValueProblem
 from solve.quantities import on_grid
 
 from ..errors import InputError, one_line

@@ -98,13 +98,13 @@ def _named(field: tuple[str, ...]) -> dict[str, str]:
     return dict(zip(("name", "title", "empty", "after"), field, strict=False))
 
 
-def stated(form: Mapping[str, Any], options: ProblemOptions, *, has_faces: bool = True) -> ProblemOptions:
+def stated(form: Mapping[str, Any], statement: ProblemOptions, *, has_faces: bool = True) -> ProblemOptions:
     """Return the options of the problem that a form states; its empty fields are left out.
 
     form: `problem`, a name of SHEETS, with its fields and lists; of Poisson's equation, where it has the cube's faces,
     for a face u0 that has data of its own `face u0`, with `kind u0` ("flux" or "exchange"), `alpha u0` and `data u0`.
-    options: those of the page, from which what the form does not ask for is taken. Raises InputError for data that
-    cannot be solved with.
+    statement: the problem of the page's options, which has the values that the form does not ask for. Raises InputError
+    for data that the solver refuses.
     """
     name = _text(form, "problem") or "poisson"
     if name not in SHEETS:
@@ -120,7 +120,7 @@ def stated(form: Mapping[str, Any], options: ProblemOptions, *, has_faces: bool 
             given[field] = _number(sheet, field, given[field])
     elif has_faces:
         given["neumann"], given["robin"] = _of_faces(form)
-    found = replace(_base(name, options), **given)
+    found = replace(_base(name, statement), **given)
     found.problem()
     return found
 
@@ -129,11 +129,11 @@ def _text(form: Mapping[str, Any], name: str) -> str:
     return str(form.get(name, "")).strip()
 
 
-def _base(name: str, options: ProblemOptions) -> ProblemOptions:
+def _base(name: str, statement: ProblemOptions) -> ProblemOptions:
     """Return options of that problem: those given, or new ones with the same meshes, degree and quadrature."""
-    if options.section == name:
-        return options
-    shared = {field.name: getattr(options, field.name) for field in fields(ProblemOptions) if field.name != "exact"}
+    if statement.section == name:
+        return statement
+    shared = {field.name: getattr(statement, field.name) for field in fields(ProblemOptions) if field.name != "exact"}
     return PROBLEMS[name](**shared)
 
 
@@ -162,15 +162,15 @@ def _of_faces(form: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]
     return tuple(neumann), tuple(robin)
 
 
-def filled(options: ProblemOptions) -> dict[str, str]:
+def filled(statement: ProblemOptions) -> dict[str, str]:
     """Return the form that states these options, as `stated` reads it; what is not given is left out."""
-    sheet, form = SHEETS[options.section], {"problem": options.section}
-    known = ((name, getattr(options, name)) for name, _, _ in (*sheet.fields, UNIT))
+    sheet, form = SHEETS[statement.section], {"problem": statement.section}
+    known = ((name, getattr(statement, name)) for name, _, _ in (*sheet.fields, UNIT))
     form |= {name: f"{value:.12g}" if isinstance(value, float) else value for name, value in known if value}
-    form |= {name: "\n".join(lines) for name, *_ in sheet.lists if (lines := getattr(options, name))}
-    if not isinstance(options, PoissonOptions):
+    form |= {name: "\n".join(lines) for name, *_ in sheet.lists if (lines := getattr(statement, name))}
+    if not isinstance(statement, PoissonOptions):
         return form
-    problem = options.problem()
+    problem = statement.problem()
     for face, data in problem.neumann.items():
         form |= {f"face {face}": "on", f"kind {face}": "flux", f"data {face}": str(data or "")}
     for face, (alpha, data) in problem.robin.items():
@@ -179,14 +179,14 @@ def filled(options: ProblemOptions) -> dict[str, str]:
     return form
 
 
-def in_words(options: ProblemOptions) -> str:
+def in_words(statement: ProblemOptions) -> str:
     """Return the data of a problem in one line, by which jobs are told apart."""
-    sheet, form = SHEETS[options.section], filled(options)
-    said = [sheet.title] if isinstance(options, ElasticityOptions) else []
+    sheet, form = SHEETS[statement.section], filled(statement)
+    said = [sheet.title] if isinstance(statement, ElasticityOptions) else []
     said += [f"{sign} = {form[name]}" for name, sign in sheet.signs.items() if name in form]
     for face in FACE_NAMES:
         if kind := form.get(f"kind {face}"):
             data = form[f"data {face}"]
             said.append(f"{kind} on {face}" + f": {data}" * bool(data))
-    said += [f"{name} on {', '.join(getattr(options, name))}" for name, *_ in sheet.lists if name in form]
+    said += [f"{name} on {', '.join(getattr(statement, name))}" for name, *_ in sheet.lists if name in form]
     return ", ".join(said) or "the problem of an empty form"

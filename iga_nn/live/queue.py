@@ -21,7 +21,7 @@ from parameterize.surface.surface import MeshError, Surface
 from ..errors import one_line
 from ..options import ProblemOptions
 from ..workflow.output_folder import default_folder, has_checkpoint
-from ..workflow.watched import Ended
+from ..workflow.worker_run import Ended
 from .course import Course
 from .worker import Message, Step
 
@@ -36,18 +36,18 @@ STARTS, DELETED = ("ready", "stopped", "failed"), ("refused", "ready", "done", "
 class Job:
     """Hold the file of a surface, or of a volume to solve on, in a folder of its own, and its state.
 
-    problem: what is solved on a volume; None for a surface. wanted: what is solved on the volume of a surface; None for
-    the problem of the page's options. picked: triangles of the face that was clicked, (k,). parent: number of the job
-    that made the volume. text: why it was refused or failed. mapped: where the training maps the surface's vertices,
-    (n, 3) in the cube. losses: those of the training that were reported. log: the lines of the run. begun: when the run
-    began, in seconds of the system's clock.
+    statement: the problem to solve on a volume; None for a surface. wanted: the problem to solve on the volume of a
+    surface; None for that of the page's options. picked: triangles of the face that was clicked, (k,). parent: number
+    of the job that made the volume. text: the reason why the job was refused or failed. mapped: the surface's vertices
+    under the map of the training, (n, 3) in the cube. losses: the reported losses of the training. log: the lines of
+    the run. begun: the start of the run, in seconds of the system's clock.
     """
 
     number: int
     name: str
     folder: Path
     state: str = "checking"
-    problem: ProblemOptions | None = None
+    statement: ProblemOptions | None = None
     wanted: ProblemOptions | None = None
     parent: int = 0
     text: str = ""
@@ -75,7 +75,7 @@ class Job:
     @property
     def volume(self) -> Path:
         """Return the path of the volume that was made, or that is solved on."""
-        return self.path if self.problem else self.results / "volume.npz"
+        return self.path if self.statement else self.results / "volume.npz"
 
     @property
     def is_mapped(self) -> bool:
@@ -143,7 +143,7 @@ class Jobs:
         """Have the job's surface checked, after those before it."""
         self._checker.submit(self._check_now, job)
 
-    def solve(self, done: Job, problem: ProblemOptions) -> Job:
+    def solve(self, done: Job, statement: ProblemOptions) -> Job:
         """Put a new job into the queue, which solves a problem on the volume of another; return it.
 
         The part's surface goes with the volume, where it is known: regions are found on it.
@@ -159,7 +159,7 @@ class Jobs:
             job.state = "refused"
             self.delete(job)
             raise
-        job.problem, job.parent, job.state = problem, done.parent or done.number, "ready"
+        job.statement, job.parent, job.state = statement, done.parent or done.number, "ready"
         self.start(job)
         return job
 

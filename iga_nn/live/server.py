@@ -113,8 +113,8 @@ class Page:
         return resolve(str(path), **self._mapping.reading())
 
     def _run(self, job: Job) -> Iterator[Message]:
-        mapping = None if job.problem else replace(self._mapping, resume=has_checkpoint(job.results))
-        return job_process.run(job.folder, job.name, mapping, job.problem or job.wanted or self._poisson, job.stop)
+        mapping = None if job.statement else replace(self._mapping, resume=has_checkpoint(job.results))
+        return job_process.run(job.folder, job.name, mapping, job.statement or job.wanted or self._poisson, job.stop)
 
     def _act(self, act: Callable[[Job], None], number: int) -> None:
         if job := self.jobs.find(number):
@@ -269,11 +269,11 @@ class Page:
         if job is None or not is_solvable(job):
             raise web.HTTPNotFound(text="there is no volume of this job to solve on")
         try:
-            problem = form.stated(await request.post(), self._poisson)
+            statement = form.stated(await request.post(), self._poisson)
         except InputError as error:
             raise web.HTTPBadRequest(text=one_line(error)) from None
         try:
-            made = await asyncio.to_thread(self.jobs.solve, job, problem)
+            made = await asyncio.to_thread(self.jobs.solve, job, statement)
         except OSError as error:
             raise web.HTTPNotFound(text=f"the volume cannot be copied: {one_line(error)}") from None
         return web.Response(text=str(made.number))

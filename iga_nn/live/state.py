@@ -40,19 +40,19 @@ PICKED = (240, 140, 20)
 EDGES_UP_TO = 3_000  # edges are drawn on surfaces of at most so many faces
 
 
-def row(job: Job, before: int, problem: ProblemOptions) -> dict[str, Any]:
+def row(job: Job, before: int, statement: ProblemOptions) -> dict[str, Any]:
     """Return what the page shows of a job, in JSON's own types.
 
-    before: jobs ahead of it in the queue. problem: that of the page's options.
+    before: jobs ahead of it in the queue. statement: the problem of the page's options.
     """
     said: dict[str, Any] = {
         "number": job.number,
         "name": job.name,
         "state": job.state,
         "label": LABELS.get(job.state, job.state) + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
-        "what": f"{form.in_words(job.problem)}; on the volume of {job.parent}" if job.problem else "",
+        "what": f"{form.in_words(job.statement)}; on the volume of {job.parent}" if job.statement else "",
         "text": job.text,
-        "starts": job.state in STARTS and not (job.problem and job.state == "failed"),  # that one would fail again
+        "starts": job.state in STARTS and not (job.statement and job.state == "failed"),  # that one would fail again
         "deletes": job.state in DELETED,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",
@@ -61,7 +61,7 @@ def row(job: Job, before: int, problem: ProblemOptions) -> dict[str, Any]:
         "files": _files(job) if job.state in ENDED else [],
     }
     if is_solvable(job) or is_ahead(job):
-        said["form"] = form.filled(job.problem or job.wanted or problem)
+        said["form"] = form.filled(job.statement or job.wanted or statement)
         said["ahead"] = is_ahead(job)
     if job.surface is not None:
         vertices, faces = len(job.surface.vertices), len(job.surface.faces)

@@ -21,7 +21,7 @@ from parameterize.progress import Progress
 from ..options import MapOptions, ProblemOptions
 from ..workflow import pipeline
 from ..workflow.output_folder import Outcome
-from ..workflow.watched import Ended, ended, logged, told
+from ..workflow.worker_run import Ended, ended, logged, throttled
 
 GRACE = 3.0  # seconds a job has to stop by itself, leaving a checkpoint
 
@@ -37,7 +37,9 @@ class Step:
 Message = Step | str | Ended  # a string is a line of the log
 
 
-def run(folder: Path, name: str, mapping: MapOptions | None, problem: ProblemOptions, stop: Event) -> Iterator[Message]:
+def run(
+    folder: Path, name: str, mapping: MapOptions | None, statement: ProblemOptions, stop: Event
+) -> Iterator[Message]:
     """Run the surface `name` in `folder`, which also takes the results; yield messages as they come, an Ended last.
 
     mapping: None where the file is a volume, on which the problem is only solved.
@@ -45,7 +47,7 @@ def run(folder: Path, name: str, mapping: MapOptions | None, problem: ProblemOpt
     spawn = multiprocessing.get_context("spawn")  # a copy of a process with threads may hang
     receiver, sender = spawn.Pipe(duplex=False)
     halt = spawn.Event()
-    process = spawn.Process(target=_work, args=(sender, halt, folder, name, mapping, problem), daemon=True)
+    process = spawn.Process(target=_work, args=(sender, halt, folder, name, mapping, statement), daemon=True)
     process.start()
     sender.close()
     try:
@@ -82,7 +84,12 @@ def _follow(
 
 
 def _work(
-    sender: Connection, halt: SharedEvent, folder: Path, name: str, mapping: MapOptions | None, problem: ProblemOptions
+    sender: Connection,
+    halt: SharedEvent,
+    folder: Path,
+    name: str,
+    mapping: MapOptions | None,
+    statement: ProblemOptions,
 ) -> None:
     """Run the job in the child process, in the job's folder: messages then name the file as the user does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C in the terminal
@@ -93,8 +100,10 @@ def _work(
 
     def work() -> Outcome | None:
         if mapping is None:
-            return pipeline.solve_to(name, problem=problem, force=True)  # over what a stopped solve left
-        return pipeline.parameterize_to(name, mapping=mapping, problem=problem, progress=told(tell, halt.is_set))
+            return pipeline.solve_to(name, statement=statement, force=True)  # over what a stopped solve left
+        return pipeline.parameterize_to(
+            name, mapping=mapping, statement=statement, progress=throttled(tell, halt.is_set)
+        )
 
     with logged(_Lines(sender), logging.INFO):
         sender.send(ended(work, "lower --control-points or --refine"))

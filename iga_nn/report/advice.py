@@ -41,15 +41,15 @@ def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
     return {"unproved": {"spans": len(spans), "parameters": parameters.tolist(), "places": volume(parameters).tolist()}}
 
 
-def what_to_try(report: Report, options: MapOptions | None = None) -> list[str]:
+def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
     """Return remedies for a map that is not certified, the most promising first; none for a certified one.
 
-    options: those the map was made with, where they are known.
+    mapping: those the map was made with, where they are known.
     """
     if is_certified(report):
         return []
     quality, remedies = report["parameterization"], []
-    if options is not None and options.steps_factor < 1.0:
+    if mapping is not None and mapping.steps_factor < 1.0:
         remedies.append("the whole training: leave out --steps-factor")
     if crossing := report.get("input", {}).get("self_intersections", {}).get("pairs", 0):
         remedies.append(f"a surface that does not intersect itself: {crossing} pairs of its faces do (`iga-nn check`)")
@@ -59,11 +59,11 @@ def what_to_try(report: Report, options: MapOptions | None = None) -> list[str]:
     if more > max(quality["control_points"]):
         is_limit = quality.get("refinement", {}).get("stopped") == "limit reached"
         remedies.append(f"more control points: --{'max-' * is_limit}control-points {more}")
-    if options is None or options.corners is None:
+    if mapping is None or mapping.corners is None:
         remedies.append("your own corners, away from those places: --corners FILE")
     else:
         remedies.append("other corners, farther apart and away from those places: --corners FILE")
-    remedies.append(f"another seed: --seed {options.seed + 1 if options else 1}")
+    remedies.append(f"another seed: --seed {mapping.seed + 1 if mapping else 1}")
     return remedies
 
 

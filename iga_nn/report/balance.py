@@ -5,7 +5,7 @@ Of elasticity these are forces, of a scalar law what flows in. Forces have the u
 
 from typing import Any
 
-from ..levels import capitalized
+from ..level_table import capitalized
 
 AXES = ("x", "y", "z")
 TINY = 1e-6  # of the largest number: the linear solver's own error is smaller

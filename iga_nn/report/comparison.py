@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..levels import TITLES, number
+from ..level_table import TITLES, number
 from ..rounding import rounded
 from ..version import __version__
 from . import document as reports

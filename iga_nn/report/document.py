@@ -14,7 +14,7 @@ import numpy as np
 from parameterize.certificate.jacobian import CLAIMS
 from parameterize.files import save_text
 
-from ..levels import ESTIMATES, EXACT_ERRORS
+from ..level_table import ESTIMATES, EXACT_ERRORS
 from ..version import __version__
 from .artifacts import REPORT, SOLVED
 

@@ -14,7 +14,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from parameterize.files import save_text
 
 from ..errors import one_line
-from ..levels import TITLES, as_rows, capitalized
+from ..level_table import TITLES, as_rows, capitalized
 from ..rounding import rounded
 from . import balance, extremes
 from . import document as reports

@@ -15,7 +15,7 @@ from parameterize.surface.surface import Surface
 from solve.solution import Solution
 from solve.study import Convergence
 
-from ..levels import as_rows
+from ..level_table import as_rows
 from . import document as reports
 
 

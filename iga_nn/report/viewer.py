@@ -21,6 +21,7 @@ from parameterize.arrays import Array, Knots
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import AXES, BSplineVolume
 from solve import SplineField
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
 from ..figures import evaluate
@@ -39,7 +40,7 @@ from ..figures.fields import (
 )
 from ..figures.style import even_range, with_unit
 from ..figures.warp import factor_for, is_displacement, warp_of
-from ..options import NO_UNITS, Equation, Units
+from ..options import NO_UNITS, Units
 
 Scene = dict[str, Any]
 
@@ -87,7 +88,7 @@ class Frame:
 def scene_of(
     volume: BSplineVolume,
     solution: SplineField | None = None,
-    problem: "Equation | None" = None,
+    problem: BoundaryValueProblem | None = None,
     *,
     units: Units = NO_UNITS,
     coarser: int = 1,

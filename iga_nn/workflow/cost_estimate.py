@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,8 +23,9 @@ from parameterize.surface.surface import Surface
 from solve.discretization.errors import POINTS
 from solve.discretization.quadrature import rule_of
 from solve.discretization.space import trial_space
+from solve.forms.boundary_value_problem import BoundaryValueProblem
+from solve.options import SolveOptions
 
-from ..options import Equation, ProblemOptions
 from ..rounding import rounded
 
 log = logging.getLogger(__name__)
@@ -125,7 +125,7 @@ def forecast(
 def _training_steps(config: Config) -> tuple[float, float]:
     """Return the steps for an easy surface, and those that show one to be hard: the first stage's, or none."""
     steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
-    steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.target == "cube"), 0))
+    steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.name == "cube"), 0))
     if limit is None or config.starts == 1:
         return steps, steps
     return (0, 0) if limit == 0.0 else (steps, config.stages[0].steps)
@@ -208,10 +208,10 @@ class SolveMemory:
         return self.shared_mb / processes + self.each_mb
 
 
-def solve_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptions) -> SolveMemory:
-    """Return the forecast for the finest level."""
-    form, space = equation.form, trial_space(volume, max(options.refine), options.degree)
-    rule = rule_of(volume, space, equation.on(volume).form.tensor, options.quadrature)
+def solve_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> SolveMemory:
+    """Return the forecast for one solve."""
+    form, space = problem.form, trial_space(volume, options.refine, options.degree)
+    rule = rule_of(volume, space, problem.on(volume).form.tensor, options.quadrature)
     points = float(np.prod(rule.shape, dtype=float))
     unknowns = float(form.components * space.dofs)
     kept = CONSTANT * form.constant + BLOCK + form.has_reaction
@@ -222,18 +222,19 @@ def solve_memory(volume: BSplineVolume, equation: Equation, options: ProblemOpti
     return SolveMemory(8e-6 * shared, 8e-6 * each)
 
 
-def tell_memory(volume: BSplineVolume, equation: Equation, options: ProblemOptions, comm: Any = None) -> None:
-    """Log what the finest level will take, warn where that is not free, and say how many processes could solve it."""
+def tell_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> None:
+    """Log the memory of a solve; where it is not free, warn, and name the number of processes that could solve it."""
     processes, here = 1, 1
-    if comm is not None:
-        processes, here = comm.size, comm.allgather(platform.node()).count(platform.node())
-    wanted, free = solve_memory(volume, equation, options), available_memory_mb(here)
+    if options.comm is not None:
+        names = options.comm.allgather(platform.node())
+        processes, here = len(names), names.count(platform.node())
+    wanted, free = solve_memory(volume, problem, options), available_memory_mb(here)
     needed = wanted.on(processes)
     each = f" on each of {processes} processes" * (processes > 1)
     log.info("estimate: %s GB of memory%s", rounded(needed / 1000.0, 1), each)
     if free is None or needed <= free:
         return
-    spans = len(trial_space(volume, max(options.refine), options.degree).breaks[0]) - 1
+    spans = len(trial_space(volume, options.refine, options.degree).breaks[0]) - 1
     enough = next((count for count in range(processes + 1, spans + 1) if wanted.on(count) <= free), None)
     more = f", or take {enough} processes with as much memory each: mpiexec -n {enough} iga-nn solve .. --mpi"
     log.warning(

@@ -21,11 +21,12 @@ from parameterize.surface.geometry import vertex_normals
 from parameterize.surface.surface import Surface
 from solve import ExpressionError
 from solve.diagnostics import empty_formulas
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
 from ..models import resolve
-from ..options import Equation, MapOptions
+from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
 from ..rounding import rounded
@@ -61,28 +62,28 @@ class _Given:
 def map_surface(
     state: RunFolder,
     mesh: str | Path,
-    options: MapOptions,
+    mapping: MapOptions,
     progress: ProgressCallback | None,
     command: str,
-    equation: Equation | None = None,
+    problem: BoundaryValueProblem | None = None,
     unknowns: int = 0,
 ) -> Parameterization:
     """Parameterize a surface, write everything that is known of the map into the folder, and return it.
 
-    command: the one that repeats it. equation, unknowns: the problem that is solved on the map, and its size.
+    command: the one that repeats it. problem, unknowns: the problem that is solved on the map, and its size.
     """
     with compilation_told():
-        given = _prepare(state, mesh, options, equation, unknowns)
-        result = _train(given, options, progress, state.folder / CHECKPOINT)
+        given = _prepare(state, mesh, mapping, problem, unknowns)
+        result = _train(given, mapping, progress, state.folder / CHECKPOINT)
     state.begin("map", "solution")  # what was left until the checkpoint of a resumed run was accepted
     state.seconds.update(result.seconds)
-    _write(state, given, result, command, options)
+    _write(state, given, result, command, mapping)
     _draw(state, given, result)
     return result
 
 
 def _prepare(
-    state: RunFolder, mesh: str | Path, options: MapOptions, equation: Equation | None, unknowns: int
+    state: RunFolder, mesh: str | Path, mapping: MapOptions, problem: BoundaryValueProblem | None, unknowns: int
 ) -> _Given:
     """Check the options, read the surface and the corners, check the problem's data, and announce what the run takes.
 
@@ -93,23 +94,23 @@ def _prepare(
     from parameterize.training.backend import choose_device
 
     with input_errors():
-        config, device = options.config(), choose_device(options.device)
+        config, device = mapping.config(), choose_device(mapping.device)
     with state.timed("load"):
-        surface = resolve(str(mesh), **options.reading())
-        corners = read_corners(Path(options.corners), frame_of(surface)) if options.corners else None
+        surface = resolve(str(mesh), **mapping.reading())
+        corners = read_corners(Path(mapping.corners), frame_of(surface)) if mapping.corners else None
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
         log.warning("%s: %s", surface.name, notice)
     with input_errors():
         marks = None if corners is None else surface.vertices[corner_vertices(surface, corners)]
-    if equation is not None:
-        _check_data(equation, surface)
-    is_resumed = options.resume and has_checkpoint(state.folder)
+    if problem is not None:
+        _check_data(problem, surface)
+    is_resumed = mapping.resume and has_checkpoint(state.folder)
     if is_resumed:
-        _check_checkpoint(state, surface, corners, options)
+        _check_checkpoint(state, surface, corners, mapping)
     else:
         state.begin("map", "solution")
-    if options.resume and not is_resumed:
+    if mapping.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
     with state.timed("load"):
         expected = forecast(surface, config, device=device, unknowns=unknowns)
@@ -119,14 +120,14 @@ def _prepare(
     return _Given(surface, corners, marks, expected)
 
 
-def _check_checkpoint(state: RunFolder, surface: Surface, corners: Any, options: MapOptions) -> None:
+def _check_checkpoint(state: RunFolder, surface: Surface, corners: Any, mapping: MapOptions) -> None:
     """Raise InputError for a checkpoint of another surface, seed or config: it is seen before anything is computed."""
     from parameterize.checkpoint import CheckpointError
     from parameterize.run import check_checkpoint
 
-    given: dict[str, Any] = {"seed": options.seed, "device": options.device, "corners": corners}
+    given: dict[str, Any] = {"seed": mapping.seed, "device": mapping.device, "corners": corners}
     try:
-        check_checkpoint(surface, options.config(), checkpoint_dir=state.folder / CHECKPOINT, **given)
+        check_checkpoint(surface, mapping.config(), checkpoint_dir=state.folder / CHECKPOINT, **given)
     except CheckpointError as error:
         raise InputError(str(error)) from None
 
@@ -164,24 +165,24 @@ def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray
     return rows.astype(np.int64)
 
 
-def _check_data(equation: Equation, surface: Surface) -> None:
+def _check_data(problem: BoundaryValueProblem, surface: Surface) -> None:
     """Check the problem's data on the surface: no points inside are known yet. Raises ExpressionError."""
-    equation = equation.placed(frame_of(surface))
+    problem = problem.placed(frame_of(surface))
     points = surface.vertices.T
-    for evaluate in (equation.boundary_at, equation.source_at, equation.form.tensor, equation.form.mass):
+    for evaluate in (problem.boundary_at, problem.source_at, problem.form.tensor, problem.form.mass):
         evaluate(points)
-    if equation.exact is not None:
-        equation.exact_at(points)
-    for _, notice in empty_formulas(equation, points):
+    if problem.exact is not None:
+        problem.exact_at(points)
+    for _, notice in empty_formulas(problem, points):
         log.warning("%s", notice)
     normals = vertex_normals(surface.vertices, surface.faces)
-    if equation.conditions:
+    if problem.conditions:
         with input_errors():
-            check_regions(equation.on_surface(surface.part), surface)
+            check_regions(problem.on_surface(surface.part), surface)
         return
     for face in FACE_NAMES:
-        if face not in equation.dirichlet:
-            _check_somewhere(partial(equation.on_face, face), surface.vertices, normals)
+        if face not in problem.dirichlet:
+            _check_somewhere(partial(problem.on_face, face), surface.vertices, normals)
 
 
 def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:
@@ -197,7 +198,7 @@ def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, 
     raise refused
 
 
-def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None, checkpoint: Path) -> Parameterization:
+def _train(given: _Given, mapping: MapOptions, progress: ProgressCallback | None, checkpoint: Path) -> Parameterization:
     """Train, and return the map. Raises InputError for a checkpoint of another run and corners without paths."""
     from parameterize.checkpoint import CheckpointError
     from parameterize.cube.edge_paths import PathError
@@ -210,13 +211,13 @@ def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None
     try:
         return parameterize(
             given.surface,
-            options.config(),
-            seed=options.seed,
-            device=options.device,
+            mapping.config(),
+            seed=mapping.seed,
+            device=mapping.device,
             corners=given.corners,
             progress=tell,
             checkpoint_dir=checkpoint,
-            resume=options.resume,
+            resume=mapping.resume,
         )
     except CheckpointError as error:
         raise InputError(str(error)) from None
@@ -224,7 +225,7 @@ def _train(given: _Given, options: MapOptions, progress: ProgressCallback | None
         raise InputError(f"{given.surface.name}: {error}; train longer, or give --corners") from None
 
 
-def _write(state: RunFolder, given: _Given, result: Parameterization, command: str, options: MapOptions) -> None:
+def _write(state: RunFolder, given: _Given, result: Parameterization, command: str, mapping: MapOptions) -> None:
     state.write(command=command)  # first, so that files which a full disk or a kill leaves belong to a run
     result.volume.save(state.folder / "volume.npz")
     result.boundary.save(state.folder / "boundary.npz")
@@ -233,7 +234,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
         input=given.surface.summary(),
         config=asdict(result.config),
         estimate=asdict(given.expected),
-        seed=options.seed,
+        seed=mapping.seed,
         device=result.device,
         versions=reports.versions(),
         parameterization=result.quality.as_dict()
@@ -241,7 +242,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
         | ({"refinement": asdict(result.refinement)} if result.refinement else {})
         | advice.unproved(result.volume, result.certificate),
     )
-    tell(state, options)
+    tell(state, mapping)
 
 
 def _draw(state: RunFolder, given: _Given, result: Parameterization) -> None:

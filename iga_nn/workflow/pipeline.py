@@ -7,7 +7,7 @@ import logging
 from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -18,16 +18,15 @@ from parameterize.files import save_text
 from parameterize.progress import ProgressCallback
 from parameterize.spline.volume import BSplineVolume
 from solve import ConvergenceRow, Solution, check_device, check_problem, convergence, modes
-from solve.discretization.space import agreed
+from solve.discretization.slab import agreed
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
-from ..kinds import check_kind
-from ..levels import as_csv, as_table, rows_of
+from ..level_table import as_csv, as_table, rows_of
 from ..options import (
     NO_UNITS,
     PROBLEMS,
-    Equation,
     MapOptions,
     ModesOptions,
     PoissonOptions,
@@ -38,10 +37,11 @@ from ..options import (
 )
 from ..report import document as reports
 from ..report import html
+from ..type_check import check_type
+from .command_line import command_line, gives_the_same
 from .cost_estimate import tell_memory
 from .mapping import map_surface
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
-from .repeat import command_line, gives_the_same
 from .solving import (
     described,
     each_level,
@@ -111,14 +111,15 @@ def run(
     >>> [level["dofs"] for level in outcome.report["poisson"]["levels"]], (outcome.folder / "report.html").exists()
     ([216], True)
     """
-    check_kind("problem", problem, str)
+    check_type("problem", problem, str)
     if problem not in PROBLEMS:
         raise InputError(f"problem {problem!r}: choose one of {', '.join(PROBLEMS)}")
-    mapping, options = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
-    check_kind(problem, options, PROBLEMS[problem])
+    mapping, statement = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
+    check_type(problem, statement, PROBLEMS[problem])
     if others := [name for name, value in given.items() if value is not None]:
         raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
-    return parameterize_to(mesh, out, mapping=mapping, problem=options, force=force, vector=vector, progress=progress)
+    how: dict[str, Any] = {"force": force, "vector": vector, "progress": progress}
+    return parameterize_to(mesh, out, mapping=mapping, statement=statement, **how)
 
 
 def parameterize_to(
@@ -126,46 +127,46 @@ def parameterize_to(
     out: str | Path | None = None,
     *,
     mapping: MapOptions | None = None,
-    problem: ProblemOptions | None = None,
+    statement: ProblemOptions | None = None,
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
 ) -> Outcome:
     """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does."""
     mapping = mapping or MapOptions()
-    check_kind("mapping", mapping, MapOptions)
-    check_kind("mesh", mesh, str | Path)
-    check_kind("out", out, str | Path | None)
-    check_kind("progress", progress, Callable | None)
-    equation, unknowns = (None, 0) if problem is None else checked(mapping, problem)
-    command = _command(mesh, out, mapping, problem)
+    check_type("mapping", mapping, MapOptions)
+    check_type("mesh", mesh, str | Path)
+    check_type("out", out, str | Path | None)
+    check_type("progress", progress, Callable | None)
+    problem, unknowns = (None, 0) if statement is None else checked(mapping, statement)
+    command = _command(mesh, out, mapping, statement)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         if state.finished:
-            return _finished_by(command, state.finished, vector, problem)
-        result = map_surface(state, mesh, mapping, progress, command, equation, unknowns)
-        if problem is None or equation is None:
+            return _finished_by(command, state.finished, vector, statement)
+        result = map_surface(state, mesh, mapping, progress, command, problem, unknowns)
+        if statement is None or problem is None:
             return _finish(state, result.volume)
-        equation = equation.on_surface(result.boundary.part)
-        solution = solve_levels(state, result.volume, equation, problem)
-        return _finish(state, result.volume, solution, equation, problem.units)
+        problem = problem.on_surface(result.boundary.part)
+        solution = solve_levels(state, result.volume, problem, statement, statement.solve_options())
+        return _finish(state, result.volume, solution, problem, statement.units)
 
 
-def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, problem: ProblemOptions | None) -> str:
+def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, statement: ProblemOptions | None) -> str:
     """Return the command that repeats such a run."""
-    if problem is None:
+    if statement is None:
         return command_line("parameterize", mesh, mapping, out=out)
-    return command_line(f"run {problem.section}", mesh, mapping, problem, out=out)
+    return command_line(f"run {statement.section}", mesh, mapping, statement, out=out)
 
 
-def checked(mapping: MapOptions, problem: ProblemOptions) -> tuple[Equation, int]:
+def checked(mapping: MapOptions, statement: ProblemOptions) -> tuple[BoundaryValueProblem, int]:
     """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
-    equation, degree = problem.problem(), mapping.config().spline.degree
+    problem, degree = statement.problem(), mapping.config().spline.degree
     blank = BSplineVolume.uniform(np.zeros((mapping.most_control_points,) * 3 + (3,)), degree)
-    return equation, check_size(blank, max(problem.refine), problem.degree, equation.form.components)
+    return problem, check_size(blank, max(statement.refine), statement.degree, problem.form.components)
 
 
 def finished_run(
-    mesh: str | Path, out: str | Path, mapping: MapOptions, problem: ProblemOptions | None, *, vector: bool = False
+    mesh: str | Path, out: str | Path, mapping: MapOptions, statement: ProblemOptions | None, *, vector: bool = False
 ) -> Outcome | None:
     """Return the finished result of `parameterize_to` in its folder, None where there is none.
 
@@ -174,14 +175,14 @@ def finished_run(
     report = reports.read(Path(out))
     if report is None or not reports.is_finished(report):
         return None
-    return _finished_by(_command(mesh, out, mapping, problem), Outcome(Path(out), report), vector, problem)
+    return _finished_by(_command(mesh, out, mapping, statement), Outcome(Path(out), report), vector, statement)
 
 
 def solve_to(
     volume: str | Path,
     out: str | Path | None = None,
     *,
-    problem: ProblemOptions | None = None,
+    statement: ProblemOptions | None = None,
     force: bool = False,
     vector: bool = False,
     device: str = "cpu",
@@ -193,23 +194,22 @@ def solve_to(
     call this and share the solve; the first one writes, the others get None. Takes the other options of `run`, and
     raises as it does.
     """
-    check_kind("volume", volume, str | Path)
-    options, path = problem or PoissonOptions(), Path(volume)
+    check_type("volume", volume, str | Path)
+    statement, path = statement or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
-    equation = with_part(options.problem(), path)
-    loaded = load_volume(path)
+    problem = with_part(statement.problem(), path)
+    loaded, options = load_volume(path), replace(statement.solve_options(), device=device, comm=comm)
     processes = 1 if comm is None else comm.size
     if comm is not None and processes == 1:
         log.warning("--mpi in a single process: `mpiexec -n 4 iga-nn solve ... --mpi` takes four")
-    check_size(loaded, max(options.refine), options.degree, equation.form.components, processes)
+    check_size(loaded, options.refine, options.degree, problem.form.components, processes)
     with input_errors():
-        check_problem(loaded, equation, comm)
-        check_device(device, equation)
-    tell_memory(loaded, equation, options, comm)
-    elsewhere = {"device": device} if device != "cpu" else {}
-    how = elsewhere | ({"mpi": True} if comm is not None else {})
-    command = command_line(f"solve {options.section}", path, options, **how, out=out)
+        check_problem(loaded, problem, comm)
+        check_device(device, problem)
+    tell_memory(loaded, problem, options)
+    how: dict[str, Any] = {"device": device} if device != "cpu" else {"mpi": True} if comm is not None else {}
+    command = command_line(f"solve {statement.section}", path, statement, **how, out=out)
     with ExitStack() as stack:
         with agreed(comm) if comm is not None else nullcontext():  # no process waits for one whose folder is refused
             state = None
@@ -218,33 +218,33 @@ def solve_to(
                 state.begin("solution")
                 write_certificate(state, path, loaded, command)
         if state is None:
-            deque(each_level(loaded, equation, options, comm=comm), maxlen=0)
+            deque(each_level(loaded, problem, statement.refine, options), maxlen=0)
             return None
-        solution = solve_levels(state, loaded, equation, options, comm=comm, **elsewhere)
-        return _finish(state, loaded, solution, equation, options.units)
+        solution = solve_levels(state, loaded, problem, statement, options)
+        return _finish(state, loaded, solution, problem, statement.units)
 
 
-def with_part(equation: Equation, volume: Path) -> Equation:
+def with_part(problem: BoundaryValueProblem, volume: Path) -> BoundaryValueProblem:
     """Return a problem whose regions know the surface that a volume was made of, from the boundary.npz beside it.
 
     Raises InputError where regions name faces or groups of that surface, and there is no such file.
     """
     beside = volume.with_name("boundary.npz")
-    if not equation.conditions or not (equation.needs_surface or beside.is_file()):
-        return equation
+    if not problem.conditions or not (problem.needs_surface or beside.is_file()):
+        return problem
     from parameterize.cube.boundary_map import read_part
 
     if not beside.is_file():
         raise InputError(f"{beside}: is not there, and without it group:NAME and face(x, y, z) mean nothing")
     with input_errors():
-        return equation.on_surface(read_part(beside))
+        return problem.on_surface(read_part(beside))
 
 
 def study_to(
     volume: str | Path,
     out: str | Path | None = None,
     *,
-    options: StudyOptions | None = None,
+    study_options: StudyOptions | None = None,
     force: bool = False,
     vector: bool = False,
 ) -> tuple[Outcome, str]:
@@ -252,26 +252,26 @@ def study_to(
 
     Takes the other options of `run`, and raises as it does.
     """
-    check_kind("volume", volume, str | Path)
-    options, path = options or StudyOptions(), Path(volume)
-    equation, levels = options.problem(), options.levels()
+    check_type("volume", volume, str | Path)
+    study_options, path = study_options or StudyOptions(), Path(volume)
+    problem, levels = study_options.problem(), study_options.levels()
     loaded = load_volume(path)
-    degrees = sorted(options.degree) or [max(loaded.degrees)]
+    degrees = sorted(study_options.degree) or [max(loaded.degrees)]
     for degree in degrees:
-        check_size(loaded, levels[-1], degree, equation.form.components)
+        check_size(loaded, levels[-1], degree, problem.form.components)
     with input_errors():
-        check_problem(loaded, equation)
+        check_problem(loaded, problem)
     with open_folder(path, f"{default_folder(path)}-study" if out is None else out, force, vector=vector) as state:
         state.begin("study")
-        write_certificate(state, path, loaded, command_line(options.command, path, options, out=out))
+        write_certificate(state, path, loaded, command_line(study_options.command, path, study_options, out=out))
         study: dict[int, list[ConvergenceRow]] = {}
         with reported(state, loaded), state.timed("solve"), input_errors():
             for degree in degrees:
-                study[degree] = convergence(loaded, equation, levels, degree, certified=verdict_of(state))
+                study[degree] = convergence(loaded, problem, levels, degree, certified=verdict_of(state))
                 log.info("degree %d: solved", degree)
         save_text(state.folder / "study.csv", as_csv(study))
         notices = notices_of(row.report for row in chain(*study.values()))
-        known = described(equation, loaded) | ({"exact": options.exact} if options.exact else {})
+        known = described(problem, loaded) | ({"exact": study_options.exact} if study_options.exact else {})
         state.write(study=known | {"levels": rows_of(study), "notices": notices})
         state.draw("study", study=study)
         return _finish(state, loaded), as_table(study)
@@ -281,7 +281,7 @@ def modes_to(
     volume: str | Path,
     out: str | Path | None = None,
     *,
-    options: ModesOptions | None = None,
+    modes_options: ModesOptions | None = None,
     force: bool = False,
     vector: bool = False,
 ) -> tuple[Outcome, str]:
@@ -289,27 +289,34 @@ def modes_to(
 
     Takes the other options of `run`, and raises as it does, and ConvergenceError.
     """
-    check_kind("volume", volume, str | Path)
-    options, path = options or ModesOptions(), Path(volume)
-    body, loaded = with_part(options.problem(), path), load_volume(path)
-    check_size(loaded, options.refine, options.degree, body.form.components)
+    check_type("volume", volume, str | Path)
+    modes_options, path = modes_options or ModesOptions(), Path(volume)
+    body, loaded = with_part(modes_options.problem(), path), load_volume(path)
+    check_size(loaded, modes_options.refine, modes_options.degree, body.form.components)
     with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
         state.begin("modes")
-        write_certificate(state, path, loaded, command_line("modes", path, options, out=out))
+        write_certificate(state, path, loaded, command_line("modes", path, modes_options, out=out))
         with reported(state, loaded), state.timed("solve"), input_errors():
-            found = modes(loaded, body, options.density, options.number, refine=options.refine, degree=options.degree)
+            found = modes(
+                loaded,
+                body,
+                modes_options.density,
+                modes_options.number,
+                refine=modes_options.refine,
+                degree=modes_options.degree,
+            )
         found.save(state.folder / "modes.npz")
-        state.write(modes=asdict(options) | found.as_dict())
+        state.write(modes=asdict(modes_options) | found.as_dict())
         state.draw("modes", volume=loaded, modes=found)
         return _finish(state, loaded, scene=moving_scene_of(state, loaded, found)), str(found)
 
 
-def _finished_by(command: str, finished: Outcome, vector: bool, problem: ProblemOptions | None) -> Outcome:
+def _finished_by(command: str, finished: Outcome, vector: bool, statement: ProblemOptions | None) -> Outcome:
     """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone."""
     folder, made_by = finished.folder, finished.report.get("command", "")
-    if problem is not None and problem.section not in finished.report:
+    if statement is not None and statement.section not in finished.report:
         path = folder / "volume.npz"
-        raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {problem.section} {path}` solves on it")
+        raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {statement.section} {path}` solves on it")
     if not gives_the_same(made_by, command):
         raise InputError(f"{folder}: holds the result of `{made_by}`; --force replaces it, --out names another folder")
     wanted = ["volume.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
@@ -325,12 +332,12 @@ def _finish(
     state: RunFolder,
     volume: BSplineVolume,
     solution: Solution | None = None,
-    equation: "Equation | None" = None,
+    problem: BoundaryValueProblem | None = None,
     units: Units = NO_UNITS,
     scene: Any = None,
 ) -> Outcome:
     """Finish the report, write the page that shows it and return the output folder."""
-    scene = scene or scene_of(state, volume, solution, equation, units=units)
+    scene = scene or scene_of(state, volume, solution, problem, units=units)
     outcome = state.finish()
     html.write(outcome.folder, outcome.report, scene)
     return outcome

@@ -9,8 +9,8 @@ import numpy as np
 from parameterize.arrays import Array, IntArray
 from parameterize.surface.geometry import doubled_areas
 from parameterize.surface.surface import Surface
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
-from solve.forms.problem import BoundaryValueProblem
 from solve.forms.region import Region
 
 from ..errors import InputError, input_errors
@@ -20,12 +20,12 @@ _SAMPLES = 20_000  # points of the surface, beside its vertices
 _SEED = 0
 
 
-def check_regions(equation: BoundaryValueProblem, surface: Surface) -> None:
+def check_regions(problem: BoundaryValueProblem, surface: Surface) -> None:
     """Raise ValueError where a region of a problem holds at no point of a surface, or names what it lacks.
 
-    equation: with its regions placed. Regions of the cube's faces are not known yet.
+    problem: with its regions placed. Regions of the cube's faces are not known yet.
     """
-    for condition in equation.conditions:
+    for condition in problem.conditions:
         if not condition.region.needs_cube and not share_of(condition.region, surface):
             raise ValueError(f"{condition.role}: {_nowhere(surface)}")
 

@@ -4,19 +4,20 @@ import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 from parameterize.spline.volume import BSplineVolume
-from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveReport, rates, solve_problem
+from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates, solve_with
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.condition import WITH_FACTOR, Condition
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
-from ..options import NO_UNITS, Equation, ProblemOptions, Units
+from ..options import NO_UNITS, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
 from ..report.extremes import growth_notices
@@ -26,35 +27,40 @@ log = logging.getLogger(__name__)
 
 
 def solve_levels(
-    state: RunFolder, volume: BSplineVolume, equation: Equation, options: ProblemOptions, **solver: Any
+    state: RunFolder,
+    volume: BSplineVolume,
+    problem: BoundaryValueProblem,
+    statement: ProblemOptions,
+    options: SolveOptions,
 ) -> Solution:
-    """Solve level after level, write the report of all, and return the finest solution.
+    """Solve level after level, write the report of all levels, and return the finest solution.
 
-    solution.npz holds the finest so far. solver: keywords of `solve.solve_problem`.
+    solution.npz holds the finest solution so far.
     """
+    options = replace(options, certified=verdict_of(state))
     solutions: list[Solution] = []
     levels: list[dict[str, Any]] = []
     with reported(state, volume), state.timed("solve"):
-        for solution in each_level(volume, equation, options, certified=verdict_of(state), **solver):
+        for solution in each_level(volume, problem, statement.refine, options):
             solution.save(state.folder / "solution.npz")
             solutions.append(solution)
             levels.append(level_of(solution))
     found = [solution.report for solution in solutions]
-    growth = growth_notices({**asdict(options), "levels": levels}) if equation.exact is None else []
+    growth = growth_notices({**asdict(statement), "levels": levels}) if problem.exact is None else []
     for notice in growth:
         log.warning("%s", notice)
-    asked = {name: given for name, given in asdict(options).items() if name not in ("refine", "degree")}
-    known = asked | described(equation, volume)
+    asked = {name: given for name, given in asdict(statement).items() if name not in ("refine", "degree")}
+    known = asked | described(problem, volume)
     state.write(
         **{
-            options.section: {name: value for name, value in known.items() if value is not None and value != ()}
-            | ({"regions": regions_of(equation, found[-1])} if equation.conditions else {})
+            statement.section: {name: value for name, value in known.items() if value is not None and value != ()}
+            | ({"regions": regions_of(problem, found[-1])} if problem.conditions else {})
             | {"levels": levels, "rates": rates(found), "notices": [*notices_of(found), *growth]}
         }
     )
     _write_cells(state, solutions[-1])
-    _draw(state, volume, solutions, equation, options.units)
-    if len(equation.dirichlet) < 6:  # the user names faces: show which is which
+    _draw(state, volume, solutions, problem, statement.units)
+    if len(problem.dirichlet) < 6:  # the user names faces: show which is which
         state.draw("solution", named_volume=volume)
     return solutions[-1]
 
@@ -71,23 +77,24 @@ def level_of(solution: Solution) -> dict[str, Any]:
     return level | {"extremes": extremes, "seconds": seconds}
 
 
-def each_level(volume: BSplineVolume, equation: Equation, options: ProblemOptions, **solver: Any) -> Iterator[Solution]:
-    """Solve level after level, each from the one before, and yield the solutions.
+def each_level(
+    volume: BSplineVolume, problem: BoundaryValueProblem, levels: Sequence[int], options: SolveOptions
+) -> Iterator[Solution]:
+    """Solve level after level, a scalar problem from the solution before, and yield the solutions.
 
-    solver: keywords of `solve.solve_problem`. Processes of an MPI job do this together.
+    Processes of an MPI job do this together.
     """
-    solver |= options.solver()
-    for level in sorted(options.refine):
+    for level in sorted(levels):
         try:
             with input_errors():
-                solution = solve_problem(volume, equation, refine=level, **solver)
+                solution = solve_with(volume, problem, replace(options, refine=level))
         except MemoryError:
             remedy = "free some, lower --refine, or share the solve: mpiexec -n 4 iga-nn solve ... --mpi"
             raise InputError(f"refine {level}: the memory does not suffice; {remedy}") from None
         log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
         yield solution
-        if equation.form.components == 1:
-            solver["start"] = solution
+        if problem.form.components == 1:
+            options = replace(options, start=solution)
 
 
 @contextmanager
@@ -121,7 +128,7 @@ def _write_cells(state: RunFolder, solution: Solution) -> None:
 
 
 def _draw(
-    state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], equation: Equation, units: Units
+    state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], problem: BoundaryValueProblem, units: Units
 ) -> None:
     """Draw the solution, its error where the exact one is known, and then the convergence if there are several levels.
 
@@ -130,17 +137,17 @@ def _draw(
     if not all(np.all(np.isfinite(solution.coefficients)) for solution in solutions):
         return
     known: dict[str, Any] = {"volume": volume, "solution": solutions[-1], "units": units}
-    if equation.exact is not None:
-        known["problem"] = equation
+    if problem.exact is not None:
+        known["problem"] = problem
         if len(solutions) > 1:
             rows = [ConvergenceRow(solution.report, None, None) for solution in solutions]
             known["levels"] = {max(solutions[-1].degrees): rows}
-    if equation.conditions:
-        known["conditions"] = (equation.placed(UnitFrame.of(volume)) if equation.is_scaled else equation).conditions
+    if problem.conditions:
+        known["conditions"] = (problem.placed(UnitFrame.of(volume)) if problem.is_scaled else problem).conditions
     state.draw("solution", **known)
 
 
-def regions_of(equation: Equation, report: SolveReport) -> list[dict[str, Any]]:
+def regions_of(problem: BoundaryValueProblem, report: SolveReport) -> list[dict[str, Any]]:
     """Return the conditions of a problem for a report: the kind, the region and the data as text, and the area.
 
     Of whole faces of the cube the area is not told.
@@ -149,7 +156,7 @@ def regions_of(equation: Equation, report: SolveReport) -> list[dict[str, Any]]:
     return [
         {"kind": condition.kind, "region": str(condition.region), "data": _as_text(condition)}
         | ({"area": areas[condition.role]} if condition.role in areas else {})
-        for condition in equation.conditions
+        for condition in problem.conditions
     ]
 
 
@@ -173,10 +180,10 @@ def _joined(data: Any, free: Sequence[bool] = ()) -> str:
     return f"{data:.12g}" if isinstance(data, float) else str(data)
 
 
-def described(equation: Equation, volume: BSplineVolume) -> dict[str, Any]:
+def described(problem: BoundaryValueProblem, volume: BSplineVolume) -> dict[str, Any]:
     """Return what the report says of a problem beside the options: the exact solution, and the meaning of X, Y, Z."""
-    given: dict[str, Any] = {"exact": equation.exact} if isinstance(equation.exact, str) else {}
-    return given | ({"frame": UnitFrame.of(volume).as_dict()} if equation.is_scaled else {})
+    given: dict[str, Any] = {"exact": problem.exact} if isinstance(problem.exact, str) else {}
+    return given | ({"frame": UnitFrame.of(volume).as_dict()} if problem.is_scaled else {})
 
 
 def notices_of(found: Iterable[SolveReport]) -> list[str]:

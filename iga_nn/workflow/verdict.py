@@ -41,15 +41,15 @@ def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, comma
     tell(state)
 
 
-def tell(state: RunFolder, options: MapOptions | None = None) -> None:
+def tell(state: RunFolder, mapping: MapOptions | None = None) -> None:
     """Log the verdict of the report; where the map is not certified, add what to try to the report.
 
-    options: those the map was made with, where they are known.
+    mapping: those the map was made with, where they are known.
     """
     quality = state.report["parameterization"]
     log.info("certificate: %s", quality["bijective"])
     if meeting := quality["boundary_meeting"]:  # not one-to-one, although perhaps nowhere folded
         place = in_brackets(meeting["point"])
         log.warning("the volume overlaps itself: its boundary passes through %s twice", place)
-    if remedies := advice.what_to_try(state.report, options):
+    if remedies := advice.what_to_try(state.report, mapping):
         state.write(advice=remedies)

@@ -15,12 +15,12 @@ from ..arrays import Array, IntArray, in_brackets
 from ..cube.cube import VARYING_AXES
 from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
-from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, settled
+from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, is_proved
 
 Point = tuple[float, float, float]
 
-_MOST_PAIRS = 50_000, 10  # in all, and for each patch in addition: more are not looked at
-_TRIED = 64  # pairs a level from which a common point is searched for
+_MOST_PAIRS = 50_000, 10  # pairs in all, and further ones for each patch: for more no proof is tried
+_TRIED = 64  # pairs at a level, from each of which a common point is searched for
 _NEWTON_STEPS = 12
 _DISTINCT = 1e3  # times their errors the two parameters of a meeting must differ
 
@@ -39,9 +39,10 @@ class Meeting:
 
 @dataclass(frozen=True)
 class BoundaryCheck:
-    """injective: True where proved, False where `meeting` was found (to rounding), None where neither.
+    """Whether a boundary is injective, and a point where it is not.
 
-    undecided: pairs of patches left without a proof.
+    injective: True where proved, False where `meeting` was found (up to rounding), None where neither succeeded.
+    undecided: the number of pairs of patches left without a proof.
     """
 
     injective: bool | None
@@ -67,8 +68,8 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 24) -> BoundaryChe
     pairs = np.concatenate([own, overlapping_boxes(points.min(axis=1) - error, points.max(axis=1) + error)])
     most = _MOST_PAIRS[0] + _MOST_PAIRS[1] * len(own)
     for depth in range(max_depth + 1):
-        hopeless = len(pairs) > most  # then only a common point is searched for
-        pairs = pairs if hopeless else pairs[~settled(pieces, pairs, error)]
+        hopeless = len(pairs) > most  # only a common point is searched for then
+        pairs = pairs if hopeless else pairs[~is_proved(pieces, pairs, error)]
         if not len(pairs):
             return BoundaryCheck(True, None, 0)
         met = _search(local, pieces, pairs, error)
@@ -84,7 +85,7 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 24) -> BoundaryChe
 def _local(volume: BSplineVolume) -> BSplineVolume:
     """Return the volume with its middle moved to the origin, and scaled by a power of two to magnitude 1.
 
-    That is one rounding for each coordinate, relative to the difference from the middle, however far away that is.
+    Each coordinate is rounded once, relative to its difference from the middle, however far away the middle is.
     """
     points = volume.control_points
     moved = points - (points.min(axis=(0, 1, 2)) + points.max(axis=(0, 1, 2))) / 2.0

@@ -13,11 +13,11 @@ from ..spline.bspline import breakpoints
 from ..spline.volume import BSplineVolume
 from ..threads import in_parallel
 
-CHUNK = 64  # spans at a time: what they need fits into the cache
+CHUNK = 64  # spans at a time: their data fit into the cache
 
 _UNIT_ROUNDOFF = 2.0**-53
 _UNDERFLOW = 1e-280  # more than a coefficient can lose to underflow (_roundings)
-_NO_EXPONENT = -10_000  # of an entry of J that is zero everywhere: below those of all others
+_NO_EXPONENT = -10_000  # stands for an entry of J that is zero everywhere: below all other exponents
 
 
 class DeterminantForm:
@@ -122,7 +122,7 @@ def _times(matrices: Array, field: Array) -> Array:
 
 
 def corners_of(values: Array, first: int = 0) -> Array:
-    """Return the coefficients that are values at corners, (..., 2, 2, 2, ...), of the three axes from `first` on."""
+    """Return the coefficients at the eight corners of the three axes from `first` on: (..., 2, 2, 2, ...)."""
     steps = (slice(None, None, n - 1) for n in values.shape[first : first + 3])
     return np.asarray(values[(slice(None),) * first + tuple(steps)])
 

@@ -1,6 +1,6 @@
 """Certificate: a proof that det J of a trivariate spline is positive on the whole cube, or a point where it is not.
 
-Of a left-handed volume, whose det J is negative on the whole, the proof is that of its mirror image: -det J > 0.
+For a left-handed volume, whose det J is negative on the whole, the mirror image is examined: -det J > 0.
 
 The Bernstein coefficients of det J bound it on every span, those at its corners are values (docs/method.md, section 6;
 Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys. 233, 2013, section
@@ -27,7 +27,7 @@ _TIGHT = 0.5  # a proved bound below this share of the least known value of det 
 
 @dataclass(frozen=True)
 class Certificate(Shown):
-    """What is known about the sign of det J.
+    """The sign of det J on the whole cube, as far as it is known.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Certificate(Shown):
 
     @property
     def claim(self) -> str:
-        """Return what the verdict is about: "det J > 0", of a left-handed volume "det J < 0"."""
+        """Return the claim that the verdict decides: "det J > 0", or "det J < 0" for a left-handed volume."""
         return CLAIMS[self.orientation]
 
 
@@ -88,7 +88,7 @@ def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
     Raises
     ------
     TypeError
-        For what is not a volume.
+        For an object that is not a BSplineVolume.
     ValueError
         For a negative depth, or where derivatives overflow.
 
@@ -159,21 +159,22 @@ class _Pieces:
 class _Search:
     """Depth-first subdivision of doubtful spans, each until it is proved, or folded, or a part of it is given up.
 
-    Depth-first bounds the memory, at most 9 * _PIECES pieces a level, and the time that a hopeless span takes.
+    The order, depth first, bounds the memory, at most 9 * _PIECES pieces a level, and the time that a hopeless span
+    takes.
     """
 
     def __init__(self, form: DeterminantForm, max_depth: int, known: float) -> None:
         self.form = form
         self.max_depth = max_depth
         self.known = known  # least value of det J seen
-        self.lowest = np.inf  # least bound of det J over the pieces done with
+        self.lowest = np.inf  # least bound of det J over the finished pieces
         self.unproved = np.zeros(form.span_count, dtype=bool)
-        self.closed = np.zeros(form.span_count, dtype=bool)  # folded or given up: not to be looked at further
+        self.closed = np.zeros(form.span_count, dtype=bool)  # folded or given up: not examined further
         self.deepest = 0.0  # det J at the worst fold
         self.worst_piece: tuple[int, int, IntArray, IntArray] | None = None  # depth, span, origin (3,), corner (3,)
 
     def examine(self, spans: IntArray) -> None:
-        """Look at whole spans (k,), flat numbers, until each is proved, folded or given up."""
+        """Examine whole spans (k,), flat numbers, until each is proved, folded or given up."""
         values, permanents = self.form.coefficients(self.form.numbers(spans))
         whole = np.ascontiguousarray(np.moveaxis(values, -1, 0))
         stack = [_Pieces(0, spans, np.zeros((len(spans), 3), dtype=np.int64), whole, permanents)]
@@ -182,7 +183,7 @@ class _Search:
             if len(top.spans) > _PIECES:
                 stack.append(top.subset(slice(_PIECES, None)))
                 top = top.subset(slice(_PIECES))
-            doubtful = self._settle(top)
+            doubtful = self._conclude(top)
             if len(doubtful.spans):
                 stack.append(doubtful.halved())
 
@@ -191,8 +192,8 @@ class _Search:
         """Return the bound of det J above which a proof is tight enough."""
         return max(0.0, _TIGHT * self.known)
 
-    def _settle(self, pieces: _Pieces) -> _Pieces:
-        """Draw the conclusions that can be drawn; return the pieces to be cut."""
+    def _conclude(self, pieces: _Pieces) -> _Pieces:
+        """Record which pieces are proved, folded or given up; return the doubtful ones, which are cut next."""
         errors = self.form.errors(pieces.permanents, pieces.depth)
         least = pieces.values.min(axis=(1, 2, 3))
         bounds = least - errors

@@ -21,8 +21,8 @@ from ..spline.volume import BSplineVolume
 
 _CHUNK = 4096  # pairs at a time
 _NEWTON_STEPS = 40  # towards a separating plane
-_REACH = 2.0  # no step changes a product by more
-_MARGIN = 0.5  # a product that is enough
+_REACH = 2.0  # largest change of a product in a step
+_MARGIN = 0.5  # least product at which the search ends
 _LIFT = 1e-14  # of the shares' sum, onto a Hessian's diagonal: the vectors may all lie in one plane
 
 
@@ -71,7 +71,7 @@ def _face_pieces(volume: BSplineVolume, axis: int, side: int, degree: int) -> tu
 
 
 def halved(pieces: Pieces, pairs: IntArray) -> tuple[Pieces, IntArray]:
-    """Return the pieces that the pairs (k, 2) name, as four each, and the pairs of those."""
+    """Return the pieces of the pairs (k, 2), each cut in four, and all pairs of the parts."""
     used, compact = np.unique(pairs, return_inverse=True)
     q = pieces.nets.shape[1] - 1
     halves = halving(q)
@@ -87,7 +87,7 @@ def halved(pieces: Pieces, pairs: IntArray) -> tuple[Pieces, IntArray]:
 
 
 def contact(pieces: Pieces, first: IntArray, second: IntArray) -> tuple[Mask, IntArray]:
-    """Return whether pieces touch in the cube, and the dimension of what they share."""
+    """Return the mask (k,) of pairs that touch in the cube, and the dimension (k,) of their common part."""
     low = np.maximum(pieces.low[first], pieces.low[second])
     high = np.minimum(pieces.high[first], pieces.high[second])
     return np.all(low <= high, axis=1), np.sum(low < high, axis=1)
@@ -98,14 +98,14 @@ def as_rows(nets: Array) -> Array:
     return nets.reshape(len(nets), nets.shape[1] * nets.shape[2], 3)
 
 
-def settled(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
-    """Return for each pair (k, 2) whether it is proved that the two meet only where they are joined."""
+def is_proved(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
+    """Return the mask (k,) of the pairs (k, 2) that are proved to meet only where they are joined."""
     done = np.zeros(len(pairs), dtype=bool)
     for start in range(0, len(pairs), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         first, second = pairs[chunk].T
         touching, shared = contact(pieces, first, second)
-        for kind, proof in enumerate((_corner_proof, _edge_proof, _own_proof)):  # what is shared: a point, an edge, all
+        for kind, proof in enumerate((_corner_proof, _edge_proof, _own_proof)):  # in common: a point, an edge, all
             rows = np.flatnonzero(touching & (shared == kind))
             done[start + rows] = proof(pieces, first[rows], second[rows], error)
         rows = np.flatnonzero(~touching)
@@ -120,7 +120,7 @@ def _own_proof(pieces: Pieces, piece: IntArray, _: IntArray, error: float) -> Ma
 
 
 def _edge_proof(pieces: Pieces, first: IntArray, second: IntArray, error: float) -> Mask:
-    """Return where two pieces with a common edge, unfolded side by side into one rectangle, are monotone together.
+    """Return the mask of pairs with a common edge that are monotone together, unfolded side by side into a rectangle.
 
     Axis 1 of the nets leads from the first over the edge into the second, axis 2 along the edge.
     """
@@ -154,7 +154,7 @@ def _turned(pieces: Pieces, rows: IntArray, along: IntArray, edge: IntArray, edg
 
 
 def _corner_proof(pieces: Pieces, first: IntArray, second: IntArray, error: float) -> Mask:
-    """Return where all vectors from the first to the corner, and from it into the second, have a common direction."""
+    """Return where all vectors to the corner, and from it into the second piece, have a common direction."""
     corner = np.maximum(pieces.low[first], pieces.low[second])
     before, behind = (_corner_last(pieces, part, corner) for part in (first, second))
     vectors = np.concatenate([before[:, -1:] - before[:, :-1], behind[:, :-1] - behind[:, -1:]], axis=1)
@@ -227,9 +227,9 @@ def _apart(a: Array, b: Array, error: float) -> Mask:
 
 
 def _half_space(vectors: Array) -> Array:
-    """Return x (n, d) with positive products x . v with all vectors v (n, k, d), where such a one is found.
+    """Return x (n, d) with positive products x . v with all vectors v (n, k, d), where such x is found.
 
-    Newton's method on the sum of exp(-x . v / |v|), which does not mind how thin the cone of such x is.
+    Newton's method minimises the sum of exp(-x . v / |v|), however thin the cone of such x is.
     """
     lengths = np.linalg.norm(vectors, axis=2, keepdims=True)
     units = vectors / np.maximum(lengths, np.finfo(np.float64).tiny)

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
-from ..config import LAYOUT, LayoutConfig
 from ..display import Brief
 from ..files import load_arrays, save_arrays
 from ..spline.bspline import real_array
@@ -19,6 +18,13 @@ from .cutting import CutMesh, cut_along_rays
 from .flips import orientation, untangle_whole
 
 PART = ("part_faces", "group_names", "group_sizes", "group_faces")  # arrays of boundary.npz that older files lack
+_SAME = 1e-7  # share of an edge's length: a cut this close to a vertex takes the vertex
+_NUDGE = 1e-4  # by which vertices move where a mesh edge runs through a corner of the cube
+_NUDGES = 10  # at most
+_FITTING_STEPS = 8  # Gauss-Newton steps of the cut vertices along their edges, at most
+_FITTING_DAMPING = 1e-3  # of these steps, against parallel directions
+_END_MARGIN = 1e-2  # share of its mesh edge that a cut keeps from either end
+_UNDO_ROUNDS = 10  # in which such a step is undone at flipped triangles, before all of it is
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,7 +89,7 @@ class BoundaryMap(Brief):
 
     @cached_property
     def part(self) -> PartSurface:
-        """Return the surface as it was before it was cut, with its groups; as it was cut where that is unknown."""
+        """Return the surface before it was cut, with its groups; where a file lacks it, the cut surface."""
         faces = self.faces if self.part_faces is None else self.part_faces
         return PartSurface(self.vertices[: faces.max(initial=-1) + 1], faces, self.groups)
 
@@ -117,7 +123,7 @@ class BoundaryMap(Brief):
 
     @classmethod
     def load(cls, path: str | Path) -> "BoundaryMap":
-        """Read boundary.npz. Raises FileNotFoundError, or ValueError naming what is wrong with the file."""
+        """Read boundary.npz. Raises FileNotFoundError, or ValueError that names the defect of the file."""
         data = load_arrays(path, ("vertices", "parameters", "faces"), PART)
         places = data["vertices"], data["parameters"], data["faces"]
         try:
@@ -130,10 +136,10 @@ class BoundaryMap(Brief):
 
 
 def read_part(path: str | Path) -> PartSurface:
-    """Read from boundary.npz the surface that a run was made of, with its groups.
+    """Read the surface of a run, with its groups, from boundary.npz.
 
-    A file written before it held these gives the surface as it was cut along the cube's edges. Raises
-    FileNotFoundError, or ValueError naming what is wrong with the file.
+    Older files give the surface cut along the cube's edges, without groups. Raises FileNotFoundError, or ValueError
+    that names the defect of the file.
     """
     return BoundaryMap.load(path).part
 
@@ -161,66 +167,61 @@ def _on_faces(parameters: Array) -> Mask:
     return np.stack([parameters == 0.0, parameters == 1.0], axis=-1).reshape(-1, len(FACE_NAMES))
 
 
-def boundary_map(
-    volume: BSplineVolume, vertices: Array, faces: IntArray, parameters: Array, layout: LayoutConfig = LAYOUT
-) -> BoundaryMap:
-    """Cut the surface (vertices (n, 3), user's units) where its parameters (n, 3) pass an edge of the cube.
+def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parameters: Array) -> BoundaryMap:
+    """Return the map of a surface (vertices (n, 3), user's units) that is cut where it crosses the cube's edges.
 
-    Parameters come from closest points of the volume's boundary, which may turn a few triangles over where the spline
-    smooths a detail away; those are laid out anew first. Cut vertices follow the input's vertices.
+    parameters (n, 3): closest points of the volume's boundary. Where the spline smooths a detail away they may flip a
+    few triangles, which are untangled first. The cut vertices follow the input's, and are fitted to the volume.
     """
-    placed = untangle_whole(parameters, faces, layout)
-    for number in range(layout.nudges):
-        cut = cut_along_rays(placed, faces, layout.same)
+    placed = untangle_whole(parameters, faces)
+    for number in range(_NUDGES):
+        cut = cut_along_rays(placed, faces, _SAME)
         spread = snap(cut.carry(placed))
         spread[: len(placed)] = placed
         plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)
         turned = plain.flipped()
         if not len(turned):
             break
-        placed = _nudged(placed, cut, turned, number, layout.nudge)
-    closer = plain  # then each cut vertex slides along its mesh edge, its parameter along the cube's, to meet F
-    for _ in range(layout.settle_steps):
-        share, moved = _settled_once(volume, cut, closer, len(vertices), layout)
-        cut, closer = _without_flips(vertices, cut, closer, share, moved, layout.undo_rounds)
+        placed = _nudged(placed, cut, turned, number)
+    closer = plain  # each cut vertex then slides along its mesh edge, and its parameter along the cube's, to meet F
+    for _ in range(_FITTING_STEPS):
+        share, moved = _fitted_once(volume, cut, closer, len(vertices))
+        cut, closer = _without_flips(vertices, cut, closer, share, moved)
     return plain if len(closer.flipped()) > len(plain.flipped()) else closer
 
 
-def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int, nudge: float) -> Array:
-    """Shift the vertices (n, 3) around degenerate pieces a little: a mesh edge ran through a corner of the cube."""
+def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int) -> Array:
+    """Shift the vertices (n, 3) around degenerate triangles a little: a mesh edge ran through a corner of the cube."""
     corners = np.unique(cut.faces[turned])
     around = np.unique(np.concatenate([corners[corners < len(placed)], cut.parents[corners].ravel()]))
     around = around[around < len(placed)]
     moved = placed.copy()
-    moved[around] += nudge * np.random.default_rng(number).uniform(-1.0, 1.0, (len(around), 3))
+    moved[around] += _NUDGE * np.random.default_rng(number).uniform(-1.0, 1.0, (len(around), 3))
     return snap(moved)
 
 
-def _settled_once(
-    volume: BSplineVolume, cut: CutMesh, best: BoundaryMap, count: int, layout: LayoutConfig
-) -> tuple[Array, Array]:
+def _fitted_once(volume: BSplineVolume, cut: CutMesh, best: BoundaryMap, count: int) -> tuple[Array, Array]:
     """Return shares (n,) and parameters (n, 3) after a Gauss-Newton step in these two unknowns of each cut vertex.
 
     The first `count` vertices are those of the input. Corners of the cube and cuts within a face keep their parameter.
     """
     where, new = best.parameters[count:], best.vertices[count:]
     inner = (where > 0.0) & (where < 1.0)  # (k, 3)
-    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; ends of cuts within a face stay
+    inner &= inner.sum(axis=1, keepdims=True) == 1  # the cube edge's direction; cut vertices within a face stay
     start, end = best.vertices[cut.parents[count:].T]
     along_cube = np.einsum("kab,kb->ka", volume.jacobian(where), inner.astype(float))
-    shift, slide = damped_fit(end - start, -along_cube, volume(where) - new, layout.settle_damping)
+    shift, slide = damped_fit(end - start, -along_cube, volume(where) - new, _FITTING_DAMPING)
     share, moved = cut.share.copy(), best.parameters.copy()
-    margin = layout.settle_margin
-    share[count:] = np.clip(share[count:] + shift, margin, 1.0 - margin)
-    moved[count:] = np.where(inner, np.clip(where + slide[:, None], margin**2, 1.0 - margin**2), where)
+    share[count:] = np.clip(share[count:] + shift, _END_MARGIN, 1.0 - _END_MARGIN)
+    moved[count:] = np.where(inner, np.clip(where + slide[:, None], _END_MARGIN**2, 1.0 - _END_MARGIN**2), where)
     return share, moved
 
 
 def _without_flips(
-    vertices: Array, cut: CutMesh, best: BoundaryMap, share: Array, moved: Array, rounds: int
+    vertices: Array, cut: CutMesh, best: BoundaryMap, share: Array, moved: Array
 ) -> tuple[CutMesh, BoundaryMap]:
     """Undo the steps to `share` and `moved` at flipped triangles; return the old cuts and map if some stay flipped."""
-    for _ in range(rounds):
+    for _ in range(_UNDO_ROUNDS):
         trial = replace(cut, share=share)
         candidate = BoundaryMap(trial.carry(vertices), moved, cut.faces)
         turned = np.setdiff1d(cut.faces[candidate.flipped()].ravel(), np.arange(len(vertices)))

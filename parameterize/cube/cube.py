@@ -33,14 +33,14 @@ def tangent_axes(axis: Any) -> tuple[Any, Any]:
 
 
 def nearest_faces(places: Array) -> IntArray:
-    """Return the number of the face that each place (n, 3) lies on, or one of several on an edge: (n,)."""
+    """Return the number of the cube's face at each place (n, 3), on an edge that of one of its faces: (n,)."""
     centred = places - 0.5
     axis = np.abs(centred).argmax(axis=1)
     return np.asarray(face_number(axis, centred[np.arange(len(axis)), axis] > 0.0))
 
 
 def project_radially(centred: Array) -> Array:
-    """Project points (n, 3) onto the cube's boundary along rays from its centre; both are counted from the centre."""
+    """Return points (n, 3) projected onto the cube's boundary along rays from its centre, the origin of both."""
     return np.asarray(centred / (2.0 * np.abs(centred).max(axis=1, keepdims=True)))
 
 
@@ -54,7 +54,7 @@ def snap(parameters: Array) -> Array:
 def damped_fit(first: Array, second: Array, right: Array, damping: float) -> tuple[Array, Array]:
     """Return the coefficients a, b (k,) that minimise |a first + b second - right|, for vectors (k, 3).
 
-    That is the linear system in every Gauss-Newton step on a face towards a closest point.
+    Every Gauss-Newton step on a face towards a closest point solves this linear system.
     The diagonal of the normal equations grows by `damping` times its sum: the two directions may be parallel. The
     vectors are first scaled by a power of two, exactly, so that nothing overflows whatever their unit.
     """
@@ -69,7 +69,7 @@ def damped_fit(first: Array, second: Array, right: Array, damping: float) -> tup
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def damped_solution(aa: Any, bb: Any, ab: Any, ra: Any, rb: Any, damping: float) -> tuple[Any, Any]:
     """Return the coefficients of `damped_fit` from the products of two vectors with each other and the right side."""
-    lift = damping * (aa + bb) + 1e-150  # no more than keeps the determinant of two zero vectors positive
+    lift = damping * (aa + bb) + 1e-150  # the last term keeps the determinant of two zero vectors positive
     aa, bb = aa + lift, bb + lift
     determinant = aa * bb - ab * ab
     return (bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant

@@ -12,17 +12,18 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..surface.geometry import edge_table
+from .layout import CubeLayout
 
+NEAR_VERTEX = 0.1  # share of an edge's length: a crossing this close to a vertex takes the vertex and leaves no sliver
+_COARSENING = 1.25  # factor of the longest edge each time a mesh would get too many points
 _PLANES = [(a, b, sign) for a, b in ((0, 1), (0, 2), (1, 2)) for sign in (1.0, -1.0)]
-_PIECES = (
-    np.array(  # of a triangle 0, 1, 2 with 0 to 3 new vertices: 3 on 0-1, 4 on 1-2, 5 on 2-0; of two, on 0-1 and 2-0
-        [
-            [(0, 1, 2), (0, 0, 0), (0, 0, 0), (0, 0, 0)],  # one more piece than new vertices; the rest is not read
-            [(0, 3, 2), (3, 1, 2), (0, 0, 0), (0, 0, 0)],
-            [(0, 3, 5), (3, 1, 2), (3, 2, 5), (0, 0, 0)],
-            [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
-        ]
-    )
+_PIECES = np.array(  # pieces of a triangle 0, 1, 2 with new vertices 3 on side 0-1, 4 on 1-2, 5 on 2-0; two are 3 and 5
+    [
+        [(0, 1, 2), (0, 0, 0), (0, 0, 0), (0, 0, 0)],  # row k, of k new vertices, has k + 1 pieces; the rest is padding
+        [(0, 3, 2), (3, 1, 2), (0, 0, 0), (0, 0, 0)],
+        [(0, 3, 5), (3, 1, 2), (3, 2, 5), (0, 0, 0)],
+        [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
+    ]
 )
 
 
@@ -48,8 +49,12 @@ class CutMesh:
             result[i] = (1.0 - self.share[i]) * result[a] + self.share[i] * result[b]
         return result
 
+    def laid_out(self, layout: CubeLayout) -> CubeLayout:
+        """Return the layout of the input with this mesh's triangles, its points and places at all vertices."""
+        return CubeLayout(self.carry(layout.points), self.faces, self.carry(layout.places), layout.n_own)
 
-def cut_along_rays(mapped: Array, faces: IntArray, snap: float) -> CutMesh:
+
+def cut_along_rays(mapped: Array, faces: IntArray, snap: float = NEAR_VERTEX) -> CutMesh:
     """Split the mesh (mapped vertices (n, 3), faces (m, 3)) along the six planes of the cube's edges.
 
     A crossing closer than `snap` (share of the edge's length) to an end takes that vertex instead of a new one.
@@ -74,8 +79,8 @@ def subdivide_long_edges(
 ) -> tuple[Array, IntArray] | None:
     """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface the same.
 
-    vertices: (n, 3), or with further columns, which are interpolated as well. None where that takes more than `most`
-    vertices: of long slivers it may take millions.
+    vertices: (n, 3), or with further columns, which are interpolated as well. Returns None where this takes more than
+    `most` vertices: long slivers may take millions.
     """
     while True:
         edges = edge_table(faces)[0]
@@ -90,21 +95,22 @@ def subdivide_long_edges(
 
 
 def subdivide_finely(vertices: Array, faces: IntArray, longest: float, most: int) -> tuple[Array, IntArray]:
-    """Cut edges that are longer than `longest`; less finely where that gives more than `most` points.
+    """Halve edges longer than `longest`, a limit that grows until there are at most `most` points.
 
-    vertices: (n, 3), or with further columns, which are interpolated as well. The given vertices stay, however many.
+    vertices: (n, 3), or with further columns, which are interpolated as well. All given vertices stay, even if they are
+    more than `most`.
     """
     while True:
         found = subdivide_long_edges(vertices, faces, longest, max(most, len(vertices)))
         if found is not None:
             return found
-        longest *= 1.25
+        longest *= _COARSENING
 
 
 def _crossings(
     height: Array, position: Array, faces: IntArray, axes: tuple[int, int, int], snap: float
 ) -> tuple[IntArray, Array]:
-    """Return the mesh edges (k, 2) to split, of triangles that a cube edge's half plane crosses, and the places (k,).
+    """Return the mesh edges (k, 2) that a cube edge's half plane splits, and the shares (k,) of their lengths there.
 
     A triangle meets the plane in a segment. It is left whole only where that segment stays beyond one of the cube's
     corners; so, after all planes, no half plane passes through the inside of a triangle.

@@ -15,14 +15,16 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
 
 from ..arrays import Array, IntArray, Mask
-from ..config import LAYOUT, LayoutConfig
 from ..surface.geometry import connected, directed_edges, edge_table, edge_triangles
 from .cube import CORNERS, EDGES, axis_and_side, face_number, project_radially, tangent_axes
-from .cutting import CutMesh, cut_along_rays, split_edges
-from .flips import Layout
+from .cutting import cut_along_rays, split_edges
+from .layout import CubeLayout
 
-_FLAT = 1e-12  # area of a triangle on the square that counts as turned over
-_TINY = 1e-12
+_STRAY = 20.0  # extra cost of a path, relative to its length, at the distance _STRAY_DISTANCE from its cube edge
+_STRAY_DISTANCE = 0.05
+_ORDERS = 24  # orders in which the twelve paths are traced before the surface is given up: twice one for each path
+_FLAT = 1e-12  # doubled area on the square up to which a triangle counts as turned over
+_TINY = 1e-12  # least length, and least 1 + cosine and 1 - cosine, in half tangents
 
 
 class PathError(RuntimeError):
@@ -33,45 +35,43 @@ class PathError(RuntimeError):
 class CubeSurface:
     """The surface, cut along the 12 paths.
 
-    cut: the refined mesh; corners (8,): vertices on the cube's corners; paths: 12 vertex sequences between corners, in
-    the order of EDGES; face_labels (m,): the cube face (u0, u1, v0, v1, w0, w1) of each triangle.
+    layout: the refined mesh; paths: 12 vertex sequences between the corners, in the order of EDGES; face_labels (m,):
+    the cube face (u0, u1, v0, v1, w0, w1) of each triangle.
     """
 
-    cut: CutMesh
-    corners: IntArray
+    layout: CubeLayout
     paths: list[IntArray]
     face_labels: IntArray
 
 
 def choose_corners(mapped: Array) -> IntArray:
-    """Return the vertices (8,) farthest towards the cube's corners, argmax <v - A, P - A>, all different."""
+    """Return eight different vertices, the farthest towards each of the cube's corners P: argmax <v - A, P - A>."""
     reach = (mapped - 0.5) @ (CORNERS - 0.5).T  # (n, 8)
     candidates = np.unique(np.argsort(-reach, axis=0)[:8])
     rows, columns = linear_sum_assignment(-reach[candidates])
     return candidates[rows[np.argsort(columns)]]
 
 
-def cut_surface(mapped: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig = LAYOUT) -> CubeSurface:
-    """Cut the mapped surface (n, 3), close to the cube's boundary, along paths between its eight corners.
+def cut_surface(layout: CubeLayout, corners: IntArray) -> CubeSurface:
+    """Cut a surface whose places are close to the cube's boundary along paths between its corners, vertices (8,).
 
     Raises PathError where the paths do not bound six discs, which happens only far from a cube, or where the corners
     come in the order of a mirrored cube.
     """
-    cut = cut_along_rays(mapped, faces, layout.path_snap)
-    position = cut.carry(mapped)
-    paths = _trace_paths(position, cut.faces, corners, layout)
+    cut = cut_along_rays(layout.places, layout.faces).laid_out(layout)
+    paths = _trace_paths(cut.places, cut.faces, corners)
     labels = _patches(cut.faces, paths, corners)
     left = np.flatnonzero((directed_edges(cut.faces) == paths[0][:2]).all(axis=1))[0] // 3
     if labels[left] != 0:  # u0 lies to the left of the path from (0,0,0) to (0,0,1), seen from outside
         raise PathError("the corners are those of a mirrored cube: swap corners 0-3 with 4-7, or let them be chosen")
-    return CubeSurface(cut, corners, paths, labels)
+    return CubeSurface(cut, paths, labels)
 
 
-def _trace_paths(position: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig) -> list[IntArray]:
-    """Return disjoint paths along mesh edges, one for each cube edge; one that is blocked is traced first next time."""
+def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
+    """Return disjoint paths along mesh edges, one for each cube edge; a blocked one comes first in the next order."""
     order = list(range(len(EDGES)))
-    for _ in range(layout.orders):
-        paths, blocked = _trace_in_order(position, faces, corners, order, layout)
+    for _ in range(_ORDERS):
+        paths, blocked = _trace_in_order(position, faces, corners, order)
         if blocked is None:
             return [paths[k] for k in range(len(EDGES))]
         order.remove(blocked)
@@ -81,9 +81,9 @@ def _trace_paths(position: Array, faces: IntArray, corners: IntArray, layout: La
 
 
 def _trace_in_order(
-    position: Array, faces: IntArray, corners: IntArray, order: list[int], layout: LayoutConfig
+    position: Array, faces: IntArray, corners: IntArray, order: list[int]
 ) -> tuple[dict[int, IntArray], int | None]:
-    """Return the shortest paths, which cost more away from their cube edge, and the first edge that found no way."""
+    """Return the cheapest paths by edge number, and the first blocked one; ways off the cube edge cost more."""
     edges = edge_table(faces)[0]
     length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
     radial = 0.5 + project_radially(position - 0.5)
@@ -96,7 +96,7 @@ def _trace_in_order(
         usable[corners[[i, j]]] = True
         keep = usable[edges].all(axis=1)
         stray = _distance_to_segment(radial, CORNERS[i], CORNERS[j])[edges[keep]].max(axis=1)
-        cost = (length[keep] + 1e-9) * (1.0 + layout.stray * stray / layout.stray_cell)
+        cost = (length[keep] + 1e-9) * (1.0 + _STRAY * stray / _STRAY_DISTANCE)
         a, b = edges[keep].T
         graph = coo_array((cost, (a, b)), shape=(len(position),) * 2).tocsr()
         _, previous = dijkstra(graph, directed=False, indices=corners[i], return_predecessors=True)
@@ -147,30 +147,34 @@ def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array,
     return np.concatenate(paths), np.concatenate(targets), np.stack([starts, starts + 1], axis=1)
 
 
-def lay_out(
-    mapped: Array, vertices: Array, faces: IntArray, corners: IntArray, layout: LayoutConfig = LAYOUT
-) -> Layout:
-    """Cut the surface (n, 3) along the paths that the mapped one (n, 3) suggests; lay its patches out on the cube."""
-    surface = cut_surface(mapped, faces, corners, layout)
-    vertices, places = surface.cut.carry(vertices), surface.cut.carry(mapped)
+def lay_out(layout: CubeLayout, corners: IntArray) -> CubeLayout:
+    """Return a layout without a flipped triangle: the surface is cut along paths, its patches spread on the cube.
+
+    layout: its places are close to the cube's boundary, and may be tangled. corners: (8,) vertices. Raises PathError
+    as `cut_surface` does.
+    """
+    surface = cut_surface(layout, corners)
+    points, places = surface.layout.points, surface.layout.places
     path, target, _ = edge_targets(places, surface.paths)
     places[path] = target
     fixed = np.zeros(len(places), dtype=bool)
     fixed[path] = True
     pieces = []
     for face in range(6):
-        patch = surface.cut.faces[surface.face_labels == face]
+        patch = surface.layout.faces[surface.face_labels == face]
         edges, count = edge_table(patch)
-        bridges = edges[(count == 2) & fixed[edges].all(axis=1)]  # inner edges: a triangle of them could end up flat
-        patch = split_edges(patch, bridges, len(vertices))
-        vertices, places = (np.concatenate([x, x[bridges].mean(axis=1)]) for x in (vertices, places))
+        bridges = edges[
+            (count == 2) & fixed[edges].all(axis=1)
+        ]  # inner edges between fixed points: a triangle of three would be flat
+        patch = split_edges(patch, bridges, len(points))
+        points, places = (np.concatenate([x, x[bridges].mean(axis=1)]) for x in (points, places))
         fixed = np.concatenate([fixed, np.zeros(len(bridges), dtype=bool)])
-        _spread(places, vertices, patch, fixed, face)
+        _spread(places, points, patch, fixed, face)
         pieces.append(patch)
-    return Layout(vertices, np.concatenate(pieces), places)
+    return CubeLayout(points, np.concatenate(pieces), places, layout.n_own)
 
 
-def _spread(places: Array, vertices: Array, patch: IntArray, fixed: Mask, face: int) -> None:
+def _spread(places: Array, points: Array, patch: IntArray, fixed: Mask, face: int) -> None:
     """Put the inner vertices of a patch (m, 3) on their cube face, in place."""
     axis, end = axis_and_side(face)
     plane = tangent_axes(axis)[:: 1 if end else -1]  # counter-clockwise seen from outside
@@ -178,14 +182,14 @@ def _spread(places: Array, vertices: Array, patch: IntArray, fixed: Mask, face: 
     triangles = triangles.reshape(-1, 3)
     flat = places[used][:, plane]
     inner = ~fixed[used]
-    weights = _combinations(flat, vertices[used], triangles)
+    weights = _combinations(flat, points[used], triangles)
     matrix = eye_array(int(inner.sum()), format="csc") - weights[inner][:, inner].tocsc()
     flat[inner] = splu(matrix).solve(weights[inner][:, ~inner] @ flat[~inner])
     places[used[inner][:, None], plane] = flat[inner]
     places[used[inner], axis] = end
 
 
-def _combinations(flat: Array, vertices: Array, triangles: IntArray) -> csr_array:
+def _combinations(flat: Array, points: Array, triangles: IntArray) -> csr_array:
     """Return the mean value coordinates of each vertex, (n, n): the weights of its neighbours, which sum to 1.
 
     They are computed from the places (n, 2) where the triangles around the vertex do not overlap there, and otherwise
@@ -197,7 +201,7 @@ def _combinations(flat: Array, vertices: Array, triangles: IntArray) -> csr_arra
     rows, columns, values = [], [], []
     for k in range(3):
         here, *ends = (triangles[:, (k + shift) % 3] for shift in range(3))
-        of_places, of_surface = (_half_tangents(points, here, *ends) for points in (flat, vertices))
+        of_places, of_surface = (_half_tangents(x, here, *ends) for x in (flat, points))
         for end, by_places, by_surface in zip(ends, of_places, of_surface, strict=True):
             rows.append(here)
             columns.append(end)

@@ -1,28 +1,18 @@
-"""Layout of a closed surface on the boundary of the cube: places of its points, orientation of its triangles."""
-
-from dataclasses import dataclass
+"""Flipped triangles of a surface laid out on the cube: how they are found, prevented and turned back."""
 
 import numba
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
-from ..config import LAYOUT, LayoutConfig
 from .cube import snap
 
 _ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 _FLAT = 1e-13  # orientation of a triangle that counts as flipped
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Surface points (n, 3), those of the mesh first, triangles (m, 3) between them, and where the points go (n, 3).
-
-    places: on the boundary of the cube; on the unit sphere around the origin as long as sphere.py and turning.py work.
-    """
-
-    vertices: Array
-    faces: IntArray
-    places: Array
+_SWEEPS = 600  # of `untangle`, at most
+_PATIENCE = 60  # sweeps of `untangle` after which one more ring of neighbours may move
+_PUSHES = 100  # sweeps of `unflip`, at most
+_PUSHED_VOLUME = 1e-2  # of a triangle that `unflip` has turned outwards, as a share of the median triangle's
+_HOLDING_ROUNDS = 20  # of `new_flips`, at most: each holds more points
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -45,14 +35,14 @@ def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
 
 
 def flipped(places: Array, faces: IntArray) -> Mask:
-    """Return which triangles (m, 3) do not face outwards, with a margin for what later steps round: (m,)."""
+    """Return the mask (m,) of triangles (m, 3) that do not face outwards, with a margin for later rounding errors."""
     return np.asarray(orientation(places, faces)[0] <= _FLAT)
 
 
-def new_flips(before: Array, after: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) -> Mask:
-    """Return which points (n,) must stay so that no further triangle flips when the others go to `after`."""
+def new_flips(before: Array, after: Array, faces: IntArray) -> Mask:
+    """Return the mask (n,) of points that must stay so that no further triangle flips when the others go to `after`."""
     stay, allowed = np.zeros(len(before), dtype=bool), flipped(before, faces)
-    for _ in range(layout.held_rounds):
+    for _ in range(_HOLDING_ROUNDS):
         bad = flipped(np.where(stay[:, None], before, after), faces) & ~allowed
         if not bad.any():
             return stay
@@ -60,17 +50,17 @@ def new_flips(before: Array, after: Array, faces: IntArray, layout: LayoutConfig
     return np.ones(len(before), dtype=bool)
 
 
-def unflip(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) -> Array:
-    """Push the corners of flipped triangles by as little as turns each outwards, sweep by sweep; some may be left.
+def unflip(parameters: Array, faces: IntArray) -> Array:
+    """Turn flipped triangles outwards by the least moves of their corners, sweep by sweep; some may stay flipped.
 
-    For a few flips in a layout whose points should stay where they are: `untangle` flattens whole neighbourhoods. Seen
+    It suits a few flips in a layout whose points should stay: `untangle` flattens whole neighbourhoods. Seen
     from the centre, the volume under a triangle is linear in each corner, so one Newton step a triangle is taken, and
     the mean of these at every corner.
     """
     direction = _directions(parameters)
     volumes = np.abs(np.linalg.det(direction[faces]))
-    goal = layout.unflipped * float(np.median(volumes))
-    for _ in range(layout.pushes):
+    goal = _PUSHED_VOLUME * float(np.median(volumes))
+    for _ in range(_PUSHES):
         bad = flipped(0.5 + direction, faces)
         if not bad.any():
             break
@@ -88,22 +78,22 @@ def unflip(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) ->
     return snap(0.5 + direction)
 
 
-def untangle(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) -> Array:
-    """Relax the vertices around flipped triangles until none is left, moving as few and as little as possible.
+def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
+    """Return the parameters (n, 3) after relaxation of the vertices around flipped triangles, until none is left.
 
     A relaxed vertex goes half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
-    are flipped at the time move; where they stay so, rings of neighbours join, one after every `patience` sweeps. After
-    all sweeps some may be left.
+    are flipped at the time move; where triangles stay flipped, one more ring of neighbours joins after every _PATIENCE
+    sweeps. After all `sweeps` some flips may be left.
     """
     i, j = faces.ravel(), faces[:, [1, 2, 0]].ravel()  # closed surface: both directions appear
     direction = _directions(parameters)
-    for sweep in range(layout.sweeps):
+    for sweep in range(sweeps):
         bad = flipped(0.5 + direction, faces)
         if not bad.any():
             break
         free = np.zeros(len(parameters), dtype=bool)
         free[faces[bad].ravel()] = True
-        for _ in range(sweep // layout.patience):
+        for _ in range(sweep // _PATIENCE):
             free[i[free[j]]] = True
         used = free[i]
         total = np.stack([np.bincount(i[used], direction[j[used], c], len(free)) for c in range(3)], axis=1)[free]
@@ -112,12 +102,12 @@ def untangle(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) 
     return snap(0.5 + direction)
 
 
-def untangle_whole(parameters: Array, faces: IntArray, layout: LayoutConfig = LAYOUT) -> Array:
-    """Untangle, or return the parameters as they are where flips would be left.
+def untangle_whole(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
+    """Return the untangled parameters (n, 3), or the given ones where flips would be left.
 
-    Rings of neighbours that join round after round spread what cannot be untangled over a whole limb of the surface.
+    Ring after ring of neighbours joins, so a flip that cannot be undone would disturb a whole limb of the surface.
     """
-    untangled = untangle(parameters, faces, layout)
+    untangled = untangle(parameters, faces, sweeps)
     return parameters if flipped(untangled, faces).any() else untangled
 
 

@@ -2,8 +2,8 @@
 
 The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
 sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
-one-to-one but badly squeezed: a long arm shrinks exponentially with its length. Where it does, the mesh edges along it
-get more weight: those of a cone, on which such a layout is even, up to its tip. From there Newton's method lowers the
+one-to-one but badly squeezed: a long arm shrinks exponentially with its length. There the mesh edges along the arm get
+the larger weights of a cone's edges, whose layout is even up to the tip. From there Newton's method lowers the
 symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has no
 area left: no step turns a triangle over.
 """
@@ -19,42 +19,49 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import eigsh, splu
 
 from ..arrays import Array, IntArray, Mask
-from ..config import LayoutConfig
 from ..progress import Progress, ProgressCallback, ignore
 from ..surface.geometry import doubled_areas, edge_table
 from .cutting import split_edges
-from .flips import Layout
+from .layout import CubeLayout
 
 _Weigh = Callable[[Array, Array, Mask], Array]
 
 _SHIFT = -1e-6  # below all eigenvalues of the Laplacian, so that it can be factorised
-_THIN = 1e-6  # area of a triangle, and length of an edge, that counts at least, as a share of the mean
-_LEAST_ROOM = 1e-40  # of a triangle on the sphere, as a share of its area: powers of less leave the numbers' range
-_SHORTEST_STEP = 1e-10
+_THIN = 1e-6  # least area of a triangle and least length of an edge, as shares of the means
+_LEAST_ROOM = 1e-40  # least area of a triangle on the sphere, as a share of its own: powers of less would overflow
+_LEAST_SHARE = 0.25  # of a divided edge's length, from its new vertex to either end
+_SQUEEZED = 1e8  # energy of the first layout above which others are tried; that of a relaxed layout is some 50
+_AWAY = 10.0  # extra weight of edges pointing away from the rim, in the second layout
+_POWERS = (2, 4, 8, 16, 32, 64)  # in the next layouts: the higher, the less edges that lead aside count
+_ONE_WAY_POWERS = (4, 16)  # in the last layouts, where a point is pulled by neighbours nearer to the rim alone
+_STEPS = 300  # Newton steps, at most
+_USUAL_STEPS = 30  # Newton steps of most surfaces, from which the time left is estimated
+_DAMPING = 1e-8  # of a Newton step, as a share of the mean diagonal entry
+_LEAST_GAIN = 1e-3  # share of the energy: the steps end once one of them gains less
+_SHORTEST_STEP = 1e-10  # share of a Newton step
+_ARMIJO = 1e-4  # share of the decrease that the slope promises which a step must reach
 
 
-def lay_on_sphere(
-    vertices: Array, faces: IntArray, layout: LayoutConfig, progress: ProgressCallback = ignore
-) -> Layout:
+def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback = ignore) -> CubeLayout:
     """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
 
-    Where the two discs divide a mesh edge, that edge gets a vertex, after those of the mesh. `progress` is told of each
-    Newton step: the stage is "layout", the loss the energy.
+    Every mesh edge that the line between the two discs crosses gets a vertex, after those of the mesh. `progress` is
+    called after each Newton step, with the stage "layout" and the energy as the loss.
     """
-    vertices, faces, upper = _halves(vertices, faces, layout.least_share)
-    triangles = _Triangles(vertices, faces)
-    directions = _hemispheres(vertices, faces, upper, lambda straight, *_: np.ones(len(straight)))
-    for weigh in _for_long_arms(layout):
-        if triangles.energy(directions) <= layout.squeezed:
+    points, faces, upper = _halves(vertices, faces)
+    triangles = _Triangles(points, faces)
+    directions = _hemispheres(points, faces, upper, lambda straight, *_: np.ones(len(straight)))
+    for weigh in _for_long_arms():
+        if triangles.energy(directions) <= _SQUEEZED:
             break
-        directions = min(directions, _hemispheres(vertices, faces, upper, weigh), key=triangles.energy)
-    return Layout(vertices, faces, _relaxed(directions, triangles, layout, progress))
+        directions = min(directions, _hemispheres(points, faces, upper, weigh), key=triangles.energy)
+    return CubeLayout(points, faces, _relaxed(directions, triangles, progress), len(vertices))
 
 
-def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntArray, Mask]:
-    """Split edges where the lowest vibration vanishes; return points, triangles, and which of these lie above.
+def _halves(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Mask]:
+    """Split edges where the lowest vibration vanishes; return points, triangles and the mask of the upper triangles.
 
-    Only how the mesh hangs together counts: new vertices keep the share `least` of an edge from its ends.
+    The exact places of the new vertices do not matter: they keep _LEAST_SHARE of an edge from its ends.
     """
     edges, _ = edge_table(faces)
     links = _links(edges, 1.0 / _lengths(vertices, edges), len(vertices))
@@ -63,33 +70,34 @@ def _halves(vertices: Array, faces: IntArray, least: float) -> tuple[Array, IntA
     height = np.where(modes[:, 1] == 0.0, np.finfo(np.float64).tiny, modes[:, 1])
     cut = edges[height[edges[:, 0]] * height[edges[:, 1]] < 0.0]
     start, end = height[cut].T
-    share = np.clip(start / (start - end), least, 1.0 - least)[:, None]
+    share = np.clip(start / (start - end), _LEAST_SHARE, 1.0 - _LEAST_SHARE)[:, None]
     points = np.concatenate([vertices, (1.0 - share) * vertices[cut[:, 0]] + share * vertices[cut[:, 1]]])
     faces = split_edges(faces, cut, len(vertices))
     return points, faces, np.concatenate([height, np.zeros(len(cut))])[faces].sum(axis=1) > 0.0
 
 
-def _for_long_arms(layout: LayoutConfig) -> Iterator[_Weigh]:
-    """Yield weights of mesh edges, see `_hemispheres`, that shrink a long arm less; which suits depends on the mesh.
+def _for_long_arms() -> Iterator[_Weigh]:
+    """Yield weights of mesh edges, see `_hemispheres`, that shrink a long arm less; the best ones depend on the mesh.
 
-    Where each ring of points around an arm is to be nearer to the middle than the last by the same amount, the edges
-    along it weigh as much as on a cone: as the square of how far away its tip is, in lengths of the edge. Edges that
-    lead aside would mix what lies on different sides of the arm, so these count the less, the higher the power. Mixed
-    least is what follows the points nearer to the rim alone.
+    Rings of points around an arm come out evenly spaced where the edges along it weigh as on a cone: the square of the
+    distance to its tip, in lengths of the edge. Edges that lead aside would mix points from different sides of the arm;
+    the higher the power, the less they count. The last weights mix least: each point follows only neighbours nearer to
+    the rim.
     """
-    yield lambda straight, *_: 1.0 + layout.along * straight
-    for power in layout.sharpness:
+    yield lambda straight, *_: 1.0 + _AWAY * straight
+    for power in _POWERS:
         yield lambda straight, left, _, p=power: 1.0 + straight**p * left**2  # type: ignore[misc]
-    for power in layout.one_way:
+    for power in _ONE_WAY_POWERS:
         yield lambda straight, left, outwards, p=power: 1.0 + straight**p * left * outwards  # type: ignore[misc]
 
 
 def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -> Array:
     """Return directions (n, 3) of points (n, 3) whose triangles above and below go to the two hemispheres.
 
-    The common rim goes to the equator by its length. Every other point is a mean of its neighbours in the disc. `weigh`
-    is told of each mesh edge how straight it leads towards the rim, or away from it, 0 to 1; how far the point farthest
-    from the rim is, in lengths of the edge; and whether the neighbour is nearer to the rim than the point it pulls.
+    The common rim goes to the equator by arc length; every other point is a weighted mean of its neighbours in the
+    disc. `weigh` returns the weights of mesh edges from three arrays (e,): the squared cosine of the edge's angle to
+    the way to the rim; the distance to the point farthest from the rim, in lengths of the edge; and whether the pulling
+    neighbour is nearer to the rim than the pulled point.
     """
     rim = np.asarray(igl.boundary_loop(faces[upper]), dtype=np.int64)
     length = np.linalg.norm(vertices[np.roll(rim, -1)] - vertices[rim], axis=1)
@@ -115,7 +123,7 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -
 
 
 def _lengths(vertices: Array, edges: IntArray) -> Array:
-    """Return the lengths (e,) of edges (e, 2), none of them too short to divide by."""
+    """Return the lengths (e,) of edges (e, 2), at least the share _THIN of their mean."""
     length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
     return np.asarray(np.maximum(length, _THIN * length.mean()))
 
@@ -123,7 +131,8 @@ def _lengths(vertices: Array, edges: IntArray) -> Array:
 def _links(edges: IntArray, weights: Array, count: int) -> csr_array:
     """Return the weights of edges (e, 2) between `count` points as a matrix.
 
-    weights: (e,) for a symmetric one; else (2 e,), those of the second ends for the first ones and then the others.
+    weights: (e,) for a symmetric one; else (2 e,), the pulls of second ends on first ends, then those of first ends on
+    second ends.
     """
     i, j = np.concatenate([edges, edges[:, ::-1]]).T
     return csr_array(coo_array((np.resize(weights, len(i)), (i, j)), shape=(count, count)))
@@ -163,15 +172,16 @@ class _Triangles:
     def energies(self, directions: Array) -> Array:
         """Return the energy of each triangle (m,).
 
-        It is infinite where a triangle is turned over, seen from the sphere's centre, or too small for the numbers.
+        It is infinite where a triangle is turned over, seen from the sphere's centre, or too small for double
+        precision.
         """
         corners = directions[self.faces]
         area = 0.5 * _volumes(corners)
-        sides = corners - corners[:, :1]  # tiny triangles would be lost in the rounding of their corners
+        sides = corners - corners[:, :1]  # else tiny triangles are lost in the rounding of their corners
         dirichlet = np.einsum("mij,mic,mjc->m", self._stiffness, sides, sides)
-        told_apart = area > _LEAST_ROOM * self._area
-        squeezed = np.divide(self._area, area, out=np.ones(len(area)), where=told_apart)
-        return np.where(told_apart, dirichlet * (1.0 + squeezed**2), np.inf)
+        regular = area > _LEAST_ROOM * self._area
+        squeezed = np.divide(self._area, area, out=np.ones(len(area)), where=regular)
+        return np.where(regular, dirichlet * (1.0 + squeezed**2), np.inf)
 
     def energy(self, directions: Array) -> float:
         """Return the energy of all triangles."""
@@ -182,9 +192,9 @@ class _Triangles:
         corners, count = directions[self.faces], len(self.faces)
         area = 0.5 * _volumes(corners)[:, None, None]
         sides = corners - corners[:, :1]
-        towards = 2.0 * self._stiffness @ sides  # of the Dirichlet energy (m, 3, 3)
+        towards = 2.0 * self._stiffness @ sides  # derivative of the Dirichlet energy (m, 3, 3)
         dirichlet = 0.5 * (towards * sides).sum(axis=(1, 2))[:, None, None]
-        wider = 0.5 * np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])  # of the area (m, 3, 3)
+        wider = 0.5 * np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])  # derivative of the area (m, 3, 3)
         square = self._area[:, None, None] ** 2
         factor, slope, bend = 1.0 + square / area**2, -2.0 * square / area**3, 6.0 * square / area**4
         gradient = factor * towards + slope * dirichlet * wider
@@ -215,39 +225,37 @@ def _area_bends(corners: Array) -> Array:
     return bends
 
 
-def _relaxed(
-    directions: Array, triangles: _Triangles, layout: LayoutConfig, progress: ProgressCallback = ignore
-) -> Array:
+def _relaxed(directions: Array, triangles: _Triangles, progress: ProgressCallback = ignore) -> Array:
     """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls.
 
-    Where the hemispheres squeeze triangles to less than the numbers can tell, the directions are returned as they are.
+    Directions with triangles too small for double precision are returned unchanged.
     """
     energy = triangles.energy(directions)
     unknowns = (2 * triangles.faces[:, :, None] + np.arange(2)).reshape(-1, 6)
     rows, columns = np.repeat(unknowns, 6, axis=1).ravel(), np.tile(unknowns, (1, 6)).ravel()
     size = 2 * len(directions)
-    for number in range(layout.sphere_steps if math.isfinite(energy) else 0):
+    for number in range(_STEPS if math.isfinite(energy) else 0):
         begun = time.perf_counter()
         tangents = _tangents(directions)
         slopes, hessians = triangles.derivatives(directions, tangents)
         slope = np.asarray(np.bincount(unknowns.ravel(), slopes.ravel(), size), dtype=np.float64)
         matrix = coo_array((hessians.ravel(), (rows, columns)), shape=(size, size)).tocsc()
-        damping = layout.sphere_damping * matrix.diagonal().mean()
+        damping = _DAMPING * matrix.diagonal().mean()
         step = _solved(csc_array(matrix + damping * eye_array(size)), -slope)
         move, length = np.einsum("nca,na->nc", tangents, step.reshape(-1, 2)), 1.0
         while length > _SHORTEST_STEP:
             trial = directions + length * move
             trial /= np.linalg.norm(trial, axis=1, keepdims=True)
             lower = triangles.energy(trial)
-            if lower <= energy + 1e-4 * length * float(slope @ step):
+            if lower <= energy + _ARMIJO * length * float(slope @ step):
                 break
             length *= 0.5
         else:
             break
         gain, directions, energy = energy - lower, trial, lower
-        left = max(layout.usual_sphere_steps - number, 1) * (time.perf_counter() - begun)
-        progress(Progress("layout", number + 1, layout.sphere_steps, energy, 0, left))
-        if gain < layout.sphere_gain * energy:
+        left = max(_USUAL_STEPS - number, 1) * (time.perf_counter() - begun)
+        progress(Progress("layout", number + 1, _STEPS, energy, 0, left))
+        if gain < _LEAST_GAIN * energy:
             break
     return directions
 

@@ -10,75 +10,84 @@ from scipy.optimize import fmin
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Array
-from ..config import LayoutConfig
 from ..surface.geometry import doubled_areas, edge_triangles
 from ..threads import in_parallel
-from .flips import Layout
+from .layout import CubeLayout
+
+_TURNS = 200  # rotations of the cube that are drawn at random
+_FINALISTS = 5  # the best of these, which are turned further
+_EVALUATIONS = 60  # of the cost while one rotation is turned further, at most
+_FIRST_TURN = 0.1  # radians: edges of the first simplex
+_OTHER_TURN = 0.3  # radians by which a turn differs from every better one to count as another
+_EDGE_WIDTH = 0.15  # from the cube's edges, within which the surface should not be hollow
+_PIECES = 24  # of each cube edge: a piece in a hollow is not made up for by ridges beside it
+_HOLLOW = 1.0  # extra weight of a piece in a hollow
 
 
-def best_turn(layout: Layout, options: LayoutConfig, generator: np.random.Generator, number: int = 0) -> Array:
-    """Return the rotation (3, 3) of a layout by which the cube's edges lie least in hollows; 1 is the next best, ...
+def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 0) -> Array:
+    """Return the rotation (3, 3) of a layout on the sphere that keeps the cube's edges best out of hollows.
 
-    The best of some random rotations are turned further by the simplex method of Nelder and Mead. Of these, turns that
-    nearly are the same count as one. Where that leaves too few, the next best rotations that differ from all follow.
+    number: 0 for the best rotation, 1 for the next best, and so on. The best of some random rotations are turned
+    further by the simplex method of Nelder and Mead; results that nearly agree count as one. Where too few are left,
+    the next best random rotations that differ from all of them follow.
     """
     middles, along, bends = _bends(layout)
-    simplex = options.turn_size * np.vstack([np.zeros(3), np.eye(3)])
+    simplex = _FIRST_TURN * np.vstack([np.zeros(3), np.eye(3)])
 
     def cost(rotation: Rotation) -> float:
         turn = rotation.as_matrix().T
-        return _hollowness(middles @ turn, along @ turn, bends, options)
+        return _hollowness(middles @ turn, along @ turn, bends)
 
     def turned_further(rotation: Rotation) -> tuple[float, Rotation]:
         def cost_after(vector: Array) -> float:
             return cost(Rotation.from_rotvec(vector) * rotation)
 
-        least = fmin(cost_after, simplex[0], initial_simplex=simplex, maxfun=options.turn_steps, disp=False)
+        least = fmin(cost_after, simplex[0], initial_simplex=simplex, maxfun=_EVALUATIONS, disp=False)
         return cost_after(least), Rotation.from_rotvec(least) * rotation
 
-    rotations = list(Rotation.random(options.turns, rng=generator))
+    rotations = list(Rotation.random(_TURNS, rng=generator))
     order = np.argsort(in_parallel(cost, rotations))
-    found = in_parallel(turned_further, [rotations[i] for i in order[: options.finals]])
+    found = in_parallel(turned_further, [rotations[i] for i in order[:_FINALISTS]])
     turns = list[Rotation]()
     for _, rotation in sorted(found, key=lambda pair: pair[0]):
-        if _is_other(rotation, turns, options):
+        if _is_other(rotation, turns):
             turns.append(rotation)
-    for i in order[options.finals :]:
+    for i in order[_FINALISTS:]:
         if number < len(turns):
             break
-        if _is_other(rotations[i], turns, options):
+        if _is_other(rotations[i], turns):
             _, rotation = turned_further(rotations[i])
-            if _is_other(rotation, turns, options):
+            if _is_other(rotation, turns):
                 turns.append(rotation)
     return np.asarray(turns[min(number, len(turns) - 1)].as_matrix())
 
 
-def hollowness(layout: Layout, options: LayoutConfig) -> float:
-    """Return how much the cube's edges lie in hollows of a layout, which `best_turn` makes small: below 0 on ridges."""
-    return _hollowness(*_bends(layout), options)
+def hollowness(layout: CubeLayout) -> float:
+    """Return the hollowness of a layout along the cube's edges, which `best_turn` minimises: negative on ridges."""
+    return _hollowness(*_bends(layout))
 
 
-def _is_other(rotation: Rotation, turns: list[Rotation], options: LayoutConfig) -> bool:
-    return all(_angle_between(rotation, turn) > options.other_turn for turn in turns)
+def _is_other(rotation: Rotation, turns: list[Rotation]) -> bool:
+    return all(_angle_between(rotation, turn) > _OTHER_TURN for turn in turns)
 
 
 def _angle_between(first: Rotation, second: Rotation) -> float:
-    """Return the angle by which two turns of the cube differ, which looks the same from 24 sides."""
+    """Return the angle between two turns of the cube, the least over its 24 symmetries."""
     return float((first * second.inv()).reduce(left=Rotation.create_group("O")).magnitude())
 
 
-def _bends(layout: Layout) -> tuple[Array, Array, Array]:
-    """Return of each mesh edge middle and direction on the sphere (e, 3), and how much the surface bends there (e,).
+def _bends(layout: CubeLayout) -> tuple[Array, Array, Array]:
+    """Return the mesh edges' middles and directions on the sphere, (e, 3) each, and the surface's bends there (e,).
 
-    That is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
+    A bend is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """
-    vertices, faces, places = layout.vertices, layout.faces, layout.places
+    points, faces, places = layout.points, layout.faces, layout.places
     edges, owners = edge_triangles(faces)
     here, there = owners.T
-    normals = doubled_areas(vertices, faces)
+    normals = doubled_areas(points, faces)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     angle = np.arccos(np.clip((normals[here] * normals[there]).sum(axis=1), -1.0, 1.0))
-    middle_there = vertices[faces[there]].mean(axis=1) - vertices[edges[:, 0]]
+    middle_there = points[faces[there]].mean(axis=1) - points[edges[:, 0]]
     hollow = np.where((middle_there * normals[here]).sum(axis=1) > 0.0, angle, -angle)
     step = places[edges[:, 1]] - places[edges[:, 0]]
     length = np.linalg.norm(step, axis=1)
@@ -86,13 +95,13 @@ def _bends(layout: Layout) -> tuple[Array, Array, Array]:
     return middles, step / np.maximum(length, 1e-300)[:, None], length * hollow
 
 
-def _hollowness(middles: Array, along: Array, bends: Array, options: LayoutConfig) -> float:
+def _hollowness(middles: Array, along: Array, bends: Array) -> float:
     """Return the sum of the bends (e,) near the cube's edges, weighed by nearness and direction.
 
-    Along a cube edge they are summed piece by piece; what is above zero counts more.
+    The bends are summed over pieces of each cube edge; a positive sum, a hollow, counts more.
     """
-    pieces = _bends_of_pieces(middles, along, bends, options.edge_width, options.edge_pieces)
-    return float(pieces.sum() + options.hollow * np.maximum(pieces, 0.0).sum())
+    pieces = _bends_of_pieces(middles, along, bends, _EDGE_WIDTH, _PIECES)
+    return float(pieces.sum() + _HOLLOW * np.maximum(pieces, 0.0).sum())
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

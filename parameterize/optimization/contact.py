@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Floats, IntArray
-from ..quality.distances import SampledBoundary
+from ..spline.sampled_boundary import SampledBoundary
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_normals
 from .operators import ControlRows, PiecewiseOperator

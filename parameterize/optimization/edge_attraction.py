@@ -11,8 +11,8 @@ import numpy as np
 
 from ..arrays import Array, Knots
 from ..cube.cube import CORNERS, EDGES
-from ..quality.distances import nearest_on_mesh
 from ..spline.bspline import divided_spans
+from ..surface.nearest import nearest_on_mesh
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
 from .surface_distance import TANGENTIAL, SurfaceFit

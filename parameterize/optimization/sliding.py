@@ -6,14 +6,12 @@ boundary error and distortion together.
 """
 
 from copy import copy
-from dataclasses import replace
 from functools import cached_property
 
 import numba
 import numpy as np
 
 from ..arrays import Array, IntArray, Knots, Mask
-from ..config import LAYOUT, LayoutConfig
 from ..cube.cube import damped_solution, nearest_faces
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints
@@ -39,10 +37,9 @@ class SlidingParameters:
         degree: int,
         parameters: Array,
         triangles: IntArray = _NO_TRIANGLES,
-        layout: LayoutConfig = LAYOUT,
     ) -> None:
         self.knots, self.degree = knots, degree
-        self.triangles, self.layout = triangles, layout
+        self.triangles = triangles
         self.place(parameters, nearest_faces(parameters))
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
@@ -53,7 +50,7 @@ class SlidingParameters:
 
     def on_knots(self, knots: Knots) -> "SlidingParameters":
         """Return the same parameters for a spline with other knots."""
-        other = SlidingParameters(knots, self.degree, self.parameters, self.triangles, self.layout)
+        other = SlidingParameters(knots, self.degree, self.parameters, self.triangles)
         other.place(self.parameters, self.cube_faces)
         return other
 
@@ -100,14 +97,14 @@ class SlidingParameters:
         """Shorten steps from `parameters` towards `goal` until no further triangle flips."""
         share = np.where((self.parameters == parameters).all(axis=1), 0.0, 1.0)
         for _ in range(_HALVINGS):
-            blocked = new_flips(parameters, self.parameters, self.triangles, self.layout)
+            blocked = new_flips(parameters, self.parameters, self.triangles)
             if not blocked.any():
                 break
             share[blocked] *= 0.5
             self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
-        self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles, self.layout))
+        self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
 
-    def settled(self, control: Array, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
+    def at_closest_points(self, control: Array, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
         """Return the parameters where F's boundary is closest to their points (N, 3), as far as no triangle flips.
 
         They slide `slides` times; triangles that this flips are relaxed in at most so many sweeps; then they slide as
@@ -117,18 +114,18 @@ class SlidingParameters:
         for _ in range(slides):
             other.slide(control, points, longest)
         other.unflip()
-        other._move(untangle_whole(other.parameters, self.triangles, replace(self.layout, sweeps=sweeps)))
+        other._move(untangle_whole(other.parameters, self.triangles, sweeps))
         for _ in range(slides):
             other.slide(control, points, longest, keep_layout=True)
         return other
 
     def relax(self, sweeps: int) -> None:
         """Untangle flipped triangles in a few sweeps, so that what sliding tangles does not pile up."""
-        self._move(untangle(self.parameters, self.triangles, replace(self.layout, sweeps=sweeps)))
+        self._move(untangle(self.parameters, self.triangles, sweeps))
 
     def unflip(self) -> None:
         """Turn flipped triangles outwards by moving their own points alone, and those by little."""
-        self._move(unflip(self.parameters, self.triangles, self.layout))
+        self._move(unflip(self.parameters, self.triangles))
 
     def _move(self, places: Array) -> None:
         moved = np.abs(places - self.parameters).max(axis=1) > 1e-9

@@ -54,7 +54,7 @@ class QualityReport(Shown):
     certificate : Certificate
         Whether det J > 0 on the whole cube, its lower bound, the witness of a fold.
     boundary_check : BoundaryCheck
-        Whether the six boundary surfaces do not meet but at their common edges, and where they do.
+        Whether the six boundary surfaces meet only at their common edges, and a point where they meet elsewhere.
     arap : BothScales of Distortion
         Mean and max of the sum of (sigma_i - 1)^2, the smallest sigma signed with det J, over `arap_points` Gauss
         points.
@@ -143,7 +143,7 @@ class QualityReport(Shown):
 def proved(
     shape: tuple[int, int, int], degrees: tuple[int, int, int], certificate: Certificate, check: BoundaryCheck
 ) -> dict[str, Any]:
-    """Return what the section says of a volume that was certified, and not measured."""
+    """Return the section's entries for a volume that was certified, but not measured."""
     bound = certificate.lower_bound
     return {
         "control_points": list(shape),
@@ -170,7 +170,7 @@ def measure(
     certificate: Certificate,
     boundary_check: BoundaryCheck,
 ) -> QualityReport:
-    """Measure a volume against the mesh it came from, and return that with what is proved of the volume.
+    """Measure a volume against the mesh it came from; return the measures together with its certificate.
 
     volume, surface_vertices (n, 3), surface_faces (m, 3) and boundary: all in the user's units. The boundary map starts
     with the surface's vertices, in their order.
@@ -179,7 +179,7 @@ def measure(
     Raises ValueError for a scale that is not positive or a boundary map of fewer vertices.
     """
     if not (isfinite(scale) and scale > 0.0):
-        raise ValueError(f"scale must be positive, got {scale}; Surface.scale is the one meant")
+        raise ValueError(f"scale must be positive, got {scale}; pass Surface.scale")
     vertices = np.asarray(surface_vertices, dtype=np.float64)
     faces = np.asarray(surface_faces, dtype=np.int64)
     n = len(vertices)
@@ -220,7 +220,8 @@ def arap_grid(
 ) -> tuple[tuple[Array, Array, Array], list[Array], Array]:
     """Return the ARAP distortion of scale * F, for each of the scales, at `n_gauss` Gauss points a direction and span.
 
-    That is the points of each axis, the values (m_u, m_v, m_w) a scale, and the weights of the integral over the cube.
+    Returns the points of each axis, the values (m_u, m_v, m_w) for each scale, and the weights of the integral over the
+    cube.
     """
     rules = [gauss_points(k, n_gauss) for k in volume.knots]
     u, v, w = (points.ravel() for points, _ in rules)

@@ -1,7 +1,7 @@
 """The distance between a surface and the boundary of a spline, both ways, at samples that cover all of the two.
 
-A mesh's vertices alone say nothing of what lies between them: a box has eight. So its triangles are cut until there are
-two samples a span of the spline's boundary at least, and the spline's spans are sampled likewise.
+The vertices of a mesh alone miss the faces between them: a box has eight vertices. So its triangles are cut until every
+span of the spline's boundary has at least two samples a direction, and the spline's spans are sampled, too.
 """
 
 from dataclasses import dataclass
@@ -11,13 +11,15 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..cube.cutting import subdivide_finely
 from ..spline.bspline import breakpoints
+from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import area_shares, doubled_areas
-from .distances import Distances, SampledBoundary, nearest_on_boundary, to_mesh
+from ..surface.nearest import distance_to_mesh
+from .distances import Distances, nearest_on_boundary
 
 _PER_SPAN = 2.0  # samples on the mesh a direction, where spans have the mean area
-_LEAST_SAMPLES = 4_000  # some, also of a spline of few spans; halving edges gives two to four times as many
-_MOST_SAMPLES = 100_000  # on the mesh, where it has not more vertices itself
+_LEAST_SAMPLES = 4_000  # about, also for a spline of few spans; halving edges gives two to four times as many
+_MOST_SAMPLES = 100_000  # on the mesh, unless it has more vertices itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +53,10 @@ class TwoSided:
 
 
 def two_sided(volume: BSplineVolume, vertices: Array, faces: IntArray) -> TwoSided:
-    """Measure between a closed mesh (vertices (n, 3), faces (m, 3)) and the spline's boundary, in their unit of length.
+    """Measure the distances between a closed mesh (vertices (n, 3), faces (m, 3)) and the spline's boundary.
 
-    The largest distance is one at samples, so it may fall short of the largest of all, the Hausdorff distance.
+    They have the unit of length of both. The largest one is that at the samples, so it may fall short of the Hausdorff
+    distance.
     """
     boundary = SampledBoundary.of(volume)
     points, triangles = subdivide_finely(vertices, faces, _spacing(volume, vertices, faces), _MOST_SAMPLES)
@@ -61,7 +64,7 @@ def two_sided(volume: BSplineVolume, vertices: Array, faces: IntArray) -> TwoSid
     return TwoSided(
         OneWay(distances, area_shares(points, triangles), parameters),
         OneWay(
-            to_mesh(boundary.points, vertices, faces),
+            distance_to_mesh(boundary.points, vertices, faces),
             area_shares(boundary.points, boundary.triangles),
             boundary.parameters,
         ),
@@ -69,7 +72,7 @@ def two_sided(volume: BSplineVolume, vertices: Array, faces: IntArray) -> TwoSid
 
 
 def _spacing(volume: BSplineVolume, vertices: Array, faces: IntArray) -> float:
-    """Return how long an edge between samples on the mesh may be."""
+    """Return the length above which edges between samples on the mesh are cut."""
     u, v, w = (len(breakpoints(row)) - 1 for row in volume.knots)
     area = float(np.linalg.norm(doubled_areas(vertices, faces), axis=1).sum()) / 2.0
     cells = max(_PER_SPAN**2 * 2 * (u * v + v * w + w * u), _LEAST_SAMPLES)

@@ -14,7 +14,7 @@ from ..arrays import Array, IntArray
 
 
 def extraction(knots: Array, degree: int) -> tuple[IntArray, Array]:
-    """Return what turns the spline's coefficients into the Bernstein coefficients of every span.
+    """Return the weights that turn a spline's coefficients into the Bernstein coefficients of every span.
 
     Returns `first` (n_spans,), the first B-spline coefficient that a span needs, and `weights`
     (n_spans, degree + 1, degree + 1): row j yields the j-th Bernstein coefficient, the blossom at degree - j times

@@ -21,7 +21,7 @@ from .volume import BSplineVolume
 
 CLOSE = 1e-10  # distance from x, over the diagonal of the box of control points, at which F(u, v, w) counts as x
 _STEPS = 20  # of Newton's method, at most
-_HALVINGS = 8  # of a step that does not lead closer
+_HALVINGS = 8  # of a step that does not lead closer, at most
 _EXACT = 1e-15  # distance over the diagonal at which nothing is left to gain
 _LEVELS = 120  # of branch and bound, at most
 _VISITS = 20_000  # parts looked at for a point, at most: a bound for maps that fold
@@ -92,7 +92,7 @@ class _Index:
     def parameters(self, points: Array) -> Array:
         """Return the parameters (m, 3) of points (m, 3), NaN outside."""
         within = np.all((points >= self.low.min(axis=0)) & (points <= self.high.max(axis=0)), axis=1)
-        found = np.full((len(points), 3), np.nan)  # outside of the box there is nothing to look for
+        found = np.full((len(points), 3), np.nan)  # points outside of the box are outside of the volume
         found[within] = self._parameters(points[within])
         return found
 

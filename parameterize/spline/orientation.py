@@ -1,7 +1,7 @@
 """The orientation of a volume: whether its parameter lines u, v, w form a right-handed or a left-handed system.
 
-It follows from the volume that the six faces enclose, by the divergence theorem: no point inside is asked, and a fold
-somewhere does not change it.
+It follows from the volume that the six faces enclose, by the divergence theorem: no point inside is evaluated, and a
+fold somewhere does not change it.
 """
 
 from collections.abc import Sequence
@@ -19,8 +19,8 @@ FACES = tuple(product(range(3), (0, 1)))  # axis and side
 def face_vectors(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Array, Array]:
     """Return points on a face, and normals as long as the surface element: (3, q_b, q_c) each.
 
-    rows: parameters of a tensor grid in the cube, of which that of `axis` is not read. The normals point outward on a
-    right-handed volume, inward on a left-handed one.
+    rows: the three rows of parameters of a tensor grid in the cube; the row of `axis` is not read. The normals point
+    outward on a right-handed volume, inward on a left-handed one.
     """
     u, v, w = (np.array([float(side)]) if a == axis else row for a, row in enumerate(rows))
     points = np.moveaxis(np.squeeze(volume.grid(u, v, w), axis), -1, 0)

@@ -35,9 +35,10 @@ LARGEST = 1e100  # coordinate: determinants of larger ones leave double precisio
 
 
 def checked_knots(degrees: Sequence[int], knots: Sequence[ArrayLike], counts: Sequence[int], what: str) -> Knots:
-    """Return the three knot vectors as float arrays; `counts` are the numbers of functions, which errors call `what`.
+    """Return the three knot vectors as float arrays.
 
-    Raises ValueError where one is not open from 0 to 1, or does not fit its degree and count.
+    counts: the numbers of basis functions. what: their name in errors. Raises ValueError where one is not open from 0
+    to 1, or does not fit its degree and count.
     """
     checked = []
     for axis, degree, row, n in zip(AXES, degrees, knots, counts, strict=True):
@@ -258,7 +259,7 @@ class BSplineVolume(Brief, Shown):
 
     @classmethod
     def load(cls, path: str | Path) -> "BSplineVolume":
-        """Read volume.npz. Raises FileNotFoundError, or ValueError naming what is wrong with the file."""
+        """Read volume.npz. Raises FileNotFoundError, or ValueError that names the defect of the file."""
         degrees, knots, points = load_spline(path, "control_points")
         try:
             return cls(degrees, knots, points)
@@ -267,6 +268,6 @@ class BSplineVolume(Brief, Shown):
 
 
 def demand_volume(volume: object) -> None:
-    """Raise TypeError for what is not a BSplineVolume."""
+    """Raise TypeError for an object that is not a BSplineVolume."""
     if not isinstance(volume, BSplineVolume):
         raise TypeError(f"volume must be a BSplineVolume, got {type(volume).__name__}")

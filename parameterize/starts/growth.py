@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from ..arrays import Knots
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
-from ..cube.flips import Layout
+from ..cube.layout import CubeLayout
 from ..optimization.endings import Reason
 from ..optimization.phases import Phase, Polish, Schedule, Separate, Unfold
 from ..optimization.state import State
@@ -66,7 +66,7 @@ class Growth(Start):
         with timed(task.seconds, "fit"), one_blas_thread():
             layout = surface_on_cube(task, self.turn)
             fit = task.fit(layout, _COARSE)
-            first = first_cube(layout, task.own, fit.places.knots, fit.places.degree)
+            first = first_cube(layout, fit.places.knots, fit.places.degree)
         return optimized(first, fit, self.schedule(task.config), task, checkpoints, self.weights)
 
     @property
@@ -95,9 +95,9 @@ STIFF = Growth(
 LAST = replace(STIFF, name="last growth", doing="growing a stiffer map, farther from the surface,", turn=2, far=0.05)
 
 
-def first_cube(layout: Layout, own: int, knots: Knots, degree: int) -> SplineMap:
+def first_cube(layout: CubeLayout, knots: Knots, degree: int) -> SplineMap:
     """Return the map onto the unit cube, turned so that it faces the surface as laid out."""
-    weights = vertex_weights(layout.vertices, layout.faces, own)
-    rotation, _ = Rotation.align_vectors(layout.vertices - 0.5, layout.places - 0.5, weights)
+    weights = vertex_weights(layout.points, layout.faces, layout.n_own)
+    rotation, _ = Rotation.align_vectors(layout.points - 0.5, layout.places - 0.5, weights)
     points = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1) - 0.5
     return SplineMap.of(BSplineVolume((degree,) * 3, knots, 0.5 + points @ rotation.as_matrix().T))

@@ -1,13 +1,14 @@
 """The first start: the network is trained, F is fitted to its map, and optimised."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
 from ..cube.edge_paths import PathError, choose_corners, lay_out
-from ..cube.flips import Layout, flipped, untangle
+from ..cube.flips import flipped, untangle
+from ..cube.layout import CubeLayout
 from ..optimization.phases import RAMP, Polish, Schedule, Separate, Shape, Unfold
 from ..progress import timed
 from ..threads import one_blas_thread
@@ -66,18 +67,17 @@ def schedule(spline: SplineConfig) -> Schedule:
     return Schedule((Shape(RAMP), Unfold(RAMP), Separate(RAMP), Polish(RAMP)), spline.rounds, _USUAL_STEPS)
 
 
-def _layout(mapped: Array, corners: IntArray | None, task: Task) -> Layout:
+def _layout(mapped: Array, corners: IntArray | None, task: Task) -> CubeLayout:
     """Return nearest points on the cube, untangled; where that leaves flips, patches between traced edges.
 
     The first stays closer to the network's map, the second always succeeds where the edges can be traced.
     """
-    vertices, faces = task.mesh
-    nearest = nearest_places(mapped)
-    untangled = untangle(nearest, faces, task.config.layout)
-    if flipped(untangled, faces).mean() > _FEW_FLIPS:
+    layout = CubeLayout(*task.mesh, mapped, task.own)
+    untangled = untangle(nearest_places(mapped), layout.faces)
+    if flipped(untangled, layout.faces).mean() > _FEW_FLIPS:
         try:
             chosen = choose_corners(mapped) if corners is None else corners
-            return lay_out(mapped, vertices, faces, chosen, task.config.layout)
+            return lay_out(layout, chosen)
         except PathError as error:
             _log.warning("the first layout has flipped triangles: %s", error)
-    return Layout(vertices, faces, untangled)
+    return replace(layout, places=untangled)

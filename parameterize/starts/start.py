@@ -12,7 +12,7 @@ from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
 from ..config import Config
 from ..cube.cutting import subdivide_finely
-from ..cube.flips import Layout
+from ..cube.layout import CubeLayout
 from ..cube.sphere import lay_on_sphere
 from ..optimization.endings import Course
 from ..optimization.optimized import Optimized
@@ -63,24 +63,22 @@ class Task:
         return subdivide_finely(self.surface.unit_vertices, self.surface.faces, longest, self.own + MOST_POINTS)
 
     @cached_property
-    def sphere(self) -> Layout:
+    def sphere(self) -> CubeLayout:
         """The surface at volume 1, laid on the sphere."""
         surface = self.surface
-        return lay_on_sphere(surface.unit_vertices, surface.faces, self.config.layout, self.report["progress"])
+        return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"])
 
-    def fit(self, layout: Layout, coarse: float) -> SurfaceFit:
+    def fit(self, layout: CubeLayout, coarse: float) -> SurfaceFit:
         """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1).
 
         coarse: share of the spans a direction in the first rounds.
         """
         spline = self.config.spline
         return SurfaceFit(
-            SlidingParameters(
-                coarse_knots(spline, coarse), spline.degree, layout.places, layout.faces, self.config.layout
-            ),
-            layout.vertices,
-            vertex_quadrics(layout.vertices, layout.faces, TANGENTIAL),
-            vertex_weights(layout.vertices, layout.faces, self.own),
+            SlidingParameters(coarse_knots(spline, coarse), spline.degree, layout.places, layout.faces),
+            layout.points,
+            vertex_quadrics(layout.points, layout.faces, TANGENTIAL),
+            vertex_weights(layout.points, layout.faces, layout.n_own),
             given_corners=None if self.given_corners is None else self.mesh[0][self.given_corners],
         )
 

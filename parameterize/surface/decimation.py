@@ -14,8 +14,9 @@ from .surface import Surface, surface_from_arrays
 def decimate(surface: Surface, max_faces: int) -> Surface:
     """Return the surface with at most `max_faces` triangles, or itself where it has no more.
 
-    Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), none that makes triangles intersect. A
-    notice says the counts and the largest distance moved; `sha256` is that of the new arrays.
+    Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), except those whose collapse would make
+    triangles intersect. A notice has the counts and the largest distance moved; `sha256` is that of the new arrays.
+    Raises MeshError for a limit below 4, and where the surface cannot be brought below it.
     """
     check_face_limit(max_faces)
     before = len(surface.faces)
@@ -33,6 +34,6 @@ def decimate(surface: Surface, max_faces: int) -> Surface:
         smaller.vertices[smaller.faces].mean(axis=1), doubled_areas(smaller.vertices, smaller.faces)
     )
     groups = renumbered(surface.groups, old)
-    # Notices before this one are about the surface as it came, those after it about the surface as it is now.
+    # Notices before this one concern the given surface, those after it the decimated one.
     notices = (*surface.notices, notice, *smaller.notices)
     return replace(smaller, source=surface.source, notices=notices, groups=groups)

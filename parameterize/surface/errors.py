@@ -53,7 +53,7 @@ def check_finite(vertices: Array, faces: IntArray) -> None:
 
 
 def without_unused_defects(vertices: Array, faces: IntArray) -> tuple[Array, tuple[str, ...]]:
-    """Return vertices (n, 3) with zeros for those that no face uses and that have no valid place, and a notice."""
+    """Return vertices (n, 3) with zeros in place of invalid ones that no face uses, and a notice of these."""
     wrong = ~np.all(abs(vertices) <= LARGEST, axis=1)
     wrong[faces.ravel()] = False
     if not wrong.any():

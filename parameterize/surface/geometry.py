@@ -7,10 +7,10 @@ from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, IntArray
 
-CELLS = 16  # of `deepest_point`, along the box's longest side, to start with
-TOLERANCE = 1e-3  # of the depth
-MOST_CELLS = 4000  # kept a level; only sheets thinner than a hundredth of the box reach it
-LEVELS = 16
+CELLS = 16  # of `deepest_point` along the box's longest side, at the first level
+TOLERANCE = 1e-3  # share of the depth
+MOST_CELLS = 4000  # kept at a level; only sheets thinner than a hundredth of the box reach it
+LEVELS = 16  # of halving, at most
 
 
 def edge_table(faces: IntArray) -> tuple[IntArray, IntArray]:
@@ -48,8 +48,9 @@ def signed_volume(vertices: Array, faces: IntArray) -> float:
 def deepest_point(vertices: Array, faces: IntArray) -> tuple[Array, float]:
     """Return the interior point (3,) farthest from the surface, to a thousandth of its depth, and that depth.
 
-    Branch and bound over cells: the signed distance changes by no more than the way walked, so a cell whose centre's
-    depth plus half its diagonal falls short of the best depth found cannot hold the deepest point. Deterministic.
+    Branch and bound over cells: the signed distance changes by at most the distance between two points, so a cell whose
+    centre's depth plus half its diagonal falls short of the best depth found cannot hold the deepest point.
+    Deterministic.
     """
     tree, winding = igl.AABB(), igl.FastWindingNumberBVH()
     tree.init(vertices, faces)
@@ -84,7 +85,7 @@ def doubled_areas(vertices: Array, faces: IntArray) -> Array:
 
 
 def _summed(values: Array, faces: IntArray, count: int) -> Array:
-    """Return the sum at each of `count` vertices of the values (m, ...) of the triangles there."""
+    """Return the sums (count, ...) at the vertices of the values (m, ...) of the triangles around each."""
     sums = np.zeros((count, *values.shape[1:]))
     for k in range(3):
         np.add.at(sums, faces[:, k], values)
@@ -108,13 +109,13 @@ def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float) -> Arra
     return np.asarray(sums / np.maximum(total, 1e-300)[:, None, None] + tangential * np.eye(3))
 
 
-def vertex_weights(vertices: Array, faces: IntArray, own: int) -> Array:
-    """Return weights (n,) of the vertices, half by count, as the report counts, and half by area; their sum is 1.
+def vertex_weights(vertices: Array, faces: IntArray, n_own: int) -> Array:
+    """Return weights (n,) of the vertices whose sum is 1: half of each by count, as in the report, and half by area.
 
-    own: how many vertices count, the first ones; those that a subdivision added do not.
+    n_own: the number of the mesh's own vertices, which come first; vertices of cut edges do not count.
     """
-    counted = np.arange(len(vertices)) < own
-    return np.asarray(0.5 * counted / own + 0.5 * area_shares(vertices, faces))
+    counted = np.arange(len(vertices)) < n_own
+    return np.asarray(0.5 * counted / n_own + 0.5 * area_shares(vertices, faces))
 
 
 def area_shares(vertices: Array, faces: IntArray) -> Array:

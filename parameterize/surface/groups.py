@@ -1,7 +1,7 @@
 """Groups: named sets of the faces of a mesh, as files and meshes in memory give them.
 
-A group is a row of face numbers, ascending; a face may be in several groups, or in none. Wherever faces are numbered
-anew, `renumbered` takes the groups along.
+A group is a row of face numbers, ascending; a face may be in several groups, or in none. Wherever faces get new
+numbers, `renumbered` gives them to the groups, too.
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,13 +15,13 @@ from .errors import MeshError
 
 Groups = Mapping[str, IntArray]  # name: numbers of faces, ascending
 
-MOST_VALUES = 64  # an array of face data with more is no division into groups
+MOST_VALUES = 64  # of an array of face data that divides the faces into groups
 MOST_GROUPS = 1000
 LONGEST_NAME = 80
 
 
 def gathered(parts: Iterable[tuple[str, ArrayLike]]) -> dict[str, IntArray]:
-    """Return groups of names and face numbers; a name that comes again names more faces of the same group."""
+    """Return groups from pairs of a name and face numbers; pairs of the same name make one group."""
     found: dict[str, list[IntArray]] = {}
     for name, numbers in parts:
         found.setdefault(" ".join(name.split())[:LONGEST_NAME], []).append(np.asarray(numbers, dtype=np.int64))
@@ -46,9 +46,9 @@ def by_value(arrays: Mapping[str, ArrayLike], count: int) -> dict[str, IntArray]
 
 
 def renumbered(groups: Groups, old: IntArray) -> dict[str, IntArray]:
-    """Return the groups of faces that are numbered anew; face i was number old[i] (m,), or was none where that is -1.
+    """Return the groups after the faces got new numbers; groups without faces are dropped.
 
-    Groups that no face is left of are dropped.
+    old: (m,), the former numbers of the present faces, -1 for a face that is new.
     """
     size = max(int(old.max(initial=-1)), *(int(numbers[-1]) for numbers in groups.values()), 0) + 1
     found = {}
@@ -60,7 +60,7 @@ def renumbered(groups: Groups, old: IntArray) -> dict[str, IntArray]:
 
 
 def checked(groups: Mapping[str, ArrayLike], count: int) -> dict[str, IntArray]:
-    """Return groups of `count` faces that a user or a file gives. Raises MeshError where numbers are no faces."""
+    """Return the groups of `count` faces that a user or a file gives. Raises MeshError for numbers of no face."""
     for name, given in groups.items():
         numbers = np.asarray(given)
         if numbers.ndim != 1 or (numbers.size and numbers.dtype.kind not in "iu"):
@@ -78,7 +78,7 @@ def few(groups: Groups) -> tuple[Groups, tuple[str, ...]]:
 
 
 def as_arrays(groups: Groups) -> dict[str, NDArray[Any]]:
-    """Return the arrays by which a file of arrays holds groups; `from_arrays` reads them."""
+    """Return groups as three arrays for an .npz file; `from_arrays` reads them."""
     return {
         "group_names": np.array(list(groups), dtype=np.str_),
         "group_sizes": np.array([len(numbers) for numbers in groups.values()], dtype=np.int64),
@@ -87,7 +87,7 @@ def as_arrays(groups: Groups) -> dict[str, NDArray[Any]]:
 
 
 def from_arrays(names: NDArray[Any], sizes: NDArray[Any], faces: NDArray[Any], count: int) -> dict[str, IntArray]:
-    """Return the groups of `count` faces that `as_arrays` made arrays of. Raises MeshError for other arrays."""
+    """Return the groups of `count` faces from the arrays of `as_arrays`. Raises MeshError for other arrays."""
     kinds = [(array.ndim, array.dtype.kind) for array in (names, sizes, faces)]
     if kinds != [(1, "U"), (1, "i"), (1, "i")] or len(names) != len(sizes) or sizes.min(initial=0) < 0:
         raise MeshError("the groups' names and sizes do not fit together")

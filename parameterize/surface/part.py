@@ -1,4 +1,4 @@
-"""PartSurface: the triangles of a part by which its faces are named: groups, nearest triangles, faces up to an edge."""
+"""PartSurface: the mesh of a part, whose faces are found by group, by a nearby point, or up to sharp edges."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +16,7 @@ from .groups import Groups
 
 NEAR = 1e-6  # of the box's diagonal: triangles whose distances differ by less are equally near
 THIN = 1e-6  # of the box's diagonal: the normal of a lower triangle is rounding
-AGREES = 1e-6  # by how much a cosine must be larger for a triangle to be preferred
+AGREES = 1e-6  # a triangle is preferred where its cosine is larger by more than this
 SHARP = 30.0  # degrees
 
 
@@ -97,7 +97,7 @@ class PartSurface(Brief):
 
     @cached_property
     def _tree(self) -> Any:
-        """Return the tree of boxes in which the nearest triangle is sought."""
+        """Return the tree of boxes that finds nearest triangles."""
         tree = igl.AABB()
         tree.init(self.vertices, self.faces)
         return tree
@@ -129,7 +129,7 @@ class PartSurface(Brief):
 
     @cached_property
     def _around(self) -> tuple[IntArray, IntArray]:
-        """Return the triangles at each vertex one after another (3 m,), and where those of each begin (n + 1,)."""
+        """Return where the triangles at each vertex begin (n + 1,), and these triangles, vertex by vertex (3 m,)."""
         order = np.argsort(self.faces.ravel(), kind="stable")
         counts = np.bincount(self.faces.ravel(), minlength=len(self.vertices))
         return np.concatenate([[0], np.cumsum(counts)]), order // 3
@@ -147,7 +147,7 @@ def _best_aligned(
     starts: IntArray,
     around: IntArray,
 ) -> IntArray:
-    """Return of the triangles at the corners of `found` (k,) that are within `reach` (k,) the one that agrees best."""
+    """Return the best aligned triangles (k,) within `reach` (k,) among those at the corners of `found` (k,)."""
     best = found.copy()
     for i in range(len(points)):
         agreement = np.dot(normals[found[i]], given[i])

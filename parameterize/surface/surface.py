@@ -60,13 +60,13 @@ class Surface(Brief, Shown):
     sha256 : str
         Of the file's bytes, or of the arrays.
     notices : tuple of str
-        What was mended or is doubtful, one line each.
+        Repairs and doubts, one line each.
     scale : float
     center : (3,) array
         to_unit(x) = scale * (x - center) + 1/2 gives volume 1 and puts the deepest interior point at (1/2, 1/2, 1/2).
     unit_vertices : (n, 3) array
-        The vertices placed so and rounded to single precision, in which networks train: the same surface in another
-        unit or at another place then gives the same numbers, and with them the same map.
+        The vertices, so placed and rounded to single precision, in which networks train: the same surface in another
+        unit or at another place then has the same numbers, and so the same map.
     crossings : (k, 2) array of int
         Pairs of faces that intersect.
     groups : dict of str to array of int
@@ -96,7 +96,7 @@ class Surface(Brief, Shown):
     groups: Groups
 
     def to_unit(self, points: ArrayLike) -> Array:
-        """Return points (..., 3), given in the user's units, as placed."""
+        """Return points (..., 3) in the user's units as placed points."""
         return self.scale * (np.asarray(points, dtype=np.float64) - self.center) + 0.5
 
     def from_unit(self, points: ArrayLike) -> Array:
@@ -115,7 +115,7 @@ class Surface(Brief, Shown):
 
     @cached_property
     def part(self) -> PartSurface:
-        """Return the triangles with what finds some of them: by a group, by a point, up to sharp edges."""
+        """Return the mesh whose triangles are found by group, by a nearby point, or up to sharp edges."""
         return PartSurface(self.vertices, self.faces, self.groups)
 
     def summary(self) -> dict[str, Any]:
@@ -164,19 +164,19 @@ def load_surface(
         The path of a surface (.obj, .stl, .ply, .off) or of cells (.mesh, .msh, .vtu), each also as .gz, or a mesh in
         memory. Of solid cells the boundary is taken.
     component : int, optional
-        Which one to take where there are several, 0 the largest.
+        The component to take where there are several; 0 is the largest.
     max_faces : int
-        Refuse more.
+        A surface with more faces is refused.
 
     Returns
     -------
     Surface
-        Checked and repaired; its `notices` say what was mended.
+        Checked and repaired; its `notices` list the repairs.
 
     Raises
     ------
     MeshError
-        A ValueError of one line for what cannot be read or is no closed surface of genus 0.
+        A ValueError of one line, for a file that cannot be read or a surface that is not closed or not of genus 0.
     TypeError
         For an object of another class.
 
@@ -228,18 +228,18 @@ def surface_from_arrays(
     faces : (m, 3) array of int
         Vertex numbers of the triangles, counted from 0.
     name : str
-        What messages and files call the surface.
+        The surface's name in messages and files.
     component : int, optional
-        Which one to take where there are several, 0 the largest.
+        The component to take where there are several; 0 is the largest.
     max_faces : int
-        Refuse more.
+        A surface with more faces is refused.
     groups : dict of str to array of int, optional
         Numbers of the faces of each group, counted from 0.
 
     Raises
     ------
     MeshError
-        A ValueError that names what is wrong with the arrays or the surface.
+        A ValueError that names the defect of the arrays or the surface.
 
     Examples
     --------
@@ -321,7 +321,7 @@ def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces
 
 
 def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:
-    """Return middle (3,) and longest side of the box of the used vertices, and notices of its size and place."""
+    """Return the middle (3,) and the longest side of the used vertices' box, and notices of its size and place."""
     used = vertices[np.unique(faces)]
     low, high = used.min(axis=0), used.max(axis=0)
     size = float((high - low).max())

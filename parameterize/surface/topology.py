@@ -1,4 +1,4 @@
-"""Checks the topology: open, non-manifold, in several components or of higher genus is refused; finds what crosses.
+"""Checks the topology: refuses surfaces that are open, non-manifold, disconnected or of higher genus; finds crossings.
 
 Positions in messages are the user's: the caller passes `where`, which turns a vertex number into text.
 """
@@ -21,7 +21,7 @@ SHOWN = 5  # pairs of faces that cross
 
 
 def choose_component(vertices: Array, faces: IntArray, component: int | None) -> tuple[IntArray, list[str]]:
-    """Return the numbers of the faces of the only component, or of the one asked for (0 the largest), and notices."""
+    """Return the face numbers of the only or the chosen component (0 is the largest), and notices. Raises MeshError."""
     groups = _components(faces)
     if component is None and len(groups) == 1:
         return np.arange(len(faces)), []
@@ -52,7 +52,7 @@ def _components(faces: IntArray) -> list[IntArray]:
 
 
 def _inside(vertices: Array, faces: IntArray, groups: list[IntArray]) -> tuple[int, list[int]]:
-    """Return the number of the widest component, and of those that lie inside it with every vertex."""
+    """Return the number of the widest component, and the numbers of those with every vertex inside it."""
     listed = [vertices[np.unique(faces[group])] for group in groups[: LISTED + 1]]
     outer = int(np.argmax([np.linalg.norm(np.ptp(points, axis=0)) for points in listed]))
     nested = []
@@ -120,7 +120,7 @@ def crossing_faces(vertices: Array, faces: IntArray) -> IntArray:
 
 
 def crossing_places(vertices: Array, faces: IntArray, pairs: IntArray) -> Array:
-    """Return a place (k, 3) for each pair: the middle of what the boxes of the two faces have in common."""
+    """Return a place (k, 3) for each pair: the middle of the intersection of the two faces' boxes."""
     corners = vertices[faces[pairs]]  # (k, 2, 3, 3)
     low, high = corners.min(axis=2).max(axis=1), corners.max(axis=2).min(axis=1)
     return np.asarray((low + high) / 2.0)

@@ -15,8 +15,8 @@ from ..arrays import Array, IntArray
 from .errors import MeshError
 
 MAX_CORNERS = 256  # time grows with the cube: 256 corners take some hundredths of a second
-SHAPE = 1e-10  # times the size squared: what the logarithm of a triangle's shape weighs beside its area
-THINNEST = 1e-12  # shape (1: equilateral, 0: flat) below which all weigh the same
+SHAPE = 1e-10  # weight of the logarithm of a triangle's shape beside its area, over the squared size
+THINNEST = 1e-12  # shape (1: equilateral, 0: flat) below which all triangles weigh the same
 
 
 def triangulate(vertices: Array, polygons: list[list[int]]) -> IntArray:

@@ -8,8 +8,8 @@ from ..arrays import Array, IntArray, Mask
 from .errors import MeshError
 from .geometry import connected, directed_edges, doubled_areas, edge_table, signed_volume
 
-WELD_TOLERANCE = 1e-7  # of the box's longest side: what single precision cannot tell apart
-LEAST_VOLUME = 1e-12  # of the cube over the box's longest side
+WELD_TOLERANCE = 1e-7  # share of the box's longest side: points this close are one in single precision
+LEAST_VOLUME = 1e-12  # share of the cube over the box's longest side
 FLAT = 1e-14  # twice a face's area over its longest edge squared, below which it counts as degenerate
 
 
@@ -22,7 +22,7 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     """Weld duplicates, drop degenerate faces and unused vertices of a mesh whose box has side 1.
 
     A mesh that is closed as numbered keeps vertices that merely touch; only edges of no length are collapsed there.
-    Returns the faces (m, 3) that are left, in the same vertex numbers, which of the given faces they were (m,), and
+    Returns the remaining faces (m, 3) in the same vertex numbers, their numbers among the given faces (m,), and
     notices.
     """
     notices = []

@@ -11,13 +11,18 @@ import torch
 from torch import Tensor
 
 from ..arrays import IntArray
-from ..config import StageConfig, TrainConfig
 from ..cube.cube import CORNERS
 from .matrices import closest_rotation, cofactor, determinant
 from .network import InverseMap, map_in_pieces
 from .samples import OFFSETS, Stencils, TriangleSampler, gather
+from .stages import Stage
 from .target_shapes import nearest, nearest_on_cube_face
 
+_ALPHA = 0.1  # determinants of G's Jacobian below this count as folds (section 4.4.2)
+_LEAST_DET = 0.5 * _ALPHA  # held in the distortion term: bijectivity rules below it, and 1 / det must not blow up
+_INWARD_NORMALS = 100.0  # weight, within the normal term, of normals that point inwards, once the shape is the cube
+_DIRECTIONS = 1e-3  # weight of the paths' directions within the edge term
+_GIVEN_CORNERS = 1e2  # weight of the corner term in stages of which Table 1 has none (section 5.4)
 _POSITION = {tuple(offset): i for i, offset in enumerate(OFFSETS.tolist())}
 _UNITS = np.eye(3, dtype=np.int64)
 
@@ -33,10 +38,10 @@ class EdgePaths:
 
 @dataclass(frozen=True, eq=False)
 class BoundarySamples:
-    """What a stage knows of the surface: vertices (n, 3) at volume 1, triangles (m, 3), and what draws these.
+    """The surface data of a stage: vertices (n, 3) at volume 1, triangles (m, 3), and the sampler of the triangles.
 
-    From the later stages on also: corners (8,), vertices that go to the cube's corners; labels (m,), the cube face of
-    each triangle; and the paths to the cube's edges.
+    Later stages also have corners (8,), the vertices that go to the cube's corners; labels (m,), the cube face of each
+    triangle; and the paths to the cube's edges.
     """
 
     vertices: Tensor
@@ -49,14 +54,13 @@ class BoundarySamples:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What the stages share when they compute the loss: the network, the stencils inside the domain, the options."""
+    """The loss of every stage, as a function of the network at stencils inside the domain and on the surface."""
 
     network: InverseMap
     stencils: Stencils
-    config: TrainConfig
 
     def __call__(
-        self, stage: StageConfig, boundary: BoundarySamples, generator: torch.Generator
+        self, stage: Stage, boundary: BoundarySamples, generator: torch.Generator
     ) -> tuple[Tensor, int, dict[str, float]]:
         """Return the weighted sum of the terms (eq. (2) and (3)), the folded stencils, and the unweighted terms."""
         picks = boundary.sampler.draw(generator)
@@ -68,15 +72,15 @@ class Objective:
         nodes, surface, *held = torch.split(mapped, [len(p) for p in points])
         surface = gather(surface, place)
         goal = self._goal(stage, boundary, surface, picks)
-        nodes, cell, config = gather(nodes, self.stencils.index), self.stencils.cell, self.config
+        nodes, cell = gather(nodes, self.stencils.index), self.stencils.cell
         jacobian = stencil_jacobian(nodes, cell)
         det = determinant(jacobian)
         corners = surface.view(-1, 3, 3)
         normals = triangle_normals(corners)
-        wrong_side = config.wrong_side if stage.target == "cube" else 0.0
+        wrong_side = _INWARD_NORMALS if stage.target == "cube" else 0.0
         terms = {
-            "bij": bijectivity(det, config.min_det),
-            "arap": distortion(jacobian, det, config.det_floor * config.min_det),
+            "bij": bijectivity(det),
+            "arap": distortion(jacobian, det),
             "fair": fairness(nodes, cell),
             "dist": distance(surface, goal),
             "norm": normal_difference(normals, triangle_normals(goal.view(-1, 3, 3)), wrong_side),
@@ -84,12 +88,12 @@ class Objective:
         } | self._held_terms(boundary, held)
         weights = {name: getattr(stage.weights, name) for name in terms}
         if "cor" in terms:
-            weights["cor"] = stage.weights.cor or stage.given_corner_weight
+            weights["cor"] = stage.weights.cor or _GIVEN_CORNERS
         total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
         return total, int((det <= 0.0).sum()), {name: float(term.detach()) for name, term in terms.items()}
 
-    def _goal(self, stage: StageConfig, boundary: BoundarySamples, surface: Tensor, picks: Tensor) -> Tensor:
-        """Return what the corners (3 t, 3) of the mapped triangles `picks` (t,) are to reach.
+    def _goal(self, stage: Stage, boundary: BoundarySamples, surface: Tensor, picks: Tensor) -> Tensor:
+        """Return the goals (3 t, 3) of the corners of the mapped triangles `picks` (t,).
 
         Once the surface is cut, each triangle goes to its own face of the cube.
         """
@@ -99,13 +103,12 @@ class Objective:
             return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
 
     def _held_terms(self, boundary: BoundarySamples, held: list[Tensor]) -> dict[str, Tensor]:
-        """Return the terms of L_bound for what is held: the mapped corners (8, 3), then the path points (k, 3)."""
+        """Return the terms of L_bound for the held vertices: the mapped corners (8, 3), then the path points (k, 3)."""
         terms = {}
         if boundary.corners is not None:
             terms["cor"] = distance(held[0], torch.as_tensor(CORNERS).to(held[0]))
         if boundary.paths is not None:
-            paths, weight = boundary.paths, self.config.edge_direction
-            terms["edge"] = edge_path(held[1], paths.targets, paths.following, weight)
+            terms["edge"] = edge_path(held[1], boundary.paths.targets, boundary.paths.following)
         return terms
 
 
@@ -120,21 +123,20 @@ def stencil_jacobian(mapped: Tensor, cell: float) -> Tensor:
     return torch.stack(columns, dim=1) / (2.0 * cell)
 
 
-def bijectivity(det: Tensor, alpha: float) -> Tensor:
-    """Return L_bij of eq. (3) as the mean of (alpha - det)_+^2, alpha = 0.1 in section 4.4.2.
+def bijectivity(det: Tensor) -> Tensor:
+    """Return L_bij of eq. (3) as the mean of (alpha - det)_+^2.
 
     The paper has no square; it keeps the gradient continuous where a fold opens.
     """
-    return (alpha - det).clamp_min(0.0).square().mean()
+    return (_ALPHA - det).clamp_min(0.0).square().mean()
 
 
-def distortion(jacobian: Tensor, det: Tensor, det_floor: float) -> Tensor:
+def distortion(jacobian: Tensor, det: Tensor) -> Tensor:
     """Return L_arap of eq. (3): the mean of det * sum (1 / sigma - 1)^2, the ARAP energy of the inverse of G.
 
-    With A = J^-1 and R its closest rotation this is det * |A - R|^2. Below `det_floor` the determinant in A is
-    held there: the bijectivity term rules over such points, and 1 / det must not blow up.
+    With A = J^-1 and R its closest rotation this is det * |A - R|^2. Smaller determinants count as _LEAST_DET.
     """
-    safe = det.clamp_min(det_floor)
+    safe = det.clamp_min(_LEAST_DET)
     inverse = cofactor(jacobian).transpose(0, 1) / safe
     return (safe * (inverse - closest_rotation(inverse)).square().sum(dim=(0, 1))).mean()
 
@@ -173,7 +175,8 @@ def triangle_normals(corners: Tensor) -> Tensor:
 def normal_difference(normals: Tensor, target: Tensor, wrong_side: float) -> Tensor:
     """Return L_norm of eq. (3), the mean squared difference of unit normals, plus a term that the paper does not have.
 
-    That is `wrong_side` times the mean of (-<n, n_target>)_+: opposite normals are a stationary point of the first.
+    The additional term is `wrong_side` times the mean of (-<n, n_target>)_+: at opposite normals the first term is
+    stationary.
     """
     opposed = (-(normals * target).sum(dim=1)).clamp_min(0.0).mean()
     return (normals - target).square().sum(dim=1).mean() + wrong_side * opposed
@@ -189,13 +192,13 @@ def star_shape(corners: Tensor, normals: Tensor) -> Tensor:
     return (-facing).clamp_min(0.0).square().mean()
 
 
-def edge_path(mapped: Tensor, target: Tensor, following: Tensor, weight: float) -> Tensor:
-    """Return L_edge of eq. (3): how far path points (k, 3) are from the cube's edges, and their directions.
+def edge_path(mapped: Tensor, target: Tensor, following: Tensor) -> Tensor:
+    """Return L_edge of eq. (3): the mean squared distances of path points (k, 3) and directions to those on the edges.
 
-    following: (s, 2) pairs of consecutive path points. weight: of the directions.
+    following: (s, 2) pairs of consecutive path points.
     """
     step = gather(mapped, following[:, 1]) - gather(mapped, following[:, 0])
     aim = target[following[:, 1]] - target[following[:, 0]]
     direction = step / step.norm(dim=1, keepdim=True).clamp_min(1e-12)
     aim = aim / aim.norm(dim=1, keepdim=True).clamp_min(1e-12)
-    return distance(mapped, target) + weight * (direction - aim).square().sum(dim=1).mean()
+    return distance(mapped, target) + _DIRECTIONS * (direction - aim).square().sum(dim=1).mean()

@@ -10,7 +10,7 @@ from ..config import NetworkConfig
 from ..threads import in_parallel
 
 _PIECE = 2048  # points that a thread takes at a time, at most
-_SHARES = 4  # their number is a multiple of this, so that as many threads end together
+_SHARES = 4  # the number of pieces is a multiple of this, so that up to so many threads end together
 
 
 class ResidualModule(nn.Module):
@@ -71,7 +71,7 @@ class InverseMap(nn.Module):
 
 
 def map_in_pieces(network: nn.Module, points: Tensor) -> Tensor:
-    """Return network(points), (m, 3) -> (m, 3), with its gradient, on all threads; the bits do not depend on them."""
+    """Return network(points), (m, 3) -> (m, 3), with its gradient, on any number of threads to the same bits."""
     mapped: Tensor = _InPieces.apply(network, points, *network.parameters())  # type: ignore[no-untyped-call]
     return mapped
 
@@ -81,7 +81,7 @@ class _InPieces(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, network: nn.Module, points: Tensor, *parameters: Tensor) -> Tensor:
-        """Map the points and keep what the way back needs."""
+        """Map the points and keep the graphs for the backward pass."""
         count = _SHARES * -(-len(points) // (_SHARES * _PIECE)) if points.device.type == "cpu" else 1
 
         def part(piece: Tensor) -> Tensor:
@@ -96,7 +96,7 @@ class _InPieces(torch.autograd.Function):
     def backward(ctx: Any, gradient: Tensor) -> Any:
         """Return the gradients in the parameters.
 
-        They are taken of sums: for others torch loads its symbolic shapes, which takes as long as many steps.
+        The gradient of a sum spares torch's symbolic shapes, whose loading takes as long as many steps.
         """
 
         def part(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, ...]:

@@ -1,4 +1,4 @@
-"""The optimiser of the training: Muon for the hidden layers' matrices, Adam for all else.
+"""The optimiser of the training: Muon for the hidden layers' matrices, Adam for all other numbers.
 
 Muon takes steps whose singular values are all alike (Jordan et al., 2024), so that directions in which the gradient is
 small advance as fast as the others. That of torch computes in bfloat16, which takes 20 times as long as float32 on
@@ -26,7 +26,8 @@ def _gradient(parameter: Tensor) -> Tensor:
 class Muon:
     """Takes steps along U V^T, where U S V^T is a matrix's gradient with Nesterov's momentum.
 
-    lr: their singular values, about; of a matrix with more rows than columns, times the square root of the ratio.
+    lr: about the singular values of a step; those of a matrix with more rows than columns are larger by the square root
+    of the ratio.
     """
 
     _MOMENTUM = 0.95
@@ -52,7 +53,7 @@ class Muon:
         matrix.sub_(direction, alpha=rate * math.sqrt(max(1.0, rows / columns)))
 
     def _orthogonal(self, matrix: Tensor) -> Tensor:
-        """Return U V^T of a matrix U S V^T, about.
+        """Return an approximation of U V^T for a matrix U S V^T.
 
         Singular values above a hundredth of the matrix' Frobenius norm come to lie between 0.68 and 1.21.
         """

@@ -13,7 +13,7 @@ from ..surface.geometry import doubled_areas
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
 _STEPS = np.array(list(np.ndindex(3, 3, 3))) - 1
 _SMALL = 8  # lattice points along a part of the lattice that is not halved further
-_ROUNDING = 1e-6  # of a distance, in cells
+_ROUNDING = 1e-6  # error of a distance, in cells
 _ACCURACY = 2.0  # of the fast winding number
 OFFSETS = np.concatenate([_STEPS[np.count_nonzero(_STEPS, axis=1) == moved] for moved in range(3)])
 
@@ -50,11 +50,11 @@ def signed_distance(points: Array, vertices: Array, faces: IntArray) -> Array:
 
 
 def near_or_inside(vertices: Array, faces: IntArray, cell: float, margin: float) -> IntArray:
-    """Return the integer coordinates (k, 3), in their order, of lattice points: of all inside and some others.
+    """Return the integer coordinates (k, 3), ascending, of all lattice points inside, and of some beside the surface.
 
-    The lattice fills the bounding box grown by `margin`, which is halved until a part is small or no triangle's box and
-    plane come within `margin`; such a part is left out where it lies outside. A thin body that lies askew fills little
-    of its box.
+    The bounding box, grown by `margin`, is halved until a part is small or far from every triangle, by more than
+    `margin` from its box or plane. Far parts are kept only inside: a thin body that lies askew fills little of its
+    box.
     """
     corners = vertices[faces]
     grown = np.stack([corners.min(axis=1) - margin, corners.max(axis=1) + margin], axis=1) / cell  # (m, 2, 3)
@@ -104,7 +104,7 @@ def interior_points(vertices: Array, faces: IntArray, cell: float) -> Array:
 
 
 class TriangleSampler:
-    """Draws triangles with probability proportional to area; all of them where `count` covers the mesh."""
+    """Draws triangles with probability proportional to area; all of them where there are at most `count`."""
 
     def __init__(self, vertices: Array, faces: IntArray, count: int, device: torch.device) -> None:
         area = np.linalg.norm(doubled_areas(vertices, faces), axis=1)

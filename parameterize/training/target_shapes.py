@@ -44,7 +44,9 @@ def nearest_on_cuboid(points: Tensor, d: float) -> Tensor:
     inside = (outward == 0.0).all(dim=1, keepdim=True)
     on_face = nearest_on_cube(local)
     axis = (on_face - 0.5).abs().argmax(dim=1, keepdim=True)
-    normal = torch.zeros_like(local).scatter(1, axis, (on_face - 0.5).gather(1, axis).sign())  # of one face on an edge
+    normal = torch.zeros_like(local).scatter(
+        1, axis, (on_face - 0.5).gather(1, axis).sign()
+    )  # on an edge that of one face
     outward = torch.where(inside, normal, outward)
     base = torch.where(inside, on_face, core)
     nearest = base + d * outward / outward.norm(dim=1, keepdim=True)

@@ -1,6 +1,6 @@
 """The training stages as one loop: smooth cuboids S(2), S(1), cube, fixed corners, fixed edges (section 4.3.1).
 
-The loss that the first stage ends with tells whether the network suits the shape.
+The loss at the end of the first stage decides whether the network suits the shape.
 """
 
 import logging
@@ -18,7 +18,7 @@ from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
-from ..cube.flips import Layout
+from ..cube.layout import CubeLayout
 from ..cube.turning import best_turn, hollowness
 from ..progress import History, Progress, ProgressCallback
 from .backend import PRECISIONS
@@ -26,19 +26,22 @@ from .losses import BoundarySamples, EdgePaths, Objective
 from .network import InverseMap
 from .optimizer import TrainingOptimizer
 from .samples import TriangleSampler, interior_points, stencils
+from .stages import STAGES
 
 _log = logging.getLogger(__name__)
 State = dict[str, Tensor]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
+_COMPARED_STEPS = 8  # the last ones of a race, whose mean distortions are compared
+_RACE_GAIN = 0.05  # share by which the turned G must be better, first in hollowness and then in distortion
 
 
 @dataclass
 class _Run:
-    """Where the training stands: stage, step, and the network at the start of the stage and at its best."""
+    """The state of the training: stage, step, and the network at the start of the stage and at its best."""
 
     number: int
     step: int
-    start: State  # the network at the start of the stage: corners and cuts were taken from it
+    start: State  # the network at the start of the stage, which gave corners and cuts
     best: State
     best_key: tuple[float, float] = (math.inf, math.inf)  # folded samples, then loss
 
@@ -75,15 +78,14 @@ class Trainer:
             first = start_map(interior_points(vertices, faces, config.train.cell))
             self.network.affine.copy_(self._tensor(first))
         inside = stencils(vertices, faces, config.train.cell, device=self.device, dtype=self.dtype)
-        self.objective = Objective(self.network, inside, config.train)
+        self.objective = Objective(self.network, inside)
 
     def run(self, *, give_up: bool = False) -> InverseMap | None:
-        """Train all stages, or those that a checkpoint leaves; return the network at the best state of the last one.
+        """Train the stages, from a checkpoint on where there is one; return the network at the last one's best state.
 
-        With `give_up`, return None where the first stage ends with a loss above `easy_loss`, see `_misfit`.
-        Where the mapped surface is still too far from a cube for its edges to be traced, the stages that fix them are
-        left out and a warning says so: the spline stage moves edges anyway. Raises PathError where the user gave the
-        corners.
+        With `give_up`, return None where the first stage ends with a loss above `easy_loss`, see `_misfit`. If the
+        mapped surface is still too far from a cube for its edges to be traced, the stages that hold edges are left out
+        with a warning: the spline stage moves edges anyway. Raises PathError instead where the user gave the corners.
         """
         given, limit = self.corners is not None, self.config.train.easy_loss
         saved = self._saved()
@@ -119,15 +121,16 @@ class Trainer:
         return self.map(self.vertices)
 
     def _prepare(self, stage: StageConfig) -> BoundarySamples:
-        """Choose corners and cut the surface, where the stage asks for it, by the network as it is."""
-        if stage.weights.cor > 0.0 and self.corners is None:
+        """Choose corners and cut the surface by the present network, in the stages that need them."""
+        weights = STAGES[stage.name].weights
+        if weights.cor > 0.0 and self.corners is None:
             self.corners = choose_corners(self.mapped())
         vertices, faces, corners = self.vertices, self.faces, self.corners
         labels = paths = None
-        if stage.weights.edge > 0.0:
+        if weights.edge > 0.0:
             assert corners is not None
-            surface = cut_surface(self.mapped(), faces, corners, self.config.layout)
-            vertices, faces, corners = surface.cut.carry(vertices), surface.cut.faces, surface.corners
+            surface = cut_surface(CubeLayout(vertices, faces, self.mapped(), len(vertices)), corners)
+            vertices, faces = surface.layout.points, surface.layout.faces
             path, target, following = edge_targets(self.map(vertices), surface.paths)
             paths = EdgePaths(self._index(path), self._tensor(target), self._index(following))
             labels = self._index(surface.face_labels)
@@ -142,37 +145,39 @@ class Trainer:
         return torch.as_tensor(values, dtype=self.dtype, device=self.device)
 
     def _misfit(self, stage: StageConfig) -> float:
-        """Return the loss of a stage at its best state without the distortion: what keeps G from reaching the target.
+        """Return the loss of a stage at its best state, without the distortion.
 
-        A straight rod has a large distortion on any ball, and yet suits the network.
+        The rest measures how far G is from its target. A straight rod has a large distortion on any ball, and yet suits
+        the network.
         """
         rows = [row for row in self.history.rows if row[0] == stage.name]
         _, _, loss, _, terms = min(rows, key=lambda row: (row[3], row[2]))
-        return loss - stage.weights.arap * terms["arap"]
+        return loss - STAGES[stage.name].weights.arap * terms["arap"]
 
     @property
     def _race_stage(self) -> int | None:
         """The first stage towards the cube, where G may be turned; None where corners are given or no race is set."""
         if self.corners is not None or self.config.train.race == 0.0:
             return None
-        return next((number for number, stage in enumerate(self.config.stages) if stage.target == "cube"), None)
+        return next((number for number, stage in enumerate(self.config.stages) if stage.name == "cube"), None)
 
     def _race(self, number: int, boundary: BoundarySamples) -> tuple[_Run, TrainingOptimizer]:
-        """Begin a stage with G as it is and, where its edges then lie less in hollows, with G turned.
+        """Begin a stage with G as it is and, where a turn keeps the cube's edges better out of hollows, with G turned.
 
-        Returns what goes on, the network left as it is then. The domain is a ball by now. Which turn of it suits the
-        cube's edges can be told beforehand; whether that lowers the distortion cannot: corners may be harder to reach.
+        Returns the run and the optimiser of the better one, whose state the network then has. The domain is a ball by
+        now. The turn that suits the cube's edges is computed beforehand; only training shows whether it lowers the
+        distortion, for corners may be harder to reach.
         """
-        train, layout, begun = self.config.train, self.config.layout, len(self.history.rows)
+        train, begun = self.config.train, len(self.history.rows)
         away, start = self.mapped() - 0.5, self._state()
         directions = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
-        ball = Layout(self.vertices, self.faces, directions)
-        turn = best_turn(ball, layout, np.random.default_rng(self.seed))
-        as_it_is = hollowness(ball, layout)
-        if hollowness(replace(ball, places=ball.places @ turn.T), layout) > as_it_is - train.race_gain * abs(as_it_is):
+        ball = CubeLayout(self.vertices, self.faces, directions, len(self.vertices))
+        turn = best_turn(ball, np.random.default_rng(self.seed))
+        as_it_is = hollowness(ball)
+        if hollowness(replace(ball, places=ball.places @ turn.T)) > as_it_is - _RACE_GAIN * abs(as_it_is):
             return _Run(number, 0, start, start), TrainingOptimizer(self.network, train)
         least, winner = math.inf, None
-        for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - train.race_gain)):
+        for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - _RACE_GAIN)):
             self.network.load_state_dict(start)
             self.network.turn(self._tensor(rotation))
             run, optimizer = _Run(number, 0, self._state(), self._state()), TrainingOptimizer(self.network, train)
@@ -180,7 +185,7 @@ class Trainer:
                 pass
             rows = self.history.rows[begun:]
             del self.history.rows[begun:]
-            distortion = float(np.mean([terms["arap"] for *_, terms in rows[-train.race_steps :]]))
+            distortion = float(np.mean([terms["arap"] for *_, terms in rows[-_COMPARED_STEPS:]]))
             if distortion < share * least:
                 least, winner = distortion, (run, optimizer, self._state(), rows)
         assert winner is not None
@@ -190,7 +195,7 @@ class Trainer:
         return run, optimizer
 
     def _train(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
-        """Train one stage, and leave the network at its best state: fewest folded samples, then lowest loss."""
+        """Train one stage, and leave the network at its best state: the fewest folded samples, then the lowest loss."""
         steps = self.config.stages[run.number].steps
         try:
             for _ in self._steps(run, boundary, optimizer, steps):
@@ -202,7 +207,7 @@ class Trainer:
         self.network.load_state_dict(run.best)
 
     def _steps(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer, until: int) -> Iterator[None]:
-        """Take the steps of a stage that are left until one of them, and report each."""
+        """Take the steps of a stage up to the step `until`, and report each."""
         stage = self.config.stages[run.number]
         later = sum(stage.steps for stage in self.config.stages[run.number + 1 :])
         started, begun = time.perf_counter(), run.step
@@ -215,10 +220,10 @@ class Trainer:
             yield
 
     def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
-        """Take one step of the optimiser; nothing of the state changes before the loss is known."""
+        """Take one step of the optimiser; the state changes only once the loss is known to be finite."""
         self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
         optimizer.clear()
-        loss, folded, terms = self.objective(stage, boundary, self.generator)
+        loss, folded, terms = self.objective(STAGES[stage.name], boundary, self.generator)
         loss.backward()  # type: ignore[no-untyped-call]
         value = float(loss.detach())
         if not math.isfinite(value):

@@ -9,10 +9,10 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
-from ..forms.problem import BoundaryValueProblem
+from ..forms.boundary_value_problem import BoundaryValueProblem
 from . import kernels
 from .quadrature import gauss_rule, geometry_planes
-from .space import TrialSpace, agreed
+from .space import TrialSpace
 
 PLANES = 16  # of points of u, in a piece of work
 POINTS = 2**16  # of a plane that are evaluated at once: they take dozens of arrays
@@ -67,7 +67,7 @@ def error_norms(
                     sums[q, 2:] += kernels.squares(gradients, scale, slopes)
 
     planes = range(whole.shape[0])
-    with agreed(space.comm):
+    with space.agreed():
         in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
     l2, norm, seminorm, slope = np.sqrt(space.total(sums.sum(axis=0))).tolist()
     if not all(space.shared(all(has_gradient))):
@@ -86,7 +86,7 @@ def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, 
     tables, spline = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients)
     plane = np.empty((4, *rule.plane_shape))
     lack = size = 0.0
-    with agreed(space.comm):
+    with space.agreed():
         for q, _, measure, x in geometry_planes(volume, rule):
             kernels.evaluate_plane(spline, q, tables, plane)
             wanted = 0.0 if problem.exact is None else problem.exact_at(x)[0][0]

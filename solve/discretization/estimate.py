@@ -15,14 +15,14 @@ from parameterize.spline.bspline import apply_along, collocation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from ..field import Points
+from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.form import strong_form
 from ..forms.frame import face_geometry
 from ..forms.jets import PAIRS, SYMMETRIC, Jet
-from ..forms.problem import BoundaryValueProblem
 from .boundary import has_face
 from .errors import Errors, ratio
 from .quadrature import gauss_rule
-from .space import TrialSpace, agreed
+from .space import TrialSpace
 
 ON_FACE = np.linspace(0.05, 0.95, 7)  # parameters a direction at which Robin's alpha is looked at
 SIGNS = tuple(product((1.0,), (1.0, -1.0), (1.0, -1.0)))  # of the waves that make up a standing one
@@ -51,7 +51,7 @@ def error_estimate(
         return None
     lowest = lowest_waves(volume, problem)
     sums = np.zeros(3)  # squares of the norms of the error, its energy norm, the norm of the solution
-    with agreed(space.comm):
+    with space.agreed():
         for squares in _inside(volume, space, coefficients, problem, lowest):
             sums += squares
         for face in filter(partial(has_face, space), problem.dirichlet):

@@ -14,8 +14,8 @@ from parameterize.spline.bspline import basis_derivatives, breakpoints, sparse_r
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import Points
+from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.condition import Condition
-from ..forms.problem import BoundaryValueProblem
 from .boundary import has_face
 from .space import TrialSpace
 from .surface_rule import SurfaceRule, surface_rule

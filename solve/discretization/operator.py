@@ -23,7 +23,7 @@ from ..forms.jets import PAIRS
 from ..forms.mass import WithMass
 from . import kernels
 from .quadrature import GaussRule, geometry_planes, operator_rule
-from .space import TrialSpace, agreed
+from .space import TrialSpace
 
 
 class FaceTerm(Protocol):
@@ -212,7 +212,7 @@ def assemble(
     an answer to show if not to trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
     Raises ValueError where det J is zero at a point, naming it.
     """
-    rule = rule or operator_rule(space)
+    rule = rule or operator_rule(space, "spline")
     parts = space, rule, threads
     basis, part = MatrixFree(*parts), component or 0
     load = np.zeros((form.components, *space.shape))
@@ -233,7 +233,7 @@ def assemble(
                 for density, total in zip(source(x), load, strict=True):
                     add_integrals(basis.tables, q, density * size, total)
 
-    with agreed(space.comm):
+    with space.agreed():
         if component is not None:
             factors = np.empty((rule.shape[0], 6 + form.has_reaction, *rule.plane_shape))
         elif form.constant:

@@ -84,7 +84,7 @@ def gauss_rule(space: TrialSpace, counts: Sequence[int] | None = None) -> GaussR
     return _tensor_rule(space, [gauss_on_spans(knots, count) for knots, count in each])
 
 
-def operator_rule(space: TrialSpace, quadrature: str = "spline", rough: bool = True) -> GaussRule:
+def operator_rule(space: TrialSpace, quadrature: str, rough: bool = True) -> GaussRule:
     """Return the rule of the operator.
 
     quadrature: as in `solve_problem`. rough: whether the factors vary much from span to span (`is_rough`), which takes

@@ -11,10 +11,11 @@ import numpy as np
 
 from parameterize.arrays import Array
 
+from .boundary_value_problem import Natural
 from .condition import GivenRegions, conditions_of
 from .data import LARGEST, SMALLEST, Data
 from .form import Quantity
-from .problem import LawWithData, Natural
+from .problem import LawWithData
 
 NONE = ("0", "0", "0")  # of a vector
 ON_REGIONS = ("fix", "roller", "symmetry", "load", "pressure", "spring")

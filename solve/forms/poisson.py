@@ -11,10 +11,11 @@ import numpy as np
 from parameterize.arrays import Array
 
 from ..field import SplineField
+from .boundary_value_problem import Natural, Robin
 from .condition import GivenRegions, conditions_of
 from .data import NOT_SMOOTH, Data, Datum, Scalar, demand, demand_definite, demand_size
 from .jets import PAIRS, SYMMETRIC, Jet
-from .problem import LawWithData, Natural, Robin
+from .problem import LawWithData
 
 IDENTITY = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)  # the six entries
 DEFAULT_EXACT = "exp(X+Z)*sin(Y)"  # the paper's solution (section 5.5), at volume 1: it means the same in any unit

@@ -80,7 +80,7 @@ def helps(operator: Operator) -> bool:
 def _place(space: TrialSpace, count: int) -> tuple[int, int]:
     """Return where those of this process begin among what all processes count, and the number of all."""
     counts = space.shared(count)
-    return sum(counts[: space.comm.rank]), sum(counts)
+    return sum(counts[: space.rank]), sum(counts)
 
 
 def incomplete_cholesky(operator: Operator) -> IncompleteCholesky | None:

@@ -1,4 +1,4 @@
-"""The boundary of solid cells: those of their faces that no second cell has, wound outward.
+"""The boundary of solid cells: the faces that belong to one cell alone, wound outward.
 
 Faces are compared by their sets of vertices. A quadrangle also meets the two triangles of another cell into which a
 diagonal cuts it, as where tetrahedra and hexahedra meet.
@@ -95,7 +95,7 @@ def _first_of_each(rows: IntArray) -> IntArray:
 
 
 def _met_once(faces: IntArray) -> Mask:
-    """Return which faces (m, corners) belong to one cell alone."""
+    """Return the mask of faces (m, corners) that belong to one cell alone."""
     numbers = _groups(faces)
     counts = np.bincount(numbers)
     if counts.max(initial=0) > 2:
@@ -144,12 +144,12 @@ def _are_faces(polygons: list[list[int]], faces: dict[int, IntArray]) -> Mask:
 
 
 def faces_alike(faces: list[list[int]], polygons: list[list[int]]) -> IntArray:
-    """Return for each face (m,) the number of the polygon with the same corners, -1 where there is none."""
+    """Return the number (m,) of the polygon with the same corners as each face, -1 where there is none."""
     return _found(faces, {size: [_of_size(polygons, size)] for size in {len(row) for row in polygons}})
 
 
 def cells_behind(faces: list[list[int]], solids: list[tuple[str, IntArray]]) -> IntArray:
-    """Return for each face (m,) of the boundary its solid cell, counted through `solids`; -1 for collapsed cells."""
+    """Return the solid cell of each face (m,) of the boundary, counted through `solids`; -1 for collapsed cells."""
     tables: dict[int, list[tuple[IntArray, IntArray]]] = {}
     first = 0
     for kind, rows in solids:

@@ -1,4 +1,4 @@
-"""Cells of every format by their kind: surface cells as polygons, solid cells as their boundary, no other is lost.
+"""Cells of every format by kind: surface cells become polygons, solid cells their boundary, others are named.
 
 Kinds are called as meshio calls them, their corners ordered as VTK orders them (The VTK User's Guide, "Cell types").
 """
@@ -91,7 +91,7 @@ def _owners(
     solids: tuple[list[tuple[str, IntArray]], IntArray],
     groups: Groups,
 ) -> IntArray:
-    """Return for the faces of the boundary (m,) the cell whose groups they are in; polygons and solids: their cells."""
+    """Return the cells (m,) whose groups the faces of the boundary are in; polygons and solids: their cells."""
     in_some = np.zeros(max(int(numbers[-1]) for numbers in groups.values()) + 2, dtype=bool)
     for numbers in groups.values():
         in_some[numbers] = True

@@ -1,4 +1,4 @@
-"""What the readers share: what they return, the lines and numbers of a text, and how a library's errors are told."""
+"""Shared by the readers: the content they return, lines and numbers of a text, errors of libraries."""
 
 import io
 import logging
@@ -25,10 +25,10 @@ WHOLE_NUMBERS = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*+", re.ASCII)
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """What a surface file holds.
+    """The content of a surface file.
 
     vertices: (n, 3). polygons: the vertex numbers of each face, counted from 0; they may be out of range.
-    notices: what the user should know about how the file was read, one line each. groups: numbers of polygons by name.
+    notices: one line each on data that were left out or changed. groups: numbers of polygons by name.
     """
 
     vertices: Array

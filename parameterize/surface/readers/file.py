@@ -39,7 +39,7 @@ FORMATS = tuple(READERS)
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """Triangles as they are given: vertices (n, 3), faces (m, 3), indices in range, groups; sha256 of what was read."""
+    """Triangles before any repair: vertices (n, 3), faces (m, 3) with valid indices, groups; sha256 of the source."""
 
     vertices: Array
     faces: IntArray

@@ -1,4 +1,4 @@
-"""Physical groups of Gmsh: those of surfaces, and of volumes for the faces that are in none of a surface.
+"""Physical groups of Gmsh: of surfaces, and of volumes for faces without a group of a surface.
 
 Elements of version 2 name their physical group, those of version 4 the entity of the geometry they are on, which may be
 in several.

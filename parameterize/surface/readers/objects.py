@@ -1,4 +1,4 @@
-"""Meshes in memory: objects of trimesh, pyvista and meshio, which are known without importing these libraries."""
+"""Meshes in memory: objects of trimesh, pyvista and meshio, recognised without importing these libraries."""
 
 import hashlib
 import sys

@@ -102,7 +102,7 @@ def _counts(words: Words) -> tuple[int, int]:
 
 
 def _vertex(words: Words, besides: int | None) -> list[float]:
-    """Read a vertex and so many words beside it; None: what is left of its line."""
+    """Read a vertex and skip `besides` further words, or with None the rest of its line."""
     line = words.place()
     found = coordinates(words.next(3), line)
     if besides is None:
@@ -113,7 +113,7 @@ def _vertex(words: Words, besides: int | None) -> list[float]:
 
 
 def _face(words: Words, *, with_colour: bool) -> list[int]:
-    """Read a face `n i_1 ... i_n`, and with its colour what is left of its line."""
+    """Read a face `n i_1 ... i_n`; with a colour, skip the rest of its line."""
     line, size = words.place(), words.next(1)[0]
     if not size.isdecimal() or len(size) > 3:
         raise MeshError(f"line {line}: a face needs its number of corners and as many vertices; {DAMAGED}")

@@ -1,6 +1,6 @@
 """PLY, text and binary: the places of its vertices, the corners of its faces and its triangle strips, groups.
 
-Whole numbers that faces have are their groups. Other elements are left out with a notice, other properties skipped.
+Whole-number properties of faces become groups. Other elements are left out with a notice, other properties skipped.
 """
 
 import re
@@ -28,7 +28,7 @@ READ = ("vertex", "face", "tristrips")
 
 
 def read_ply(data: bytes, max_faces: int) -> Content:
-    """Read a PLY; one that promises more than it holds is refused before its rows are read."""
+    """Read a PLY; a header that promises more than the file holds is refused before the rows are read."""
     data = data.removeprefix(b"\xef\xbb\xbf")
     begin, end = BEGIN.match(data), END.search(data)
     if not begin or not end:
@@ -117,7 +117,7 @@ def _numbers(words: Sequence[str]) -> IntArray:
 
 
 def _groups(element: Element, marks: list[int], columns: Sequence[ArrayLike], before: int) -> Groups:
-    """Return the groups of faces, which `before` other polygons come before, by the columns of their marks."""
+    """Return the groups of faces by the columns of their marks; `before`: the number of polygons before these faces."""
     names = [element.properties[k][0] for k in marks]
     found = by_value(dict(zip(names, columns, strict=True)), element.count)
     return renumbered(found, np.append(np.full(before, -1), np.arange(element.count)))
@@ -166,7 +166,7 @@ def _whole(rows: NDArray[Any] | list[tuple[float, ...]]) -> list[list[int]]:
 
 
 def _parted(strips: list[list[int]]) -> list[list[int]]:
-    """Return strips, of which a -1 parts two."""
+    """Return the strips, which are separated by -1."""
     parted: list[list[int]] = [[]]
     for strip in strips:
         for number in strip:

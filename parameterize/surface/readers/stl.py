@@ -1,7 +1,7 @@
 """STL, text and binary, read by trimesh once the counts are checked.
 
-Of a text, the names of the solids, which may be any words, and what stands before the first one are cut out first;
-where there are several solids, these names are groups.
+Names of solids in a text may be any words: they are removed first, with all lines before the first solid. The names
+of several solids become groups.
 """
 
 import io

@@ -1,7 +1,7 @@
 """Arrays of a VTK XML file: text, base64 or raw, within the file or appended, compressed or not.
 
-Written from vtkXMLWriter and vtkXMLDataParser. A few kilobytes can hold gigabytes of zeros: what blocks unpack to is
-counted while they are unpacked, against a limit for the whole file.
+Written from vtkXMLWriter and vtkXMLDataParser. A few kilobytes can hold gigabytes of zeros: the unpacked bytes are
+counted block by block, against a limit for the whole file.
 """
 
 import lzma
@@ -31,7 +31,7 @@ LZ4 = "vtkLZ4DataCompressor"
 
 @dataclass
 class Decoder:
-    """How the arrays of a file are stored.
+    """Reads the arrays of a file as they are stored.
 
     order: "<" or ">". word: type of the sizes before the data. compressor: VTK's name, "" for none. appended: the bytes
     after the underscore of the section AppendedData. raw: these are no base64. left: bytes that arrays may unpack to.
@@ -110,7 +110,7 @@ class Decoder:
 class Stream:
     """Bytes from where an array begins, raw or base64.
 
-    What stands before the data is encoded with it, or by itself, then filled up by `=` unless nothing is to be filled.
+    The sizes before the data are encoded with them, or by themselves and then padded by `=`.
     """
 
     source: bytes

@@ -27,7 +27,7 @@ from iga_nn.io.formats import load_volume
 from iga_nn.options import MapOptions
 from iga_nn.workflow.output_folder import RunFolder, has_checkpoint
 from iga_nn.workflow.verdict import certified_facts
-from parameterize.quality.distances import SampledBoundary
+from parameterize.spline.sampled_boundary import SampledBoundary
 
 FORK = multiprocessing.get_context("fork")
 

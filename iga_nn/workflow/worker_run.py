@@ -1,4 +1,4 @@
-"""Runs what others watch: the log goes where they read it, steps are told, and the end is a state with its reason."""
+"""Runs a job in a worker process: its log, its progress, and its end as a state with a reason."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from ..report.document import Report
     from .output_folder import Outcome
 
-LOGGERS = ("iga_nn", "parameterize", "solve")  # a run's log goes to these and those below them
-INTERVAL = 0.4  # seconds, at least, between two steps that are told
-SHARE = 0.05  # of a run's time, at most, that telling takes
+LOGGERS = ("iga_nn", "parameterize", "solve")  # the roots of a run's loggers
+INTERVAL = 0.4  # least seconds between two messages of progress
+SHARE = 0.05  # largest share of a run's time for these messages
 
 
 @dataclass(frozen=True)
 class Ended:
-    """Say how a run ended. line: why there is no report."""
+    """Hold the end of a run. line: the reason where there is no report."""
 
     state: Literal["done", "refused", "failed", "stopped"]
     line: str = ""
@@ -33,10 +33,10 @@ class Ended:
 
 
 def ended(run: Callable[[], Outcome | None], less_memory: str) -> Ended:
-    """Run in a worker process and return how it ended; nothing is raised.
+    """Run in a worker process and return the end of the run; nothing is raised.
 
-    The traceback of an internal error is printed here, since only this process knows it. less_memory: the remedy where
-    the memory does not suffice.
+    The traceback of an internal error is printed here, since only this process knows it. less_memory: the remedy for
+    too little memory.
     """
     try:
         outcome = run()
@@ -53,8 +53,8 @@ def ended(run: Callable[[], Outcome | None], less_memory: str) -> Ended:
     return Ended("done", report=outcome.report if outcome else None)
 
 
-def told(tell: Callable[[Progress], None], is_stopped: Callable[[], bool]) -> ProgressCallback:
-    """Return what tells some of the steps of a training, and interrupts it at the next step once it is stopped."""
+def throttled(tell: Callable[[Progress], None], is_stopped: Callable[[], bool]) -> ProgressCallback:
+    """Return a throttled callback of progress that interrupts the training at the next step on request."""
     due = 0.0
 
     def step(progress: Progress) -> None:
@@ -72,7 +72,7 @@ def told(tell: Callable[[Progress], None], is_stopped: Callable[[], bool]) -> Pr
 
 @contextmanager
 def logged(handler: logging.Handler, level: int = logging.NOTSET) -> Iterator[None]:
-    """Give the log of what the block runs to a handler alone; NOTSET leaves the level as it is."""
+    """Send the log of the block to one handler alone; NOTSET leaves the level as it is."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     before = [(logger.level, logger.propagate) for logger in loggers]
     for logger in loggers:

@@ -7,7 +7,7 @@ import pytest
 
 from iga_nn.cli.commands import app
 from iga_nn.options import ElasticityOptions, ElasticityStudyOptions, MapOptions, PoissonOptions, StudyOptions
-from iga_nn.workflow.repeat import command_line
+from iga_nn.workflow.command_line import command_line
 
 
 def options_of(line: str) -> tuple[object, ...]:

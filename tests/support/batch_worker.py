@@ -17,7 +17,7 @@ from small_run import FEW, tiny_config
 from iga_nn.options import MapOptions
 from iga_nn.workflow import pipeline
 from iga_nn.workflow.output_folder import RunFolder
-from parameterize.quality.distances import SampledBoundary
+from parameterize.spline.sampled_boundary import SampledBoundary
 
 HOLD = "corners"  # the stage, after some checkpoints
 

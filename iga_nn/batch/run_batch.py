@@ -10,14 +10,14 @@ from threading import RLock
 from parameterize.files import save_text
 
 from ..errors import InputError, expected_errors, one_line
-from ..kinds import check_kind
 from ..options import MapOptions, PoissonOptions, WorkerOptions
 from ..report import document as reports
 from ..rounding import rounded
+from ..type_check import check_type
 from ..workflow import pipeline
 from ..workflow.cost_estimate import warn_of_memory
 from ..workflow.output_folder import forget, locked, new_folder, writable
-from ..workflow.watched import Ended
+from ..workflow.worker_run import Ended
 from .surfaces import demand_one, entries_of
 from .table import Batch, Row, page
 from .task import Task, Work, compute
@@ -101,24 +101,24 @@ def run_batch(
     >>> len(batch.rows), batch.rows[0].report == outcome.report
     (1, True)
     """
-    mapping, options, workers = mapping or MapOptions(), poisson or PoissonOptions(), workers or WorkerOptions()
+    mapping, statement, workers = mapping or MapOptions(), poisson or PoissonOptions(), workers or WorkerOptions()
     for name, value, kind in (
         ("surfaces", surfaces, tuple[str | Path, ...]),
         ("out", out, str | Path),
         ("mapping", mapping, MapOptions),
-        ("poisson", options, PoissonOptions),
+        ("poisson", statement, PoissonOptions),
         ("workers", workers, WorkerOptions),
         ("progress", progress, Callable | None),
     ):
-        check_kind(name, value, kind)
-    pipeline.checked(mapping, options)
+        check_type(name, value, kind)
+    pipeline.checked(mapping, statement)
     if out == "":
         raise InputError("out is empty: name a folder")
     corners = None if mapping.corners is None else Path(mapping.corners).absolute()
     common = replace(mapping, corners=corners, resume=True)
     entries = entries_of([str(surface) for surface in surfaces], Path(out))
     demand_one(entries)
-    tasks = [Task(entry.name, entry.mesh, entry.folder, common, options, vector) for entry in entries]
+    tasks = [Task(entry.name, entry.mesh, entry.folder, common, statement, vector) for entry in entries]
     return run_tasks(Path(out), tasks, workers, force=force, progress=progress)
 
 
@@ -151,10 +151,10 @@ def _found(task: Task, force: bool) -> Row:
         if force:
             forget(task.folder)
             return row
-        finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.options, vector=task.vector)
+        finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.statement, vector=task.vector)
     except expected_errors() as error:
         refused = row.ended(Ended("refused", one_line(error)))
-        log.warning("%s", refused.told())
+        log.warning("%s", refused.as_line())
         return refused
     return row if finished is None else row.ended(Ended("done", report=finished.report))
 
@@ -198,7 +198,7 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
                 row = batch.rows[waiting[at]].ended(how)
                 batch = batch.with_row(waiting[at], row)
                 _write(batch)
-                log.log(logging.INFO if row.state == "certified" else logging.WARNING, "%s", row.told())
+                log.log(logging.INFO if row.state == "certified" else logging.WARNING, "%s", row.as_line())
                 show()
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {batch.summary}; the same command goes on") from None

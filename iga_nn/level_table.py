@@ -1,4 +1,4 @@
-"""Names the numbers of a level, which is one solve on one mesh, and writes levels as text, tables and CSV."""
+"""Titles of the numbers of a level, which is one solve on one mesh, and the tables of levels as text and CSV."""
 
 from __future__ import annotations
 

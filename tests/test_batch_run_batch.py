@@ -17,7 +17,7 @@ from small_run import small_surface
 
 from iga_nn.cli.commands import main
 
-HERE = Path(__file__).resolve().parent
+SUPPORT = Path(__file__).resolve().parent / "support"
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 PATIENCE = 900.0  # seconds, on a busy machine
 
@@ -29,8 +29,8 @@ class Command:
         scratch = folder / "scratch"
         scratch.mkdir(exist_ok=True)
         environment = os.environ | {
-            "PYTHONPATH": os.pathsep.join((str(HERE.parent), str(HERE))),
-            "DASK_DISTRIBUTED__WORKER__PRELOAD": str(HERE / "batch_worker.py"),
+            "PYTHONPATH": os.pathsep.join((str(SUPPORT.parents[1]), str(SUPPORT))),
+            "DASK_DISTRIBUTED__WORKER__PRELOAD": str(SUPPORT / "batch_worker.py"),
             "TMPDIR": str(scratch),
         }
         command = [sys.executable, "-P", "-m", "iga_nn", "batch", *arguments, "--refine", "0", "--out", "out"]

@@ -9,7 +9,7 @@ import pytest
 from mpi_job import mpiexec
 
 from iga_nn.cli.commands import main
-from iga_nn.workflow import processes
+from iga_nn.workflow import mpi_job
 from solve import Poisson, SplineField, benchmark_volume, solve_problem
 
 SOLVE = ("mpi_command.py", "solve", "poisson", "map.npz", "--refine", "1", "--mpi", "--quiet")
@@ -59,8 +59,8 @@ class _Others:
 
 def test_a_process_that_fails_alone_says_why(monkeypatch, capsys):
     for name in ("GRACE", "PRINTING"):
-        monkeypatch.setattr(processes, name, 0.0)
-    with pytest.raises(SystemExit) as ended, processes.together(_Others()):
+        monkeypatch.setattr(mpi_job, name, 0.0)
+    with pytest.raises(SystemExit) as ended, mpi_job.together(_Others()):
         raise MemoryError
     logging.disable(logging.NOTSET)
     assert ended.value.code == 2

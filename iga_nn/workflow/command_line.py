@@ -8,15 +8,15 @@ from typing import Any
 SILENT = ("resume",)  # changes how a result is reached, not what it is
 
 
-def command_line(command: str, source: str | Path, *options: Any, **given: Any) -> str:
+def command_line(command: str, source: str | Path, *chosen: Any, **given: Any) -> str:
     """Return one line for a shell: the command, its input, and every option that is not the default.
 
-    options: frozen dataclasses of `iga_nn.options`. given: further options by name, left out where they are None.
+    chosen: frozen dataclasses of `iga_nn.options`. given: further options by name, left out where they are None.
     """
     words = ["iga-nn", *command.split(), str(source)]
-    for chosen in options:
-        for field in fields(chosen):
-            value = getattr(chosen, field.name)
+    for group in chosen:
+        for field in fields(group):
+            value = getattr(group, field.name)
             if value != field.default and field.name not in SILENT:
                 words += _words(field.name, value)
     for name, value in given.items():

@@ -1,4 +1,4 @@
-"""Runs a command on the processes of an MPI job: one prints and writes, and none waits for one that failed."""
+"""Runs a command on the processes of an MPI job: one prints and writes, and none waits for a process that failed."""
 
 import logging
 import sys
@@ -10,9 +10,9 @@ from typing import Any
 from ..errors import InputError, one_line
 
 FAILED = 2  # exit code
-GRACE = 10.0  # seconds in which all processes must fail where one does
+GRACE = 10.0  # seconds in which all processes must fail once one has failed
 POLL = 0.02  # seconds
-PRINTING = 0.5  # seconds that mpiexec has to pass on a line before it ends all processes
+PRINTING = 0.5  # seconds for mpiexec to pass on a line before it ends all processes
 
 
 def all_processes() -> Any:
@@ -29,9 +29,9 @@ def all_processes() -> Any:
 
 @contextmanager
 def together(comm: Any) -> Iterator[None]:
-    """Let the block fail on all processes or on none; only the first one says why.
+    """Let the block fail on all processes or on none; only the first process prints the reason.
 
-    Where it fails on one while others wait for it, that one says why and ends the job.
+    A process that fails while others wait for it prints the reason and ends the job.
     """
     if comm.rank > 0:
         logging.disable()

@@ -1,6 +1,7 @@
 """A surface and options whose training takes about a second."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from shapes import rounded_cube, turned
@@ -8,6 +9,7 @@ from shapes import rounded_cube, turned
 from parameterize.config import NetworkConfig, preset
 from parameterize.surface.surface import surface_from_arrays
 
+BATCH_WORKER = Path(__file__).with_name("batch_worker.py")
 STEPS = (6, 4, 8, 4, 8)
 FEW = (40,)  # samples a direction of a face of the spline's boundary; 160 otherwise
 

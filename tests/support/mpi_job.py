@@ -5,10 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-TESTS = Path(__file__).parent
+SUPPORT = Path(__file__).parent
 ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
-    "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS))),
+    "PYTHONPATH": os.pathsep.join(map(str, (SUPPORT.parents[1], SUPPORT))),
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
@@ -18,7 +18,15 @@ ENVIRONMENT = {
 
 def mpiexec(ranks, script, *arguments, cwd, **environment):
     """Return what a script of this folder ends with, in a folder, on some processes."""
-    command = [Path(sys.executable).with_name("mpiexec"), "-n", ranks, sys.executable, "-P", TESTS / script, *arguments]
+    command = [
+        Path(sys.executable).with_name("mpiexec"),
+        "-n",
+        ranks,
+        sys.executable,
+        "-P",
+        SUPPORT / script,
+        *arguments,
+    ]
     return subprocess.run(
         list(map(str, command)),
         cwd=cwd,

@@ -9,13 +9,13 @@ import signal
 import solve.system as system
 from iga_nn.__main__ import run_and_exit
 from iga_nn.report import viewer
-from iga_nn.workflow import processes
+from iga_nn.workflow import mpi_job
 from iga_nn.workflow.output_folder import RunFolder
 from parameterize.conjugate_gradients import conjugate_gradients
 
 RunFolder.draw = lambda *_, **__: None
 viewer.scene_of = lambda *_, **__: None
-processes.GRACE = 1.0
+mpi_job.GRACE = 1.0
 
 
 def failing(*arguments):

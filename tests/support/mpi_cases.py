@@ -1,4 +1,4 @@
-"""Problems that 1, 2, 3, 4 and 7 processes of an MPI job solve together: `mpiexec -n 7 python mpi_cases.py FOLDER`.
+"""Problems that 1, 2, 4 and 7 processes of an MPI job solve together: `mpiexec -n 7 python mpi_cases.py FOLDER`.
 
 The first of each group writes, into a folder named after their number, NAME.npy, the coefficients of each problem, and
 found.json: the reports, and how many processes raised the error that the data of some of them cause.
@@ -70,7 +70,7 @@ def refused(comm):
     return 0
 
 
-GROUPS = ((1, 2, 4), (3,), (7,))  # at work at the same time
+GROUPS = ((1, 2, 4), (7,))  # at work at the same time
 
 
 def main(folder):

@@ -1,4 +1,4 @@
-"""Checks the values of a dataclass against its annotations: Python does not, and the command line does it itself."""
+"""Checks the values of a dataclass against its annotations, for calls from Python; the command line converts texts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -22,17 +22,17 @@ _KINDS: dict[Any, tuple[tuple[type, ...], str]] = {
 
 @dataclass(frozen=True)
 class Checked:
-    """A base of dataclasses whose values are of the kinds that they are annotated with. Raises InputError."""
+    """A base of dataclasses that refuse a value of another type than its annotation, with an InputError."""
 
     def __post_init__(self) -> None:
-        """Refuse the first field whose value is of another kind."""
+        """Refuse the first field whose value has another type."""
         hints = get_type_hints(type(self))
         for field in fields(self):
-            check_kind(field.name.replace("_", " "), getattr(self, field.name), hints[field.name])
+            check_type(field.name.replace("_", " "), getattr(self, field.name), hints[field.name])
 
 
-def check_kind(name: str, value: Any, hint: Any) -> None:
-    """Raise InputError for a value that is not of the kind that an annotation names."""
+def check_type(name: str, value: Any, hint: Any) -> None:
+    """Raise InputError for a value of another type than the annotation `hint`."""
     if not _fits(value, hint):
         raise InputError(f"{name}: must be {_in_words(hint)}, got {value!r:.80}")
 

@@ -1,0 +1,80 @@
+"""Defines the arguments that several commands share, and how their texts are converted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+from cyclopts import CycloptsError, Parameter, Token, convert
+
+from ..options import (
+    ElasticityOptions,
+    ElasticityStudyOptions,
+    MapOptions,
+    ModesOptions,
+    PoissonOptions,
+    ProblemOptions,
+    StudyOptions,
+    SurfaceOptions,
+    WorkerOptions,
+)
+
+
+def converted(kind: Any, tokens: Sequence[Token]) -> Any:
+    """Convert an argument as cyclopts does, but refuse a fraction for a whole number: it would be rounded."""
+    if int in (kind, *get_args(kind)) and (wrong := [token for token in tokens if "." in token.value]):
+        raise CycloptsError(msg=f"{wrong[0].keyword}: must be a whole number, got {wrong[0].value}")
+    return convert(kind, tokens)
+
+
+Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
+Volume = Annotated[
+    Path, Parameter(help="volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.")
+]
+ObjFile = Annotated[Path | None, Parameter(help="file to write; NAME.obj in the current folder by default.")]
+Overwrite = Annotated[bool, Parameter(help="replace that file where it has other content.")]
+Mpi = Annotated[
+    bool, Parameter(help="share the solve among the processes of `mpiexec -n 4 iga-nn solve ...`; docs/mpi.md.")
+]
+Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.")]
+
+
+@dataclass(frozen=True)
+class OutputOptions:
+    """Say where the results go, and what is printed.
+
+    Args:
+        out: output folder; the input's stem in the current folder by default.
+        force: replace a finished result in that folder.
+        vector: write plots of curves (loss history, errors over the mesh size) as PDF, too.
+        quiet: show no progress.
+    """
+
+    out: str | None = None
+    force: bool = False
+    vector: bool = False
+    quiet: bool = False
+    as_json: Json = False
+
+    @property
+    def folder(self) -> dict[str, Any]:
+        """Return what the pipeline takes of these options."""
+        return {"out": self.out, "force": self.force, "vector": self.vector}
+
+
+@dataclass(frozen=True)
+class PageOptions(MapOptions):
+    """Say how surfaces of the live page become volumes: what belongs to one surface is no option there."""
+
+    corners: Annotated[Path | None, Parameter(parse=False)] = None
+    resume: Annotated[bool, Parameter(parse=False)] = False
+
+
+for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions, ModesOptions):
+    Parameter(name="*")(kind)  # each field of these options, and of those derived from them, is a flag
+
+OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
+WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
+PAGE, MODES = PageOptions(), ModesOptions()

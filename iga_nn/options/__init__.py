@@ -1,0 +1,16 @@
+"""Holds the options of the pipeline and of the command line, and checks their values."""
+
+from .analysis import ElasticityStudyOptions as ElasticityStudyOptions
+from .analysis import ModesOptions as ModesOptions
+from .analysis import StudyOptions as StudyOptions
+from .mapping import MapOptions as MapOptions
+from .mapping import SurfaceOptions as SurfaceOptions
+from .problem import NO_UNITS as NO_UNITS
+from .problem import PROBLEMS as PROBLEMS
+from .problem import ElasticityOptions as ElasticityOptions
+from .problem import PoissonOptions as PoissonOptions
+from .problem import ProblemOptions as ProblemOptions
+from .problem import Units as Units
+from .space import check_size as check_size
+from .space import check_space as check_space
+from .workers import WorkerOptions as WorkerOptions

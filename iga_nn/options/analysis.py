@@ -1,0 +1,125 @@
+"""Holds the options of convergence studies and of modes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from ..errors import InputError, input_errors
+from ..type_check import Checked
+from .problem import ElasticityOptions, Formula, PoissonOptions
+from .space import check_level, check_space
+
+if TYPE_CHECKING:
+    from solve import Elasticity
+    from solve.forms.boundary_value_problem import BoundaryValueProblem
+
+
+@dataclass(frozen=True)
+class StudyOptions(Checked):
+    """Give an exact solution of Poisson's problem, and the trial spaces it is approximated in.
+
+    Attributes:
+        exact: the solution, a formula in x, y, z or X, Y, Z (scaled to volume 1 about the middle); exp(X+Z)*sin(Y) by
+            default. One that starts with a minus is written --exact=-x.
+        degree: one or more degrees; that of the map by default.
+        refine: levels to solve on, 0 1 2 or 0..2; level n halves every knot span of the map n times.
+    """
+
+    exact: Formula | None = None
+    degree: tuple[int, ...] = ()
+    refine: tuple[str, ...] = ("0..2",)
+
+    command: ClassVar[str] = "study"
+
+    def problem(self) -> BoundaryValueProblem:
+        """Return the problem of these options. Raises InputError."""
+        return PoissonOptions(exact=self.exact).problem()
+
+    def levels(self) -> list[int]:
+        """Return the refinement levels in order. Raises InputError, also for degrees that cannot be run."""
+        levels = [level for text in self.refine for level in _range(text)]
+        if len(set(self.degree)) != len(self.degree):
+            raise InputError(f"degree {self.degree}: give distinct degrees")
+        for degree in self.degree or (None,):
+            check_space(levels, degree)
+        return sorted(levels)
+
+
+@dataclass(frozen=True)
+class ElasticityStudyOptions(StudyOptions):
+    """Give an exact displacement of an elastic body, and the trial spaces it is approximated in.
+
+    Attributes:
+        exact: the displacement, a vector: three formulas in x, y, z or X, Y, Z (scaled to volume 1 about the middle),
+            separated by semicolons, in quotes: "x*y;0;sin(z)".
+        traction: faces with the traction of that displacement; the others carry the displacement itself.
+        young: Young's modulus E.
+        poisson_ratio: Poisson's ratio nu.
+    """
+
+    traction: tuple[str, ...] = ()
+    young: float = 1.0
+    poisson_ratio: float = 0.3
+
+    command: ClassVar[str] = "study elasticity"
+
+    def problem(self) -> BoundaryValueProblem:
+        """Return the problem of these options. Raises InputError."""
+        if given := [entry for entry in self.traction if "=" in entry]:
+            face = given[0].partition("=")[0]
+            raise InputError(f"traction {given[0]}: a study takes that of the exact displacement: write {face} alone")
+        if self.exact is None:
+            raise InputError("no solution to compare with: give the displacement as --exact 'x*y;sin(z);x'")
+        own = ElasticityOptions(self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio)
+        return own.problem()
+
+
+@dataclass(frozen=True)
+class ModesOptions(Checked):
+    """State which vibrations of an elastic body are sought, what it is made of and where it is held.
+
+    Attributes:
+        young: Young's modulus E.
+        poisson_ratio: Poisson's ratio nu.
+        density: mass per volume, in units that agree with those of E and of the volume.
+        number: how many modes, from the lowest frequency on.
+        fix: regions of the boundary that are held, as in `run elasticity`: "nz < -0.9", "face(x, y, z)", group:NAME,
+            u0; without any the body is free, and its rigid motions are left out.
+        roller: regions held along their normal alone.
+        refine: how often every knot span of the map is halved.
+        degree: degree of the trial space; that of the map by default.
+    """
+
+    young: float = 1.0
+    poisson_ratio: float = 0.3
+    density: float = 1.0
+    number: int = 6
+    fix: tuple[str, ...] = ()
+    roller: tuple[str, ...] = ()
+    refine: int = 0
+    degree: int | None = None
+
+    def problem(self) -> Elasticity:
+        """Return the body, without loads. Raises InputError."""
+        from parameterize.spline.volume import FACE_NAMES
+        from solve import Elasticity
+        from solve.modes import check_modes
+
+        check_space([self.refine], self.degree)
+        free = {} if self.fix or self.roller else dict.fromkeys(FACE_NAMES, ["0"] * 3)
+        held = {"fix": self.fix or None, "roller": self.roller or None}
+        with input_errors():
+            check_modes(self.density, self.number)
+            return Elasticity(traction=free, young=self.young, poisson_ratio=self.poisson_ratio, **held)
+
+
+def _range(text: str) -> list[int]:
+    """Return a level, or all from the first to the last of "0..4". Raises InputError."""
+    first, dots, last = text.partition("..")
+    if not (first.isdecimal() and (last.isdecimal() or not dots)):
+        raise InputError(f"refine {text!r}: write levels such as 0 1 2, or a range such as 0..2")
+    check_level(int(last or first))  # before the list is made
+    if int(last or first) < int(first):
+        raise InputError(f"refine {text!r}: the range ends before it begins; write {last}..{first}")
+    return list(range(int(first), int(last or first) + 1))

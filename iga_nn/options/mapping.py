@@ -1,0 +1,100 @@
+"""Holds the options of a surface and of the map that is made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from parameterize.config import MAX_CONTROL_POINTS
+
+from ..errors import InputError, input_errors
+from ..type_check import Checked
+
+if TYPE_CHECKING:
+    from parameterize.config import Config
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceOptions(Checked):
+    """Say which surface is taken from a file.
+
+    Attributes:
+        component: number of the connected component to take, counted from 0.
+        max_faces: refuse surfaces with more faces.
+        decimate: reduce surfaces with more faces to max_faces instead; a notice says how far they moved.
+    """
+
+    component: int | None = None
+    max_faces: int = 500_000
+    decimate: bool = False
+
+    def reading(self) -> dict[str, Any]:
+        """Return the keywords of `models.resolve`."""
+        return {field.name: getattr(self, field.name) for field in fields(SurfaceOptions)}
+
+
+@dataclass(frozen=True)
+class MapOptions(SurfaceOptions):
+    """Say how a surface becomes a volume.
+
+    Attributes:
+        preset: "fast", made for two CPU cores; "grown", where every map grows from a cube, also of easy shapes; or
+            "paper", the paper's own settings.
+        seed: equal seeds give equal volumes, bit for bit.
+        device: where the network is trained; "auto" takes CUDA where it is available.
+        control_points: number of control points per direction; "auto" starts with 30 and adds more where the surface is
+            not met, each direction its own, until the tolerance is met or there are max_control_points.
+        corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the
+            cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
+            {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
+        resume: continue from the checkpoint in the output folder.
+        steps_factor: multiply the steps of every stage by this factor; a small one gives a quick look.
+        tolerance: of control_points "auto": root mean square distance between surface and spline, taken both ways, over
+            the diagonal of the surface's bounding box.
+        max_control_points: of control_points "auto": at most so many per direction, 30 or more, with which it starts.
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.MapOptions(control_points=20, steps_factor=0.5).config().spline.control_points
+        20
+    """
+
+    preset: Literal["fast", "grown", "paper"] = "fast"
+    seed: int = 0
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    control_points: int | Literal["auto"] = 30
+    corners: Path | None = None
+    resume: bool = False
+    steps_factor: float = 1.0
+    tolerance: float = 5e-4
+    max_control_points: int = 60
+
+    def config(self) -> Config:
+        """Return the configuration of these options. Raises InputError for values that cannot be run."""
+        from parameterize.config import preset
+
+        if self.seed < 0:
+            raise InputError(f"seed {self.seed}: must not be negative")
+        with input_errors():
+            config = preset(self.preset).scaled(self.steps_factor)
+            if self.control_points == "auto":
+                first = config.spline.control_points
+                _check_count("max control points", self.max_control_points, first, f"; auto starts with {first}")
+                return config.refined(self.tolerance, self.max_control_points)
+            _check_count("control points", self.control_points, config.spline.degree + 1)
+            for name in ("tolerance", "max_control_points"):
+                if getattr(self, name) != getattr(MapOptions, name):
+                    raise InputError(f"{name.replace('_', ' ')}: has a meaning with --control-points auto alone")
+            return config.with_control_points(self.control_points)
+
+    @property
+    def most_control_points(self) -> int:
+        """Return how many control points a direction may get."""
+        return self.max_control_points if self.control_points == "auto" else self.control_points
+
+
+def _check_count(name: str, count: int, fewest: int, reason: str = "") -> None:
+    """Raise InputError for a number of control points that cannot be run."""
+    if not fewest <= count <= MAX_CONTROL_POINTS:
+        raise InputError(f"{name} {count}: at least {fewest}, at most {MAX_CONTROL_POINTS} per direction{reason}")

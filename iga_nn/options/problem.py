@@ -1,0 +1,244 @@
+"""Holds the options of a boundary value problem: its law, its data, and the meshes it is solved on."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import KW_ONLY, dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from ..errors import InputError, input_errors
+from ..type_check import Checked
+from . import texts
+from .space import check_space
+
+if TYPE_CHECKING:
+    from solve import Elasticity, Poisson, SolveOptions
+    from solve.forms.boundary_value_problem import BoundaryValueProblem
+
+Formula = str  # one that starts with a minus is written --option=-x
+
+LONGEST_UNIT = 20  # letters
+MOST_ITERATIONS = 3000  # of an elastic body; a bracket held at one end takes 680, and some 1600 after a refinement
+
+
+@dataclass(frozen=True)
+class Units:
+    """Hold the texts that stand behind the values of a solution and behind stresses, None where none is given."""
+
+    displacement: str | None = None
+    stress: str | None = None
+
+
+NO_UNITS = Units()
+
+
+@dataclass(frozen=True)
+class ProblemOptions(Checked, ABC):
+    """Hold what every PDE of the command line is told: its exact solution, the meshes it is solved on, and how.
+
+    A new PDE is a subclass with options of its own, entered in PROBLEMS.
+
+    Attributes:
+        refine: levels to solve on; level n halves every knot span of the map n times.
+        degree: degree of the trial space; that of the map by default.
+        quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
+            points a span; "gauss", degree points a span.
+        unit: of lengths, such as mm: free text, which stands behind lengths and places and changes no number.
+    """
+
+    exact: Formula | None = None
+    _: KW_ONLY
+    refine: tuple[int, ...] = (0, 1)
+    degree: int | None = None
+    quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
+    unit: str | None = None
+
+    section: ClassVar[str]  # its name on the command line and in report.json
+    title: ClassVar[str]
+
+    @abstractmethod
+    def problem(self) -> BoundaryValueProblem:
+        """Return the problem of these options. Raises InputError."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("unit", "stress_unit"):
+            text = getattr(self, name, None)
+            if text is not None and not (text.strip() and text.isprintable() and len(text) <= LONGEST_UNIT):
+                flag = "--" + name.replace("_", "-")
+                raise InputError(f"{flag} {text!r:.80}: give a short text such as mm, at most {LONGEST_UNIT} letters")
+
+    @property
+    def units(self) -> Units:
+        """Return what stands beside colour bars."""
+        return NO_UNITS
+
+    def solve_options(self) -> SolveOptions:
+        """Return the options of the solve on the finest mesh."""
+        from solve import SolveOptions
+
+        return SolveOptions(refine=max(self.refine), degree=self.degree, quadrature=self.quadrature)
+
+
+@dataclass(frozen=True)
+class PoissonOptions(ProblemOptions):
+    """State -div(kappa grad u) + c u = f on the volume, with data on its six faces, and the meshes it is solved on.
+
+    A formula may use x, y, z, in the input's units, and X, Y, Z, the same scaled to volume 1 about the middle of the
+    volume's bounding box: X = (x - c) / V^(1/3). A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and
+    so on.
+
+    Attributes:
+        exact: exact solution, a formula, from which f and g follow; errors are reported. It is exp(X+Z)*sin(Y) where
+            neither f nor g is given. A formula that starts with a minus is written --exact=-x.
+        source: f, a formula.
+        boundary: g, the values of u, a formula.
+        kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz.
+        reaction: c, a formula.
+        neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for that of the exact solution.
+        robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
+            solution.
+        value: regions of the boundary with given values of u, each as "REGION=FORMULA", or REGION for zero or the exact
+            solution. A region is a condition on position and outward normal, "nz > 0.9 and x < 2", a face of the part,
+            "face(x, y, z)", a group of the mesh, group:NAME, a box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where
+            regions are given, all else of the boundary has no flux, and the source is zero unless it is given.
+        flux: regions with a given flux kappa du/dn into the body, each as "REGION=FORMULA".
+        exchange: regions where kappa du/dn = alpha (outside - u), each as "REGION=ALPHA:OUTSIDE".
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.PoissonOptions(source="1", robin=("u1=2:0",), refine=(0,)).problem().robin
+        {'u1': ('2', '0')}
+    """
+
+    source: Formula | None = None
+    boundary: Formula | None = None
+    kappa: Formula | None = None
+    reaction: Formula | None = None
+    neumann: tuple[str, ...] = ()
+    robin: tuple[str, ...] = ()
+    value: tuple[str, ...] = ()
+    flux: tuple[str, ...] = ()
+    exchange: tuple[str, ...] = ()
+
+    section: ClassVar[str] = "poisson"
+    title: ClassVar[str] = "Poisson's equation"
+
+    def problem(self) -> Poisson:
+        """Return the problem of these options. Raises InputError."""
+        from solve import Poisson
+
+        check_space(self.refine, self.degree)
+        robin = {}
+        for face, text in texts.faces("robin", self.robin).items():
+            alpha, colon, g = (text or "").partition(":")
+            if not alpha.strip():
+                raise InputError(f"robin {face}: write {face}=ALPHA or {face}=ALPHA:FORMULA")
+            robin[face] = (alpha, g if colon else None)
+        with input_errors():
+            return Poisson(
+                exact=self.exact,
+                source=self.source,
+                boundary=self.boundary,
+                kappa=None if self.kappa is None else self.kappa.split(","),
+                reaction=self.reaction,
+                neumann=texts.faces("neumann", self.neumann),
+                robin=robin,
+                value=texts.on_regions("value", self.value, str),
+                inflow=texts.on_regions("flux", self.flux, str),
+                exchange=texts.on_regions("exchange", self.exchange, texts.pair),
+            )
+
+
+@dataclass(frozen=True)
+class ElasticityOptions(ProblemOptions):
+    """State linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
+
+    A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
+    or X, Y, Z (scaled to volume 1 about the middle), separated by semicolons, in quotes: "x*y;0;sin(z)"; 0 is the zero
+    vector.
+
+    Attributes:
+        exact: exact displacement, a vector, from which force and boundary data follow; errors are reported. One that
+            starts with a minus is written --exact="-x;0;0".
+        body_force: force per volume, a vector; zero where neither it nor exact is given.
+        displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
+        traction: faces where a traction is given, each as "FACE=VECTOR", FACE=0 for a face that is free, or FACE for
+            that of the exact solution.
+        young: Young's modulus E.
+        poisson_ratio: Poisson's ratio nu.
+        fix: regions of the boundary that are held, each as REGION, or "REGION=VECTOR" for a given displacement; an
+            entry of the vector that is left out is free: "x < 1=0;;". A region is a condition on position and outward
+            normal, "nz > 0.9 and x < 2", a face of the part, "face(x, y, z)", a group of the mesh, group:NAME, a
+            box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where regions are given, all else of the boundary is
+            free.
+        roller: regions held along their normal alone.
+        symmetry: the same: where a plane of symmetry cuts the body.
+        load: regions with a force per area, each as "REGION=VECTOR".
+        pressure: regions with a force per area against the outward normal, each as "REGION=FORMULA".
+        spring: regions on an elastic foundation, force per area and displacement, each as "REGION=FORMULA".
+        stress_unit: of stresses, such as MPa: free text, which stands behind stresses and changes no number.
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.ElasticityOptions(body_force="0;0;-1", young=210.0).problem().force
+        ['0', '0', '-1']
+    """
+
+    body_force: Formula | None = None
+    displacement: Formula | None = None
+    traction: tuple[str, ...] = ()
+    young: float = 1.0
+    poisson_ratio: float = 0.3
+    fix: tuple[str, ...] = ()
+    roller: tuple[str, ...] = ()
+    symmetry: tuple[str, ...] = ()
+    load: tuple[str, ...] = ()
+    pressure: tuple[str, ...] = ()
+    spring: tuple[str, ...] = ()
+    stress_unit: str | None = None
+
+    section: ClassVar[str] = "elasticity"
+    title: ClassVar[str] = "linear elasticity"
+
+    def solve_options(self) -> SolveOptions:
+        """Return the options of the solve on the finest mesh: a slender body takes more iterations than a scalar."""
+        return replace(super().solve_options(), max_iterations=MOST_ITERATIONS)
+
+    @property
+    def units(self) -> Units:
+        """Return what stands beside colour bars."""
+        return Units(self.unit, self.stress_unit)
+
+    def problem(self) -> Elasticity:
+        """Return the problem of these options. Raises InputError."""
+        from solve import Elasticity
+
+        check_space(self.refine, self.degree)
+        loads = self.exact, self.body_force, self.displacement, self.traction, self.load, self.pressure, self.fix
+        if not any(loads):
+            raise InputError(
+                "no load is given: --load 'nz > 0.9=0;0;-1', --pressure, --body-force '0;0;-1' or --traction"
+            )
+        traction = texts.faces("traction", self.traction)
+        with input_errors():
+            body = Elasticity(
+                exact=texts.vector("--exact", self.exact),
+                force=texts.vector("--body-force", self.body_force),
+                displacement=texts.vector("--displacement", self.displacement),
+                traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
+                young=self.young,
+                poisson_ratio=self.poisson_ratio,
+                fix=texts.on_regions("fix", self.fix, texts.parts),
+                roller=texts.on_regions("roller", self.roller, str),
+                symmetry=texts.on_regions("symmetry", self.symmetry, str),
+                load=texts.on_regions("load", self.load, partial(texts.vector, "--load")),
+                pressure=texts.on_regions("pressure", self.pressure, str),
+                spring=texts.on_regions("spring", self.spring, str),
+            )
+            body.demand_held()
+            return body
+
+
+PROBLEMS: dict[str, type[ProblemOptions]] = {kind.section: kind for kind in (PoissonOptions, ElasticityOptions)}

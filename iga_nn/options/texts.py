@@ -1,0 +1,66 @@
+"""Reads the texts in which an option states data: FACE=TEXT, REGION=DATA, vectors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from ..errors import InputError
+
+_EQUALS = re.compile("(?<![<>=])=(?!=)")
+_QUOTED = re.compile("\"[^\"]*\"|'[^']*'")
+
+
+def faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
+    """Return FACE=TEXT and FACE entries as a table. Raises InputError for a face named twice."""
+    found: dict[str, str | None] = {}
+    for entry in entries:
+        face, equals, text = entry.partition("=")
+        if face in found:
+            raise InputError(f"{name}: face {face} is given twice")
+        found[face] = text if equals else None
+    return found
+
+
+def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) -> dict[str, Any] | None:
+    """Return REGION=DATA and REGION entries as a table, None without entries. Raises InputError for a region twice.
+
+    read: makes data of their text; an entry without data has None. The = of <= and >=, and what stands between quotes,
+    belongs to the region.
+    """
+    found: dict[str, Any] = {}
+    for entry in entries:
+        split = _EQUALS.search(_QUOTED.sub(lambda text: "." * len(text[0]), entry))
+        region = (entry if split is None else entry[: split.start()]).strip()
+        if not region:
+            raise InputError(f"{kind} {entry!r:.80}: write a region before the =, such as 'nz > 0.9'")
+        if region in found:
+            raise InputError(f"{kind}: region {region!r:.80} is given twice")
+        found[region] = None if split is None else read(entry[split.end() :].strip())
+    return found or None
+
+
+def pair(text: str) -> tuple[str, str]:
+    """Return a factor and what the outside has, from ALPHA:OUTSIDE. Raises InputError."""
+    factor, colon, outside = text.partition(":")
+    if not (factor.strip() and colon and outside.strip()):
+        raise InputError(f"exchange {text!r:.80}: write REGION=ALPHA:OUTSIDE, such as 'nz > 0.9=25:20'")
+    return factor, outside
+
+
+def parts(text: str) -> list[str | None] | None:
+    """Return the formulas of a vector, None for an entry that is left out."""
+    entries = vector("--fix", text)
+    return None if entries is None else [entry if entry.strip() else None for entry in entries]
+
+
+def vector(flag: str, text: str | None) -> list[str] | None:
+    """Return the formulas of a vector; "0" is the zero vector. Raises InputError where they are not three."""
+    if text is None:
+        return None
+    entries = ["0"] * 3 if text.strip() == "0" else text.split(";")
+    if len(entries) != 3:
+        form = "write three formulas with semicolons between them, such as '0;0;-1', or 0 for none"
+        raise InputError(f"{flag} {text!r:.80}: {form}")
+    return entries

@@ -1,0 +1,286 @@
+"""BoundaryValueProblem: a law and its data in the volume and on its boundary, as the solver asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from parameterize.arrays import Array
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+
+from ..field import SplineField
+from .condition import WITH_FACTOR, Condition
+from .data import Data, Datum, demand, finite, parse
+from .form import Form, check_shapes, strong_form, strong_terms
+from .frame import UnitFrame
+from .jets import Jet, Numbers, coordinates, known
+from .parser import Expression
+from .region import Part
+
+Natural = Mapping[str, Data | None]
+Robin = Mapping[str, tuple[Data, Data | None]]
+
+
+class BoundaryValueProblem:
+    """What the solver asks of a problem: its law, and its data at points (3, ...), components first.
+
+    Data have roles: exact, source, boundary; "neumann u0", "robin u0" and "robin u0: alpha" of a face; and those of the
+    law's own coefficients. Every method raises ExpressionError where data are not finite.
+    """
+
+    form: Form
+    exact: Data | None
+    of_coordinates: ClassVar[bool] = False  # whether functions as data take three arrays x, y, z
+    labels: ClassVar[Mapping[str, str]] = {}  # role -> name in messages, where that is another
+    natural: tuple[str, ...]  # faces on which the flux through them is given
+    dirichlet: tuple[str, ...]  # faces on which u itself is given
+    conditions: tuple[Condition, ...]  # on regions of the boundary; where there are any, all else of it is free
+    data: Mapping[str, Datum]  # by role
+
+    def _set(
+        self,
+        given: Mapping[str, Data | None],
+        neumann: Natural,
+        robin: Robin,
+        conditions: tuple[Condition, ...] = (),
+        **counts: int,
+    ) -> None:
+        """Parse the data. Raises ValueError where they do not fit together or cannot be known.
+
+        counts: role -> how many entries its datum has, where these are not the law's components.
+        """
+        if not isinstance(count := self.form.components, int) or count < 1:
+            raise ValueError(
+                f"{type(self.form).__name__}.components must be a whole number, 1 or more, got {count!r:.80}"
+            )
+        for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
+            if not isinstance(faces, Mapping):
+                raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
+            for face in faces:
+                if face not in FACE_NAMES:
+                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
+        if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
+            raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
+        if both := neumann.keys() & robin.keys():
+            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give one of them")
+        on_faces = {f"neumann {face}": entry for face, entry in neumann.items()}
+        for face, (alpha, entry) in robin.items():
+            on_faces |= {f"robin {face}: alpha": alpha, f"robin {face}": entry}
+        data = {}
+        for role, entry in {**given, **on_faces}.items():
+            if entry is not None:
+                count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
+                face = role.split(":")[0].partition(" ")[2]
+                data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
+        on_regions = {role: pair for condition in conditions for role, pair in condition.given().items()}
+        for role, (entry, size) in on_regions.items():
+            if entry is not None:
+                count = size or self.form.components
+                data[role] = parse(role, entry, count, of_coordinates=self.of_coordinates)
+        dirichlet = tuple(face for face in FACE_NAMES if face not in neumann and face not in robin)
+        if conditions:
+            if on_faces or given.get("boundary") is not None:
+                raise ValueError(
+                    f"give data on regions, or on faces by {self.label('boundary')}, {self.label('neumann')} and "
+                    'robin, not both: a face of the cube is a region, too, as in "u0"'
+                )
+            strong = {face for condition in conditions if condition.is_strong for face in condition.region.faces}
+            dirichlet = tuple(face for face in FACE_NAMES if face in strong)
+        for name, value in (
+            ("data", data),
+            ("natural", tuple(neumann)),
+            ("dirichlet", dirichlet),
+            ("conditions", conditions),
+        ):
+            object.__setattr__(self, name, value)
+        for role in ("source", *on_faces, *on_regions):
+            if role not in data:
+                self._check_derived(role)
+
+    def _check_derived(self, role: str) -> None:
+        """Raise ValueError where data that are not given do not follow from `exact`."""
+        name, exact = self.label(role), self.data.get("exact")
+        if exact is None:
+            zero = '"0"' if self.form.components == 1 else '("0", ...)'
+            raise ValueError(f"{name} has no data: give {name}={zero} for none, or the solution as formulas in exact")
+        why = (
+            ""
+            if exact.is_formula
+            else "exact is a function, a field or a choice (where, min, max), whose derivatives are unknown"
+        )
+        why = why or (self.not_differentiable if role == "source" else "")
+        if why:
+            raise ValueError(f"{name} has no data: {why}; give {name}=... too, or formulas")
+
+    def label(self, role: str) -> str:
+        """Return the name by which messages call the datum of a role."""
+        first, _, rest = role.partition(" ")
+        return f"{self.labels.get(first, first)} {rest}".rstrip()
+
+    @property
+    def formulas(self) -> list[tuple[str, Datum, Expression]]:
+        """The data that are formulas: role, datum, and each of its formulas."""
+        return [(role, datum, entry) for role, datum in self.data.items() for entry in datum.formulas]
+
+    def on(self, volume: BSplineVolume) -> Self:
+        """Return the same problem with X, Y, Z measured in a volume: its size is 1 in them, the middle of its box 0.
+
+        Raises ValueError for a field that was found on another volume.
+        """
+        for datum in self.data.values():
+            if not all(entry.fits(volume) for entry in datum.entries if isinstance(entry, SplineField)):
+                raise ValueError(
+                    f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
+                )
+        return self.placed(UnitFrame.of(volume)) if self.is_scaled else self
+
+    def demand_held(self) -> None:
+        """Raise ValueError where it is plain from the data that nothing fixes the solution."""
+
+    @property
+    def is_scaled(self) -> bool:
+        """Whether X, Y or Z occurs in a formula or in the condition of a region."""
+        return any(formula.is_scaled for _, _, formula in self.formulas) or any(
+            condition.region.is_scaled for condition in self.conditions
+        )
+
+    def on_surface(self, part: Part) -> Self:
+        """Return the same problem with the faces and groups of its regions found on a part's surface mesh."""
+        other = copy(self)
+        regions = (replace(condition, region=condition.region.placed(surface=part)) for condition in self.conditions)
+        object.__setattr__(other, "conditions", tuple(regions))
+        return other
+
+    @property
+    def needs_surface(self) -> bool:
+        """Whether a face or a group of the part is among the regions, and its surface is not known."""
+        return any(c.region.needs_surface and c.region.surface is None for c in self.conditions)
+
+    @property
+    def fixes_nothing(self) -> bool:
+        """Whether no value of u is given anywhere, and no exchange with the outside."""
+        if self.conditions:
+            return not any(c.is_essential or c.kind in WITH_FACTOR for c in self.conditions)
+        return len(self.natural) == len(FACE_NAMES)
+
+    def placed(self, frame: UnitFrame) -> Self:
+        """Return the same problem with X, Y, Z measured in a frame."""
+        other = copy(self)
+        object.__setattr__(other, "data", {role: datum.placed(frame) for role, datum in self.data.items()})
+        regions = (replace(condition, region=condition.region.placed(frame)) for condition in self.conditions)
+        object.__setattr__(other, "conditions", tuple(regions))
+        return other
+
+    @property
+    def not_differentiable(self) -> str:
+        """Why the derivatives of the law's coefficients are unknown; "" where they are known.
+
+        Raises LawError where the law's results have wrong shapes: that is said first.
+        """
+        try:
+            strong_form(self.form, [Jet(np.ones(1))] * self.form.components, np.ones((3, 1)))
+        except Exception as error:  # whatever a user's law does with jets
+            check_shapes(self.form)
+            return f"the law {type(self.form).__name__} does not run on jets ({error})"
+        return ""
+
+    @property
+    def exact_formulas(self) -> list[Expression]:
+        """The formulas of `exact`; none where it is not given as formulas."""
+        exact = self.data.get("exact")
+        return exact.formulas if exact and exact.is_formula else []
+
+    def source_at(self, x: Array) -> Array:
+        """Return the source f (c, ...)."""
+        return self.data["source"](x) if "source" in self.data else self.source_of_exact(x)
+
+    def source_of_exact(self, x: Array) -> Array:
+        """Return -div flux + react (c, ...) of the formulas `exact`."""
+        found = strong_form(self.form, self._exact_jets(x), x)
+        return finite(f"{self.label('source')} (from exact)", found, x, self._first_formula)
+
+    def size_of_exact(self, x: Array) -> float:
+        """Return the size of the largest term in -div flux + react of the formulas `exact`, where these may cancel."""
+        return max(float(np.abs(t).max()) for row in strong_terms(self.form, self._exact_jets(x), x) for t in row)
+
+    def _exact_jets(self, x: Array, hessian: Numbers = (0.0,) * 6) -> list[Jet]:
+        return [formula.jet(coordinates(np.asarray(x), hessian)) for formula in self.exact_formulas]
+
+    def boundary_at(self, x: Array, face: str = "") -> Array:
+        """Return the values of u (c, ...) given on the boundary: those of `exact` or zero where none are given.
+
+        face: on which the points lie, where regions give a face its own values.
+        """
+        of_face = [c.role for c in self.conditions if c.is_strong and face in c.region.faces]
+        for role in (*of_face[:1], "boundary", "exact"):
+            if role in self.data:
+                return self.data[role](x)
+        return np.zeros((self.form.components, *x.shape[1:]))
+
+    def on_face(self, face: str, x: Array, normal: Array) -> tuple[Array | None, Array]:
+        """Return alpha (...) and g (c, ...) of flux . n + alpha u = g on a face; alpha is None for Neumann's data.
+
+        normal: (3, ...), outward unit normals.
+        """
+        role, alpha = f"neumann {face}", None
+        if face not in self.natural:
+            role = f"robin {face}"
+            alpha = self.data[f"{role}: alpha"](x)[0]
+            demand(alpha >= 0.0, f"{role}: alpha", "zero or positive", x)
+        if role in self.data:
+            return alpha, self.data[role](x)
+        flux = self._flux_of_exact(role, x, normal)
+        return alpha, flux if alpha is None else flux + alpha * self.data["exact"](x)
+
+    def _flux_of_exact(self, role: str, x: Array, normal: Array) -> Array:
+        """Return flux . n (c, ...) of the formulas `exact`, data of a role."""
+        u, grad = known(self._exact_jets(x, ()), x.shape[1:])
+        flux = (np.asarray(self.form.flux(u, grad, x), dtype=np.float64) * normal).sum(axis=1)
+        return finite(f"{self.label(role)} (from exact)", flux, x, self._first_formula)
+
+    def values_on(self, condition: Condition, direction: Array, x: Array) -> Array:
+        """Return what an essential condition gives of u along a direction (c, m) at points (3, m): (m,)."""
+        role = condition.role if condition.role in self.data else "exact"
+        found = self.data[role](x)
+        return found[0] if len(found) != len(direction) else np.asarray((found * direction).sum(axis=0))
+
+    def flux_on(self, condition: Condition | None, x: Array, normal: Array) -> Array:
+        """Return the flux (c, m) into the body that a condition gives at points (3, m) with normals (3, m).
+
+        None stands for the flux of `exact`, or none, on what no region names. That of a factor is for u = 0.
+        """
+        if condition is None or (condition.data is None and condition.role not in self.data):
+            if not self.exact_formulas:
+                return np.zeros((self.form.components, *x.shape[1:]))
+            return self._flux_of_exact("flux" if condition is None else condition.role, x, normal)
+        if condition.kind in WITH_FACTOR:
+            factor = self.factor_on(condition, x)
+            if condition.role in self.data:
+                return np.asarray(factor * self.data[condition.role](x))
+            return self._flux_of_exact(condition.role, x, normal) + factor * self.data["exact"](x)
+        found = self.data[condition.role](x)
+        return -found[0] * normal if condition.kind == "pressure" else found
+
+    def factor_on(self, condition: Condition, x: Array) -> Array:
+        """Return the factor (m,) of an exchange or a spring at points (3, m)."""
+        role = f"{condition.role}: factor"
+        factor = self.data[role](x)[0]
+        demand(factor >= 0.0, role, "zero or positive", x)
+        return factor
+
+    def exact_at(self, x: Array) -> tuple[Array, Array | None]:
+        """Return exact u (c, ...) and its gradient (c, 3, ...), None where the derivatives are unknown."""
+        exact = self.data["exact"]
+        if not exact.is_formula:
+            return exact(x), None
+        value, gradient = known(self._exact_jets(x, ()), x.shape[1:])
+        finite("exact", value, x, self._first_formula)
+        return value, finite("gradient of exact", gradient, x, self._first_formula)
+
+    @property
+    def _first_formula(self) -> Expression | None:
+        return self.exact_formulas[0] if len(self.exact_formulas) == 1 else None

@@ -1,0 +1,85 @@
+"""SolveOptions: how a problem is discretized, and how its linear system is solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from numbers import Integral, Real
+from typing import Any, Self
+
+from parameterize.threads import default_threads
+
+from .field import SplineField
+from .forms.boundary_value_problem import BoundaryValueProblem
+from .forms.poisson import Poisson
+
+DEVICES = ("cpu", "cuda")
+
+
+@dataclass(frozen=True, kw_only=True)
+class IterationOptions:
+    """Hold the options of the linear solver, keywords of `System.solve`; `iga_nn.solve` describes them.
+
+    Raises ValueError where a tolerance or a number of iterations is out of range.
+    """
+
+    tolerance: float = 1e-10
+    max_iterations: int = 1000
+    certified: str | None = None
+    device: str = "cpu"
+    start: SplineField | None = None
+    estimate: bool | None = None
+    strict: bool = False
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.tolerance, Real) and 0.0 < self.tolerance < 1.0):
+            raise ValueError(f"tolerance must be a number between 0 and 1, got {self.tolerance!r:.80}")
+        if not (isinstance(self.max_iterations, Integral) and self.max_iterations >= 1):
+            raise ValueError(f"max_iterations must be a whole number, at least 1, got {self.max_iterations!r:.80}")
+
+    @classmethod
+    def of(cls, keywords: dict[str, Any]) -> Self:
+        """Return the options of a user's keywords. Raises TypeError for a keyword that is no option."""
+        known = [field.name for field in fields(cls)]
+        if unknown := [name for name in keywords if name not in known]:
+            raise TypeError(f"{unknown[0]}: is no option of a solve; the options are {', '.join(known)}")
+        return cls(**keywords)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolveOptions(IterationOptions):
+    """Hold all options of a solve, those of its discretization too: keywords of `iga_nn.solve`, which describes them.
+
+    Raises ValueError also where the number of threads is out of range.
+    """
+
+    refine: int = 0
+    degree: int | None = None
+    threads: int | None = None
+    quadrature: str = "spline"
+    comm: Any = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.threads is not None and self.threads < 1:
+            raise ValueError(f"threads must be at least 1, got {self.threads}; leave it out for {default_threads()}")
+
+    @property
+    def thread_count(self) -> int:
+        """Threads of a process: by default all at hand, or one where the processes of `comm` share the work."""
+        return self.threads or (default_threads() if self.comm is None else 1)
+
+
+def check_device(device: str, problem: BoundaryValueProblem) -> None:
+    """Raise ValueError for a device that is unknown or absent, or that cannot solve the problem."""
+    if device not in DEVICES:
+        raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
+    if device != "cpu":
+        if not isinstance(problem, Poisson):
+            raise ValueError(f"{type(problem).__name__.lower()} runs on device='cpu' only, got device={device!r}")
+        if problem.robin:
+            raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
+        if problem.conditions:
+            raise ValueError(f"regions run on device='cpu' only, got device={device!r}")
+        from .linear.cuda import check_available  # torch comes in here only
+
+        check_available(device)
