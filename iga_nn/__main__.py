@@ -33,7 +33,7 @@ def catch_signals() -> None:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Interrupt; later, where LLVM has called Python while it compiles a kernel: what is raised there gets lost."""
+    """Interrupt; later, where LLVM has called Python while it compiles a kernel: an error raised there gets lost."""
     while frame is not None:
         if hasattr(signal, "setitimer") and frame.f_globals.get("__name__", "").startswith("llvmlite."):
             signal.signal(signal.SIGALRM, _interrupt)

@@ -21,7 +21,7 @@ class InputError(ValueError):
 
 @contextmanager
 def input_errors() -> Iterator[None]:
-    """Turn ValueError and OSError of the block into InputError; the block only reads or checks what the user gave."""
+    """Turn ValueError and OSError of the block into InputError; the block only reads or checks a user's input."""
     try:
         yield
     except (OSError, ValueError) as error:

@@ -51,7 +51,7 @@ def number(key: str, value: float | None) -> str:
 
 
 def rows_of(study: Study) -> list[dict[str, Any]]:
-    """Return one entry a level with the names of COLUMNS; what is not known is None. Seconds are CPU seconds."""
+    """Return one entry a level with the names of COLUMNS; an unknown number is None. Seconds are CPU seconds."""
     found = []
     for degree, levels in study.items():
         for level in levels:

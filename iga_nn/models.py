@@ -35,7 +35,7 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
     """Return the surface that MESH names: a file, else a sample, else a model in the folder IGA_NN_DATA.
 
     component, max_faces: as in load_surface. decimate: reduce a larger surface to max_faces instead of refusing it.
-    Raises MeshError, which says where to get what is missing.
+    Raises MeshError with the way to get a missing file.
     """
     if decimate:
         from parameterize.surface import decimation
@@ -56,7 +56,7 @@ def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FAC
 
 
 def not_found(name: str) -> MeshError:
-    """Return the refusal of a name that is no file, no sample and no model at hand: what to do, and what is near."""
+    """Return the refusal of a name that is no file, no sample and no model at hand, with a remedy and similar names."""
     stem = Path(name).name.split(".")[0]
     if stem in MODELS:
         return MeshError(f"{name}: not found; get it with `iga-nn fetch {stem}`, or set {DATA_FOLDER} to its folder")

@@ -46,7 +46,7 @@ def write_obj(surface: Surface, path: str | Path) -> None:
 
 def obj_text(surface: Surface) -> str:
     """Return a surface as OBJ in the user's units, with every digit of its coordinates."""
-    # trimesh writes a fixed number of decimals, which loses digits, of small surfaces all of them
+    # trimesh writes a fixed number of decimals: small surfaces would lose all digits
     rows = [f"# {surface.name}: {len(surface.vertices)} vertices, {len(surface.faces)} faces"]
     rows += [f"v {x!r} {y!r} {z!r}" for x, y, z in surface.vertices.tolist()]
     rows += [f"f {a} {b} {c}" for a, b, c in (surface.faces + 1).tolist()]

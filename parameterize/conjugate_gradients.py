@@ -83,7 +83,7 @@ def conjugate_gradients(
 
 
 def _fault(rz: float, curvature: float = 1.0) -> str:
-    """Return what is wrong where r.z, or the curvature p.Ap of the direction that follows from z, is not positive."""
+    """Return the fault where r.z, or the curvature p.Ap of the direction that follows from z, is not positive."""
     if not math.isfinite(rz) or rz == 0.0:  # r is neither
         return NO_DIRECTION
     if not math.isfinite(curvature):

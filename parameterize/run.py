@@ -16,6 +16,7 @@ from .certificate.jacobian import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
+from .cube.layout import CubeLayout
 from .display import Brief
 from .optimization.optimized import Optimized
 from .optimization.surface_distance import SurfaceFit
@@ -258,5 +259,5 @@ def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSpl
     points = surface.from_unit(found.spline.volume.control_points)
     volume = BSplineVolume((spline.degree,) * 3, places.knots, points)
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
-    boundary = boundary_map(volume, own, places.triangles, places.parameters)
+    boundary = boundary_map(volume, CubeLayout(own, places.triangles, places.parameters, task.own))
     return volume, replace(boundary, part_faces=surface.faces, groups=surface.groups)

@@ -1,4 +1,4 @@
-"""When the numbers of a solve are not to be trusted: what is said of data, map, mesh and linear solver."""
+"""Doubts about the numbers of a solve: notices on its data, its map, its mesh and its linear solver."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -60,9 +60,9 @@ def judge(
     estimate: Errors | None,
     unknowns: int,
 ) -> tuple[list[str], bool]:
-    """Return what is doubtful in a problem and the errors of its solution, a line each; whether these mean anything.
+    """Return the notices on a problem and on the errors of its solution, and whether these errors mean anything.
 
-    They do not where a formula that decides what is solved does not vary, or the mesh does not resolve the exact
+    They mean nothing where a decisive formula does not vary, or where the mesh does not resolve the exact
     solution. An estimated error is no reason: it is said, and may be wrong.
     """
     points = Points.on(volume, SAMPLES, SAMPLES, SAMPLES)
@@ -142,7 +142,7 @@ def _range(values: Array) -> tuple[float, float] | None:
 
 
 def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list[str]:
-    """Return what does not fit a problem's exact formulas on the volume, one line each; none without such formulas.
+    """Return the data that contradict a problem's exact formulas on the volume, one line each; none without formulas.
 
     Source and Dirichlet data are compared with those of the formulas at 7 points per direction, unless these are not
     finite there.
@@ -172,7 +172,7 @@ def _values_fit(volume: BSplineVolume, problem: BoundaryValueProblem, face: str)
 
 
 def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:
-    """Whether data are those of `exact`: a function that returns them, and the size of what cancels in them."""
+    """Whether data are those of `exact`; of_exact: returns these, and the size of the terms that cancel in them."""
     try:
         derived, size = of_exact()
     except ExpressionError:  # perhaps the reason why they are given
@@ -184,7 +184,7 @@ def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:
 def map_notices(
     volume: BSplineVolume, matrix: MatrixFree, certified: str | None, weaknesses: Iterable[str]
 ) -> list[str]:
-    """Return what is to be said of the map, and of a preconditioner that lacks a part.
+    """Return the notices on the map, and on a preconditioner that lacks a part.
 
     weaknesses: of the preconditioner of each component.
     """

@@ -103,7 +103,7 @@ class SplineField(Brief):
         """
         if self.geometry is None:
             raise ValueError(
-                "points in space need a volume, which this field lacks: dataclasses.replace(field, geometry=volume)"
+                "points in space require a field with a volume: dataclasses.replace(field, geometry=volume)"
             )
         where = self.geometry.locate(points)
         outside = np.isnan(where[:, 0])
@@ -112,7 +112,7 @@ class SplineField(Brief):
             middle = self.geometry.control_points.mean(axis=(0, 1, 2))
             if np.abs(beyond - middle).max() > FARTHEST * np.ptp(self.geometry.control_points, axis=(0, 1, 2)).max():
                 raise ValueError(
-                    f"a point lies more than {FARTHEST:g} times the volume's size away: its nearest is lost"
+                    f"a point lies more than {FARTHEST:g} times the volume's size away: its nearest point is not found"
                 )
             where[outside], _ = nearest_on_boundary(beyond, self.geometry, SampledBoundary.of(self.geometry))
             outside[:] = False
@@ -125,16 +125,17 @@ class SplineField(Brief):
         return evaluate_grid(self.degrees, self.knots, self.coefficients, (u, v, w))
 
     def at(self, x: Array) -> Array:
-        """Return values (...) or (c, ...) at the points x (3, ...) that a law or a datum is given by the solver.
+        """Return values (...) or (c, ...) at points x (3, ...) of the solver, as a law or a datum receives them.
 
-        At parameters a field is called: `field(uvw)`. Raises ValueError for points whose parameters are not known.
+        For parameters use `field(uvw)`. Raises ValueError for points whose parameters are not known.
         """
         if isinstance(x, Points) and x.places is not None:
             return np.moveaxis(self(x.places), 0, -1)
         if not isinstance(x, Points) or x.rows is None:
             raise ValueError(
-                "a field is a function of the parameters u, v, w: call field(uvw), uvw of shape (m, 3) with numbers "
-                "from 0 to 1, or field.grid(u, v, w); `at` takes the points x that a law or a datum is given, unchanged"
+                "a field is a function of the parameters: evaluate with field(uvw), uvw of shape (m, 3) from 0 to 1, "
+                "or field.grid(u, v, w); for points in space use field.probe(points); `at` requires the solver's own "
+                "points x, as a law or a datum receives them, without a change"
             )
         values = np.moveaxis(self.grid(*x.rows), -1, 0) if self.coefficients.ndim == 4 else self.grid(*x.rows)[None]
         single = [axis for axis in range(3) if axis not in x.order]  # directions of one parameter
@@ -142,7 +143,7 @@ class SplineField(Brief):
         return values if self.coefficients.ndim == 4 else values[0]
 
     def fits(self, volume: BSplineVolume) -> bool:
-        """Return whether the field may be data on a volume: found on it, or on none that is known."""
+        """Return whether the field may be a datum on a volume: the field belongs to this volume or to none."""
         own = self.geometry
         if own is None or own is volume:
             return True
@@ -157,7 +158,7 @@ class SplineField(Brief):
     def load(path: str | Path) -> "SplineField":
         """Read solution.npz: the field alone, without map and report.
 
-        Raises FileNotFoundError, or ValueError naming what is wrong with the file.
+        Raises FileNotFoundError, or ValueError that names the fault of the file.
         """
         degrees, knots, coefficients = load_spline(path, "coefficients")
         if coefficients.dtype.kind != "f" or not np.all(np.isfinite(coefficients)):

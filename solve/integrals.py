@@ -33,7 +33,7 @@ def integrate(
     Parameters
     ----------
     body : BSplineVolume or Solution
-        What is integrated over.
+        The domain of the integral.
     what : str or function, optional
         Nothing for 1, so that the integral is the volume or the area. Of a solution the name of a quantity, as in
         `Solution.quantity`, or a function of u (c, ...), grad (c, 3, ...) and x (3, ...). Of a volume a function of x.
@@ -44,7 +44,7 @@ def integrate(
     Raises
     ------
     TypeError
-        For what is no volume or solution.
+        For an object that is no volume or solution.
     ValueError
         For a name that the law does not give, a region that is refused or has no area, and a function that fails or has
         another shape.
@@ -110,7 +110,7 @@ def _volume_of(body: BSplineVolume | Solution) -> BSplineVolume:
 
 
 def _counts(body: BSplineVolume | Solution) -> list[int]:
-    """Return how many Gauss points a span and direction: exact for the volume, as many as the errors' of a solution."""
+    """Return the number of Gauss points a span and direction: exact for a volume, as for the errors of a solution."""
     degrees = zip(_volume_of(body).degrees, body.degrees, strict=True)
     return [max((3 * of_map + 1) // 2, own + 2) for of_map, own in degrees]
 
@@ -166,14 +166,14 @@ def _placed(body: BSplineVolume | Solution, over: Regions) -> list[Region]:
 
 
 def _on_grid(body: BSplineVolume | Solution, what: str | Integrand | None, u: Array, v: Array, w: Array) -> Array:
-    """Return what is integrated (..., n_u, n_v, n_w) on a grid."""
+    """Return the integrand (..., n_u, n_v, n_w) on a grid."""
     if what is not None and isinstance(body, Solution):
         return grid_values(body, quantity_of(body.problem.form, what), u, v, w)  # type: ignore[arg-type]
     return _of_position(what, Points.on(_volume_of(body), u, v, w))
 
 
 def _at_points(body: BSplineVolume | Solution, what: str | Integrand | None, rule: SurfaceRule) -> Array:
-    """Return what is integrated (m, ...) at the points of a rule."""
+    """Return the integrand (m, ...) at the points of a rule."""
     if what is not None and isinstance(body, Solution):
         return at_points(body, body.problem.form, what, rule.at.parameters)  # type: ignore[arg-type]
     x = Points.at(np.ascontiguousarray(rule.at.x), rule.at.parameters)
@@ -183,7 +183,7 @@ def _at_points(body: BSplineVolume | Solution, what: str | Integrand | None, rul
 def _of_position(what: str | Integrand | None, x: Points) -> Array:
     """Return a function of x (..., shape) at points x (3, shape), or 1.
 
-    Raises ValueError for what is no function, and for one that fails or has another shape.
+    Raises ValueError for an object that is no function, and for a function that fails or has another shape.
     """
     if what is None:
         return np.ones(x.shape[1:])

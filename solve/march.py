@@ -41,7 +41,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class March(Brief):
-    """What a march leaves: u at some times.
+    """The solution u at some of the times of a march.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ def march(
 ) -> March:
     """Step through time: capacity du/dt - div flux + react = f, the law and its data those of a problem.
 
-    Both schemes are of second order in dt. BDF2 damps what is rough in the start, its first step is Euler's; the
+    Both schemes are of second order in dt. BDF2 damps a rough start, and its first step is Euler's; the
     trapezoidal rule keeps more energy, and oscillates where start and data on faces disagree.
 
     Parameters
@@ -105,12 +105,12 @@ def march(
         A function changes the data from step to step: `lambda t: iga_nn.Poisson(source=f"{t}*x", boundary="0")`. The
         law stays that of the first time, and so do the faces where u is given.
     start : SplineField or datum
-        u at the first time: a field of the trial space or of a coarser one, or a formula, a function, or a sequence of
-        them, as data of the problem are.
+        u at the first time: a field of the trial space or of a coarser one, or a datum, as a formula, a function or a
+        sequence.
     dt : float
         The time step.
     steps : int
-        How many.
+        Number of time steps.
     scheme : str
         "bdf2" or "trapezoidal".
     capacity : float
@@ -118,7 +118,7 @@ def march(
     first : float
         The time of the start.
     every : int
-        Keep each so manieth step; the last one is kept in any case.
+        Number of steps from one field that is kept to the next; the last field is kept in any case.
     callback : function, optional
         Called with time and field after every step.
     refine, degree, threads, quadrature, tolerance, max_iterations
@@ -255,7 +255,7 @@ class _Path:
         return SplineField(space.degrees, space.knots, coefficients, self.data.volume)
 
     def step(self, time: float) -> int:
-        """Go to a time, and return how many iterations it took. Raises ConvergenceError."""
+        """Go to a time, and return the number of iterations. Raises ConvergenceError."""
         load, known = self.data.at(time)
         system, right = self._equation(load)
         window = (slice(None), *self.data.space.window)

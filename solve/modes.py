@@ -112,7 +112,7 @@ def modes(
     density : float
         Mass per volume.
     n : int
-        How many modes.
+        Number of modes.
     refine, degree, threads, quadrature
         As in `iga_nn.solve`.
     tolerance : float

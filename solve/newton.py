@@ -64,7 +64,7 @@ def newton(
     start : SplineField, optional
         Where the iteration starts, a field of the same degree in the trial space or in a coarser one; zero by default.
     load_steps : int
-        Source and data on faces are raised to their values in so many equal steps, each from the last solution.
+        Number of equal steps in which source and data on faces rise to their values, each from the last solution.
     refine, degree, threads, quadrature
         As in `iga_nn.solve`.
     tolerance : float
@@ -129,7 +129,7 @@ def newton(
 class _Balance:
     """The forces of a law against the loads; arrays are (c, n_u, n_v, n_w).
 
-    known: the coefficients that are given on faces. is_fixed: which ones are.
+    known: the coefficients that are given on faces. is_fixed: the mask of these.
     """
 
     forces: Forces
@@ -176,7 +176,7 @@ class _Balance:
             (full, inner), made = searched, made + 1
 
     def _step(self, full: Array, rest: Array, missing: Array, residual: float) -> Array:
-        """Return Newton's step, with what is missing on the faces."""
+        """Return Newton's step, which brings the faces to their values."""
         tangent, form = self.forces.derivative(full), self.forces.form
         if form.symmetric and not tangent.is_symmetric:
             raise ValueError(f"{type(form).__name__} has a derivative that is not symmetric: set `symmetric = False`")
@@ -209,7 +209,7 @@ class _Balance:
 
 
 class _Loads:
-    """A problem under a simple law: what is assembled of it are its loads, and its data on faces."""
+    """A problem under a simple law, of which only the loads and the data on faces are assembled."""
 
     def __init__(self, problem: BoundaryValueProblem) -> None:
         self.problem, self.form = problem, _Simple()
@@ -241,7 +241,7 @@ def _solved(tangent: Tangent, right: Array, is_symmetric: bool, tolerance: float
 
 
 def _failed(history: list[float], why: str) -> str:
-    """Return that Newton's method did not converge, and what to do, in one line."""
+    """Return the message of a failure of Newton's method with its remedy, in one line."""
     return (
         f"newton: no convergence, residual {history[-1]:.1e} {why}: raise load_steps (or max_iterations), or start "
         "nearer to the solution"

@@ -1,4 +1,4 @@
-"""SolveOptions: how a problem is discretized, and how its linear system is solved."""
+"""SolveOptions: the discretization of a problem, and the iteration for its linear system."""
 
 from __future__ import annotations
 

@@ -167,7 +167,7 @@ def extremes(field: SplineField, form: Form, what: str | Quantity) -> Extremes:
 
 
 def all_extremes(field: SplineField, form: Form) -> dict[str, Extremes]:
-    """Return the extremes of the quantities that a law tells (`Form.told`), by name, from one search for all of them.
+    """Return the extremes of the quantities that reports show (`Form.told`), by name, from one search for all of them.
 
     It takes fewer samples a span than `extremes`, so that it costs a small share of a solve.
     """

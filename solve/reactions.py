@@ -1,4 +1,4 @@
-"""Reactions: what supports do to the body, from the residual of the equations, so that they balance what acts on it."""
+"""Reactions of the supports, from the residual of the equations, so that they balance the loads."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .forms.condition import WITH_FACTOR
 
 @dataclass(frozen=True)
 class Balance:
-    """What acts on the body, and what its supports answer; of elasticity forces, of a scalar law what flows in.
+    """The loads on the body and the reactions of its supports: forces of elasticity, inflows of a scalar law.
 
     Attributes
     ----------
     load : tuple of float
         The integral of the source and of all that is given as flux, (c,).
     reactions : dict of str to tuple of float
-        By support, a region's condition or a face of the cube: the integral (c,) of what it does to the body.
+        By support, a region's condition or a face of the cube: the integral (c,) of its action on the body.
     areas : dict of str to float
         By condition, the area of its region.
     imbalance : float or None
@@ -101,7 +101,7 @@ def balance(problem: BoundaryValueProblem, matrix: MatrixFree, coefficients: Arr
 
 
 def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array) -> dict[str, Array]:
-    """Return what holds the coefficients that the trial space fixes, by face or by the condition that names it."""
+    """Return the reactions of the fixed coefficients, by face of the cube or by the condition that names it."""
     fixed = np.zeros(residual.shape[1:], dtype=bool)
     found: dict[str, Array] = {}
     for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
@@ -127,7 +127,7 @@ def _has_end(space: TrialSpace, name: str) -> bool:
 def _of_regions(
     problem: BoundaryValueProblem, faces: list[WeakFace], coefficients: Array
 ) -> tuple[dict[str, Array], Array]:
-    """Return what supports on regions do, and what an exchange would do to a body of u = 0."""
+    """Return the reactions of supports on regions, and the flux of an exchange into a body of u = 0."""
     found = {
         c.role: np.zeros(len(coefficients))
         for c in problem.conditions

@@ -61,7 +61,7 @@ class SolveReport:
     estimate : Errors or None
         Of the L2 error, from the residual, where there is no exact solution, or on request.
     notices : tuple of str
-        What the reader of these numbers must know, one line each.
+        Warnings about these numbers, one line each.
     meaningful : bool
         False where a formula does not vary on the domain, or the mesh does not resolve the exact solution.
     residuals : tuple of float
@@ -70,7 +70,7 @@ class SolveReport:
         Of several processes, the bytes that all together send in a step of the linear solver: for copies of rows
         ("halo"), and in the preconditioner ("transposition", "substitution").
     balance : Balance or None
-        What acts on the body and what its supports answer.
+        The loads on the body and the reactions of its supports.
 
     Examples
     --------
@@ -169,7 +169,7 @@ class Solution(SplineField, Shown):
         return extremes(self, self.problem.form, what)
 
     def all_extremes(self) -> dict[str, Extremes]:
-        """Return the extremes that a report tells, by name (`problem.form.told`), from one search for all of them.
+        """Return the extremes that a report shows, by name (`problem.form.told`), from one search for all of them.
 
         It takes fewer samples than `extremes` does on fine meshes.
         """

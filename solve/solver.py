@@ -37,7 +37,7 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     Other Parameters
     ----------------
     refine : int
-        How often every span of the map's knots is halved for the trial space; 0 by default.
+        Number of times that every span of the map's knots is halved for the trial space; 0 by default.
     degree : int, optional
         Of the trial space; the map's own by default.
     threads : int, optional
@@ -76,7 +76,7 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     ExpressionError
         Where the data are not finite or have the wrong sign.
     TypeError
-        For what is no problem or no volume, and for an option that there is not.
+        For an object that is no problem or no volume, and for an unknown option.
     ConvergenceError
         As `strict` says.
 
@@ -92,7 +92,7 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
 
 
 def solve_with(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> Solution:
-    """Return what `solve_problem` does, of options as one object."""
+    """Return the solution of `solve_problem` for options as one object."""
     check_device(options.device, problem)
     return discretized(volume, problem, options).solve_with(options)
 
@@ -133,7 +133,7 @@ def discretize(
 def discretized(
     volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions, shift: float = 0.0
 ) -> System:
-    """Return what `discretize` does, with `shift` times the mass added to the matrix: then nothing need hold a body."""
+    """Return the system of `discretize` with `shift` times the mass in its matrix; a shifted body needs no supports."""
     placed, space = prepared(volume, problem, options)
     if shift == 0.0:
         problem.demand_held()
@@ -143,7 +143,7 @@ def discretized(
 def prepared(
     volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions
 ) -> tuple[BoundaryValueProblem, TrialSpace]:
-    """Check what is discretized; return the problem placed in the volume, and the trial space."""
+    """Check volume and problem; return the problem placed in the volume, and the trial space."""
     demand_volume(volume)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")

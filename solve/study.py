@@ -77,7 +77,7 @@ def convergence(
     refine : iterable of int
         Levels; level n halves every span n times.
     tolerance : float
-        Of the linear solver; a degree of 5 needs less than its default to show its rate.
+        Of the linear solver; degree 5 requires a smaller one than the default of a solve to show its rate.
 
     Returns
     -------

@@ -17,7 +17,7 @@ from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data, balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
-from .discretization.errors import error_norms, missing_mean
+from .discretization.errors import Errors, error_norms, missing_mean
 from .discretization.estimate import error_estimate
 from .discretization.on_regions import demand_supports
 from .discretization.operator import FormOperator, Operator, assemble, with_mass
@@ -63,7 +63,7 @@ class System:
     known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
     blocks: tuple[FastDiagonalization, ...]  # a component each
     right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
-    loads: Array  # (c, n_u, n_v, n_w): of all coefficients, before what is known is taken from them
+    loads: Array  # (c, n_u, n_v, n_w): of all coefficients, before the known ones are subtracted
     setup: float  # process seconds
 
     @property
@@ -95,7 +95,7 @@ class System:
     def field(self, x: Array) -> SplineField:
         """Return the spline of the free coefficients x (N,) and of those that are fixed.
 
-        Raises ValueError for another number of them.
+        Raises ValueError for another number of coefficients.
         """
         if np.size(x) != self.right.size:
             raise ValueError(f"x must have {self.right.size} entries, the free coefficients, got {np.size(x)}")
@@ -145,7 +145,7 @@ class System:
         return self.solve_with(IterationOptions.of(how))
 
     def solve_with(self, options: IterationOptions) -> Solution:
-        """Return what `solve` does, of options as one object."""
+        """Return the solution of `solve` for options as one object."""
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
@@ -169,13 +169,9 @@ class System:
         if self.blocks[0].singular:
             full += missing_mean(volume, space, full[0], problem)
         clock.append(time.process_time())
-        errors = estimate = None
         largest = max(space.shared(float(np.abs(full).max(initial=0.0))))
         has_norm = largest <= LARGEST_VALUE
-        if has_norm and problem.exact is not None:
-            errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
-        if has_norm and (options.estimate or (options.estimate is None and problem.exact is None)):
-            estimate = error_estimate(volume, space, full, problem, self._energy(result.x))
+        errors, estimate = self._errors(full, result.x, options.estimate) if has_norm else (None, None)
         clock.append(time.process_time())
         doubtful, meaningful = judge(volume, problem, errors, estimate if result.converged else None, dofs)
         if errors is None and problem.form.caveat:
@@ -202,6 +198,19 @@ class System:
         field = self._spline(full)
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
 
+    def _errors(self, full: Array, free: Array, is_estimated: bool | None) -> tuple[Errors | None, Errors | None]:
+        """Return the errors of a solution, where the exact one is known, and their estimate, where it is wanted.
+
+        full, free: all coefficients, and the free ones. is_estimated: None for where the exact solution is not known.
+        """
+        volume, problem, space = self.volume, self.problem, self.space
+        errors = estimate = None
+        if problem.exact is not None:
+            errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
+        if is_estimated or (is_estimated is None and problem.exact is None):
+            estimate = error_estimate(volume, space, full, problem, self._energy(free))
+        return errors, estimate
+
     def _energy(self, free: Array) -> float | None:
         """Return a(u_h, u_h) of free coefficients that solve the system, None where it is not the work of the loads."""
         lifted = sum(int(np.count_nonzero(face.values)) for face in self.weak)
@@ -210,7 +219,7 @@ class System:
         return float(self.space.total((self.right * free).sum()))
 
     def _iterate(self, options: IterationOptions) -> LinearResult:
-        """Return what the linear solver finds: conjugate gradients, or GMRES where the law is not symmetric."""
+        """Return the result of conjugate gradients, or of GMRES where the law is not symmetric."""
         operator, limits = self.matrix, (options.tolerance, options.max_iterations)
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
         if options.device != "cpu":
@@ -242,7 +251,7 @@ def build(
 ) -> System:
     """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
 
-    shift: A is the law's matrix plus so many times the mass.
+    shift: factor of the mass matrix in A, beside the law's matrix.
     """
     start = time.process_time()
     with one_blas_thread():

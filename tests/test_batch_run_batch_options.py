@@ -46,7 +46,7 @@ def test_bad_options_are_one_line_and_cost_nothing(in_folder, capsys):
     assert "workers 0" in refused(capsys, "bean", "--workers", "0")
     assert "threads per worker 9999" in refused(capsys, "bean", "--threads-per-worker", "9999")
     assert "retries -1" in refused(capsys, "bean", "--retries=-1")
-    assert "--memory-limit: is for workers on this machine" in refused(
+    assert "--memory-limit: applies to workers on this machine" in refused(
         capsys, "bean", "--scheduler", "tcp://127.0.0.1:1", "--memory-limit", "8GiB"
     )
     assert "seed -1" in refused(capsys, "bean", "--seed=-1")

@@ -375,7 +375,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["run", "poisson", "cube", "--robin", "u0=1", "--neumann", "u0"], "face u0 has both"),
         (["study", "good.npz", "--refine", "0..9"], "at most 6"),
         (["study", "good.npz", "--refine", "2..0"], "ends before it begins; write 0..2"),
-        (["study", "poisson", "good.npz"], "arguments that mean nothing here: good.npz; --help"),
+        (["study", "poisson", "good.npz"], "unknown arguments: good.npz; --help"),
         (["solve", "elasticity", "good.npz", "--source", "1"], "Unknown option: --source. --help lists the options."),
         (["solve", "poisson", "good.npz", "--refin", "1"], "Unknown option: --refin. Did you mean --refine?"),
         (["check", "cube", "--max-faces", "-4"], "max_faces must be a whole number, at least 4, got -4"),

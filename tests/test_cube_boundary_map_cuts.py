@@ -4,6 +4,7 @@ from shapes import area, ball, is_closed, turned
 
 from parameterize.cube.boundary_map import BoundaryMap, boundary_map
 from parameterize.cube.cutting import cut_along_rays
+from parameterize.cube.layout import CubeLayout
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
@@ -42,7 +43,7 @@ def assert_valid(result, vertices, faces):
 @pytest.mark.parametrize("seed", range(3))
 def test_the_surface_is_cut_along_the_cubes_edges(seed):
     vertices, parameters, faces = placed_ball(seed)
-    result = boundary_map(identity_volume(), vertices, faces, parameters)
+    result = boundary_map(identity_volume(), CubeLayout(vertices, faces, parameters, len(vertices)))
     assert_valid(result, vertices, faces)
     assert result.parameters[: len(vertices)] == pytest.approx(parameters, abs=1e-12)
     share = np.bincount(result.cube_faces, minlength=6) / len(result.faces)
@@ -54,7 +55,9 @@ def test_flipped_triangles_are_laid_out_anew(seed):
     vertices, parameters, faces = placed_ball(seed, noise=0.04)
     before = len(BoundaryMap(vertices, parameters, faces).flipped())
     assert before > 10
-    assert_valid(boundary_map(identity_volume(), vertices, faces, parameters), vertices, faces)
+    assert_valid(
+        boundary_map(identity_volume(), CubeLayout(vertices, faces, parameters, len(vertices))), vertices, faces
+    )
 
 
 def test_one_flipped_vertex_moves_and_the_rest_stays():
@@ -63,7 +66,7 @@ def test_one_flipped_vertex_moves_and_the_rest_stays():
     ring = np.setdiff1d(faces[(faces == wrong).any(axis=1)], [wrong])
     parameters[wrong] = onto_cube(2.0 * parameters[ring[:1]] - parameters[[wrong]])[0]  # across a neighbour
     assert len(BoundaryMap(vertices, parameters, faces).flipped()) > 0
-    result = boundary_map(identity_volume(), vertices, faces, parameters)
+    result = boundary_map(identity_volume(), CubeLayout(vertices, faces, parameters, len(vertices)))
     assert_valid(result, vertices, faces)
     moved = np.linalg.norm(result.parameters[: len(vertices)] - parameters, axis=1) > 1e-9
     assert moved[wrong] and moved.sum() < 20
@@ -73,12 +76,14 @@ def test_one_flipped_vertex_moves_and_the_rest_stays():
 def test_parameters_that_coincide_with_edges_and_corners(seed):
     vertices, parameters, faces = placed_ball(seed)
     parameters = onto_cube(np.round(parameters * 20.0) / 20.0)  # many exactly on edges, cuts meet vertices and corners
-    assert_valid(boundary_map(identity_volume(), vertices, faces, parameters), vertices, faces)
+    assert_valid(
+        boundary_map(identity_volume(), CubeLayout(vertices, faces, parameters, len(vertices))), vertices, faces
+    )
 
 
 def test_cut_vertices_are_fitted_where_the_volume_puts_them():
     vertices, parameters, faces = placed_ball(2)
-    fitted = boundary_map(identity_volume(), vertices, faces, parameters)
+    fitted = boundary_map(identity_volume(), CubeLayout(vertices, faces, parameters, len(vertices)))
     off = np.linalg.norm(fitted.vertices - fitted.parameters, axis=1)  # the volume is the identity
     assert off[: len(vertices)].max() < 1e-12
     cut = cut_along_rays(parameters, faces, 0.0)

@@ -81,14 +81,14 @@ def test_auto_takes_its_limits_to_the_map():
         ),
         ({"control_points": "auto", "max_control_points": 101}, "max control points 101: at least 30, at most 100"),
         ({"control_points": 3}, "control points 3: at least 4, at most 100"),
-        ({"tolerance": 1e-3}, "tolerance: has a meaning with --control-points auto alone"),
+        ({"tolerance": 1e-3}, "tolerance: requires --control-points auto"),
         ({"control_points": "many"}, "control points: must be a whole number or 'auto', got 'many'"),
         ({"seed": True}, "seed: must be a whole number, got True"),
         ({"steps_factor": None}, "steps factor: must be a number, got None"),
         ({"component": "x"}, "component: must be a whole number or None, got 'x'"),
         ({"max_faces": "x"}, "max faces: must be a whole number, got 'x'"),
         ({"corners": [1, 2]}, "corners: must be a path or None, got .1, 2."),
-        ({"max_control_points": 40}, "max control points: has a meaning with --control-points auto alone"),
+        ({"max_control_points": 40}, "max control points: requires --control-points auto"),
     ],
 )
 def test_limits_that_cannot_be_run_are_refused(given, says):

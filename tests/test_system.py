@@ -97,7 +97,7 @@ def test_a_law_may_read_a_field():
     wanted = solve_problem(volume, iga_nn.Poisson(source="1", kappa="1+y*y"), tolerance=1e-12)
     assert np.allclose(found.coefficients, wanted.coefficients, atol=1e-11)
     assert found.report.error_estimate is None
-    with pytest.raises(ValueError, match=r"function of the parameters u, v, w: call field\(uvw\)"):
+    with pytest.raises(ValueError, match=r"function of the parameters: evaluate with field\(uvw\)"):
         field.at(np.zeros((3, 4)))
 
 

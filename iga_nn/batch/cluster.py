@@ -21,16 +21,16 @@ from .task import LESS_MEMORY, Task, Work, compute, stop
 
 log = logging.getLogger(__name__)
 
-POLL = 0.5  # seconds between two looks at what has ended
+POLL = 0.5  # seconds between two checks for ended surfaces
 PATIENCE = 10.0  # seconds until a scheduler must have answered
 HOPELESS = 600.0  # seconds without a worker on this machine: they start again within some
 GRACE = 3.0  # seconds that interrupted surfaces have to keep a checkpoint
 SMALLEST = 1 << 29  # bytes: the libraries alone take nearly as much
-MEMORY_TOPIC = "worker-restart-memory"  # dask tells here which workers were ended for their memory
+MEMORY_TOPIC = "worker-restart-memory"  # dask's topic of workers that were ended for their memory
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 SILENT = "CRITICAL"
 CONFIG = {
-    "distributed.worker.memory.target": False,  # what a worker holds is no data of dask's that it could write to disk,
+    "distributed.worker.memory.target": False,  # a worker's memory is no data of dask's that could go to disk,
     "distributed.worker.memory.spill": False,  # and a worker that pauses would wait for ever for it to shrink
     "distributed.worker.memory.pause": False,
     "distributed.worker.profile.enabled": False,
@@ -39,7 +39,7 @@ CONFIG = {
     "distributed.worker.http.routes": [],
 }
 
-Told = Callable[[int, str, float], None]  # number of a surface, its stage, the share of its work that is done
+OnProgress = Callable[[int, str, float], None]  # number of a surface, its stage, the share of its work that is done
 
 
 @contextmanager
@@ -61,7 +61,7 @@ def connected(workers: WorkerOptions, most: int) -> Iterator[Client]:
 
 
 class _OwnOutput(WorkerPlugin):  # type: ignore[misc]
-    """Sends what libraries print in a worker to stderr: stdout is for the answer of the command."""
+    """Sends the output of libraries in a worker to stderr: stdout is for the answer of the command."""
 
     def setup(self, worker: Worker) -> None:
         """Redirect the worker's process, which starts or has just started."""
@@ -72,7 +72,7 @@ class _OwnOutput(WorkerPlugin):  # type: ignore[misc]
 def _local(workers: WorkerOptions, most: int) -> Iterator[LocalCluster]:
     """Start worker processes on this machine.
 
-    They listen on free ports of 127.0.0.1, without a dashboard, and ignore Ctrl-C: they are told to stop.
+    They listen on free ports of 127.0.0.1, without a dashboard, and ignore Ctrl-C: the client stops them.
     """
     threads = dict.fromkeys(THREAD_VARIABLES, str(workers.threads_per_worker))
     with ExitStack() as stack:
@@ -133,9 +133,9 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def computed(
-    client: Client, tasks: Sequence[Task], workers: WorkerOptions, tell: Told, work: Work = compute
+    client: Client, tasks: Sequence[Task], workers: WorkerOptions, tell: OnProgress, work: Work = compute
 ) -> Generator[tuple[int, Ended], None, None]:
-    """Yield the number of each task and how it ended, as they end; one that failed is tried again before that.
+    """Yield the number of each task and its end, in the order of the ends; a failed task is tried again before that.
 
     A surface is handed out once a worker is free for it: one behind another would be lost with that other's worker.
     Where the caller ends early, surfaces keep a checkpoint.
@@ -182,7 +182,7 @@ def _first_ended(futures: list[Future]) -> list[Future]:
 
 
 def _ended(client: Client, future: Future) -> Ended:
-    """Return how a task ended, also where it raised an error or lost its workers."""
+    """Return the end of a task, also where it raised an error or lost its workers."""
     error = future.exception()
     if error is None:
         return future.result()
@@ -204,7 +204,7 @@ def _ran_out_of_memory(client: Client, worker: str) -> bool:
 
 
 def _stop(client: Client, batch: str, futures: list[Future]) -> None:
-    """Ask the workers to end what they compute of a batch, and wait a moment until they have."""
+    """Ask the workers to end their surfaces of a batch, and wait a moment until they have."""
     with suppress(Exception):  # workers or the scheduler may be gone: their surfaces have earlier checkpoints
         client.run(stop, batch, on_error="ignore")
         wait(futures, timeout=GRACE)

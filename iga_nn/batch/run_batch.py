@@ -1,4 +1,4 @@
-"""Carries a batch from the surfaces to the table: skips what is finished, computes the rest, keeps what is known."""
+"""Carries a batch from the surfaces to the table: skips finished surfaces, computes the others, keeps all results."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -29,7 +29,7 @@ INSTALL = "pip install 'iga-nn[batch]'"
 
 @dataclass(frozen=True)
 class Running:
-    """Say how far a surface is. share: of its work that is done."""
+    """Hold the progress of a surface. share: of its work that is done."""
 
     name: str
     stage: str
@@ -67,13 +67,13 @@ def run_batch(
     poisson : PoissonOptions, optional
         The problem that is solved on each.
     workers : WorkerOptions, optional
-        Who computes; two processes of this machine by default.
+        Options of the worker processes; two of this machine by default.
     force : bool
         Start all surfaces anew.
     vector : bool
         Write plots of curves as PDF, too.
     progress : callable, optional
-        Called with the batch and a list of those that are computed after every change.
+        Called after every change with the batch and the list of its running surfaces.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def run_tasks(
 
 
 def _found(task: Task, force: bool) -> Row:
-    """Return the row of a surface as its folder is: finished, refused because of what is in it, or still to compute."""
+    """Return the row of a surface by the state of its folder: finished, refused for its content, or to be computed."""
     row = Row(task)
     try:
         if force:
@@ -168,7 +168,7 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
         raise InputError(f"a batch needs {package}, which is not installed: {INSTALL}") from None
     waiting = [number for number, row in enumerate(batch.rows) if row.state == "waiting"]
     running: dict[int, Running] = {}
-    one_at_a_time = RLock()  # surfaces end in this thread, and dask tells of their progress in another
+    one_at_a_time = RLock()  # surfaces end in this thread, and dask reports their progress in another
 
     def show() -> None:
         with one_at_a_time:

@@ -1,4 +1,4 @@
-"""Turns what the user names (files, folders, patterns, samples, models, g1) into surfaces with a folder each."""
+"""Turns a user's names (files, folders, patterns, samples, models, g1) into surfaces with a folder each."""
 
 import glob
 from collections import Counter
@@ -32,7 +32,7 @@ def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
     Files are known by their absolute paths: a worker with another current folder finds them, too. Raises InputError
     where nothing is named, and where a folder or a pattern holds no surface.
     """
-    found: dict[str, str] = {}  # what tells surfaces apart -> name
+    found: dict[str, str] = {}  # key of a surface -> name
     for given in surfaces:
         for name in _names_in(given):
             found.setdefault(str(Path(name).resolve()) if Path(name).is_file() else name, name)
@@ -46,7 +46,7 @@ def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
 
 
 def demand_one(entries: Sequence[Entry]) -> None:
-    """Raise MeshError where none of the surfaces that are named is there; where some are, the table tells of others."""
+    """Raise MeshError where no named surface is there; where some are, the table has the others as refused."""
     if not any(entry.mesh in SAMPLES or entry.mesh in MODELS or Path(entry.mesh).exists() for entry in entries):
         raise not_found(entries[0].name)
 
@@ -82,7 +82,7 @@ def distinct_folders(meshes: Sequence[str]) -> list[str]:
     """Return a folder's name for each of some different surfaces.
 
     It is the surface's stem, as `run` has it. Where several have the same, all of these take the file's name instead,
-    then with the folder it is in before it, and so on up the path; a number tells apart what is left.
+    then with the folder it is in before it, and so on up the path; a number separates names that are still equal.
     """
     choices = [_folder_names(mesh) for mesh in meshes]
     level = [0] * len(meshes)

@@ -51,7 +51,7 @@ WHOLE = ("seconds", "dofs", "iterations")
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """Hold what is known of one surface. line: why it was refused or failed."""
+    """Hold the result of one surface. line: the reason of a refusal or failure."""
 
     entry: Entry
     state: State = "waiting"
@@ -67,11 +67,11 @@ class Row:
         return replace(self, state=state, line=printable(line))
 
     def verdict(self) -> dict[str, Any]:
-        """Return what decides whether the result is used, as `iga-nn run --json` prints it; empty without a result."""
+        """Return the verdict on the result, as `iga-nn run --json` prints it; empty without a result."""
         return reports.verdict(self.report, self.entry.folder) if self.report is not None else {}
 
     def figures(self) -> dict[str, Any]:
-        """Return the numbers of the page, at volume 1 and on the finest mesh; what is not known is None."""
+        """Return the numbers of the page, at volume 1 and on the finest mesh; an unknown number is None."""
         known = self.verdict()
         known |= (known.get("levels") or [{}])[-1]
         for key, value in known.get("arap", {}).get("unit_volume", {}).items():
@@ -98,7 +98,7 @@ class Batch:
 
     @property
     def counts(self) -> dict[State, int]:
-        """Return how many surfaces are in which state, without those that no surface is in."""
+        """Return the number of surfaces by state, without states that no surface is in."""
         found = Counter(row.state for row in self.rows)
         return {state: found[state] for state in get_args(State) if found[state]}
 
@@ -146,7 +146,7 @@ def page(batch: Batch) -> str:
 
 
 def _row(row: Row) -> dict[str, Any]:
-    """Return what the template shows of a row; each figure as its text and the value it is sorted by."""
+    """Return the content of a row for the template; each figure as its text and the value it is sorted by."""
     report = row.entry.folder / PAGE
     return {
         "name": row.entry.name,

@@ -1,4 +1,4 @@
-"""Computes one surface of a batch in a worker process, and tells the client how far it is."""
+"""Computes one surface of a batch in a worker process, and reports its progress to the client."""
 
 import logging
 from collections.abc import Callable
@@ -20,7 +20,7 @@ _stopped: set[str] = set()  # batches that were interrupted
 
 @dataclass(frozen=True)
 class Task(Entry):
-    """Hold a surface of a batch and all that its result depends on.
+    """Hold a surface of a batch and all options of its result.
 
     statement: the problem to solve, None to parameterize the surface alone. vector: write curves as PDF, too.
     """
@@ -34,9 +34,9 @@ Work = Callable[[Task, int, str], Ended]
 
 
 def compute(task: Task, number: int, batch: str) -> Ended:
-    """Compute a surface from its checkpoint, where there is one, into its folder, and return how it ended.
+    """Compute a surface into its folder, from its checkpoint where there is one, and return its end.
 
-    number: of the surface in the batch, for the steps that are told.
+    number: of the surface in the batch, for the messages of progress.
     """
     from distributed import get_worker
 

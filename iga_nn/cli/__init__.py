@@ -1,4 +1,4 @@
-"""Is what a user types and sees: the commands, their progress, their answers and these exit codes."""
+"""The command line: the commands, their progress, their answers and these exit codes."""
 
 DONE = 0
 BAD_INPUT = 2

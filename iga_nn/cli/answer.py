@@ -1,4 +1,4 @@
-"""Returns what a command prints when it is done, and the exit code that goes with it."""
+"""Words the answer of a command that is done, and finds its exit code."""
 
 from itertools import zip_longest
 from typing import Any
@@ -28,7 +28,7 @@ def batch_exit_code(batch: Batch) -> int:
 
 
 def verdict_in_words(outcome: Outcome) -> str:
-    """Return a finished run for a reader: numbers, what to try, and in the end verdict, error and what to open."""
+    """Return a finished run for a reader: numbers, advice, and last the verdict, the error and the page to open."""
     verdict = reports.verdict(outcome.report, outcome.folder)
     lines = []
     for scale, arap in verdict.get("arap", {}).items():

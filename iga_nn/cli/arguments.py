@@ -1,4 +1,4 @@
-"""Defines the arguments that several commands share, and how their texts are converted."""
+"""Defines the arguments that several commands share, and the conversion of their texts."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.
 
 @dataclass(frozen=True)
 class OutputOptions:
-    """Say where the results go, and what is printed.
+    """Options of the output folder and of the terminal.
 
     Args:
         out: output folder; the input's stem in the current folder by default.
         force: replace a finished result in that folder.
-        vector: write plots of curves (loss history, errors over the mesh size) as PDF, too.
+        vector: also write plots of curves (loss history, errors over the mesh size) as PDF.
         quiet: show no progress.
     """
 
@@ -60,13 +60,13 @@ class OutputOptions:
 
     @property
     def folder(self) -> dict[str, Any]:
-        """Return what the pipeline takes of these options."""
+        """Return the keywords of the pipeline."""
         return {"out": self.out, "force": self.force, "vector": self.vector}
 
 
 @dataclass(frozen=True)
 class PageOptions(MapOptions):
-    """Say how surfaces of the live page become volumes: what belongs to one surface is no option there."""
+    """Options of the map for all surfaces of the live page, without those of a single surface."""
 
     corners: Annotated[Path | None, Parameter(parse=False)] = None
     resume: Annotated[bool, Parameter(parse=False)] = False

@@ -115,8 +115,8 @@ def run_many(
 ) -> int:
     """Run many surfaces in worker processes, each into its own folder in --out, with one table of them all.
 
-    batch.csv, batch.json and batch.html are written anew after every surface. The same command again skips what is
-    finished, goes on from checkpoints and tries failures once more.
+    batch.csv, batch.json and batch.html are written anew after every surface. The same command again skips finished
+    surfaces, goes on from checkpoints and tries failures once more.
 
     Args:
         surfaces: files, folders, patterns in quotes, names of samples and models, or g1 for the set G1.
@@ -197,7 +197,7 @@ def study_volume(volume: Volume, /, *, output: OutputOptions = OUTPUT, study: St
 def study_elasticity(
     volume: Volume, /, *, output: OutputOptions = OUTPUT, study: ElasticityStudyOptions = ELASTICITY_STUDY
 ) -> int:
-    """Do the same for linear elasticity with a given displacement."""
+    """Make a convergence study of linear elasticity with a given displacement."""
     return _study(volume, output, study)
 
 
@@ -243,13 +243,13 @@ def check(
     force: bool = False,
     as_json: Json = False,
 ) -> int:
-    """Say whether a surface is accepted, or whether a volume is certified; write nothing but a picture of regions.
+    """Check a surface for acceptance, or certify a volume; write nothing but a picture of regions.
 
     Args:
         path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
-        strict: refuse a surface that intersects itself; without this option it is a notice.
-        region: regions of the surface to look at, such as "nz > 0.9 and x < 2": each is told with its area and the
-            number of triangles that lie mostly in it, and refused where no point of the surface lies in it.
+        strict: refuse a surface that intersects itself; by default this is a notice.
+        region: regions of the surface, such as "nz > 0.9 and x < 2"; the answer has the area of each and the number of
+            triangles that lie mostly in it, and a region without a point of the surface is refused.
         picture: PNG of the surface to write, with the regions in colours.
         force: replace that picture where it exists.
     """
@@ -328,9 +328,9 @@ def export_volume(
         out: file to write; the volume's stem with the format's ending in the current folder by default.
         solution: solution.npz to export, too: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
             NAME_u.json).
-        samples: of a view, cells a span of the solution and direction; by default 3, fewer where they were more than a
-            million.
-        quantity: of a view with a solution, what it shows beside u: names such as stress, von_mises, principal, strain,
+        samples: of a view, cells per span of the solution and direction; 3 by default, fewer where the view would have
+            more than a million cells.
+        quantity: of a view with a solution, quantities beside u, such as stress, von_mises, principal, strain,
             gradient, flux.
         force: replace that file where it exists.
     """
@@ -345,7 +345,7 @@ def compare_runs(one: Path, other: Path, /, *, out: Path = Path("compare.html"),
 
     Args:
         one: output folder of a run.
-        other: that of another; ratios are those of its numbers to the numbers of the first.
+        other: output folder of another run; ratios are its numbers over those of the first run.
         out: page to write.
         force: replace that file where it exists.
     """
@@ -370,9 +370,9 @@ def serve_page(
     """Serve a page to this computer's browser: drop a surface, watch it become a volume, download the files.
 
     Args:
-        port: of 127.0.0.1; 0 takes a free one.
+        port: port of 127.0.0.1; 0 takes a free port.
         open_browser: open the page in the browser.
-        max_upload: megabytes a surface's file may have.
+        max_upload: largest size of a surface's file, in megabytes.
     """
     from ..live.app import serve
 
@@ -385,7 +385,7 @@ def main(argv: list[str]) -> int:
     try:
         with _processes(argv):
             code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
-    except KeyboardInterrupt as error:  # its message says how to continue, where that is possible
+    except KeyboardInterrupt as error:  # its message has the command that continues, where there is one
         print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
     except expected_errors() + (CycloptsError,) as error:

@@ -34,7 +34,7 @@ Show = Callable[..., None]  # Display.show
 
 
 class Display:
-    """Shows how far a command is: a bar on a terminal, else a line at each new stage and every ten seconds."""
+    """Shows the progress of a command: a bar on a terminal, else a line at each new stage and every ten seconds."""
 
     def __init__(self, console: Console, *columns: ProgressColumn) -> None:
         state = TextColumn("{task.fields[state]}", table_column=Column(ratio=1, no_wrap=True))  # is cut off first
@@ -52,7 +52,7 @@ class Display:
         self._stage, self._printed = "", time.monotonic()
 
     def show(self, line: str, stage: str = "", **now: Any) -> None:
-        """Take the state after a change: as a line, and as what the task of the bar is now."""
+        """Take the state after a change: as a line, and as the present task of the bar."""
         self.bar.update(self._task, visible=True, **now)
         if self.bar.disable and (stage != self._stage or time.monotonic() - self._printed >= PLAIN_INTERVAL):
             self.bar.console.print(Text(line), soft_wrap=True)
@@ -67,7 +67,7 @@ def tell_run(show: Show, now: Progress) -> None:
 
 
 def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
-    """Show the state of a batch: how many surfaces ended, the stage and the share done of those computed."""
+    """Show the state of a batch: the number of ended surfaces, and the stage and share of the running ones."""
     total = len(batch.rows)
     ended = total - batch.counts.get("waiting", 0)
     state = (
@@ -79,7 +79,7 @@ def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
 
 
 def describe(progress: Progress) -> str:
-    """Return folds, time left and loss as text; how long the spline fit takes is known only when it runs."""
+    """Return folds, time left and loss as text; the seconds of the spline fit are known only while it runs."""
     minutes, seconds = divmod(math.ceil(max(0.0, progress.seconds_left)), 60)
     left = f"{minutes}:{seconds:02d} left"
     folds = f"{progress.folded} fold{'s' * (progress.folded != 1)}"
@@ -121,7 +121,7 @@ def shown_batch(quiet: bool) -> Iterator[BatchProgress | None]:
 
 @contextmanager
 def _shown(quiet: bool, *columns: ProgressColumn) -> Iterator[Show | None]:
-    """Show the log of the packages on stderr, and yield what shows the progress on such a bar; None where `quiet`."""
+    """Show the log of the packages on stderr, and yield the callback of its progress bar; None where `quiet`."""
     console = Console(file=sys.stderr, highlight=False)
     with logged(_ConsoleHandler(console), logging.WARNING if quiet else logging.INFO):
         if quiet:

@@ -16,7 +16,7 @@ _FAR_HINT = re.compile(r"(Unknown option: \W*(\w).*?) Did you mean --(?!\2).*")
 def refusal(error: Exception, argv: list[str]) -> str:
     """Return the fault and its remedy, in one line."""
     if isinstance(error, UnusedCliTokensError):
-        return f"arguments that mean nothing here: {' '.join(error.unused_tokens or ())}; --help lists what there is"
+        return f"unknown arguments: {' '.join(error.unused_tokens or ())}; --help lists the arguments"
     if isinstance(error, CycloptsError):
         return _FAR_HINT.sub(r"\1 --help lists the options.", one_line(error)) + _minus_hint(argv)
     return one_line(error)

@@ -39,7 +39,7 @@ def best_cut(faces: Sequence[Patch], hand: int = 1) -> tuple[Octant, View]:
 
 
 def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
-    """Return what is seen of nine patches, the six faces and the three sections, when an octant is left out.
+    """Return the visible parts of nine patches, the six faces and the three sections, without an octant.
 
     Three faces stay whole, three lose their quarter in the octant, and of each section only this quarter is seen.
     """

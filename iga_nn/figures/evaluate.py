@@ -1,4 +1,4 @@
-"""Evaluates what figures show: points of a volume on the cube's faces and sections, and the values there."""
+"""Evaluates the content of figures: points of a volume on the cube's faces and sections, and the values there."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,7 +48,7 @@ def error_at(found: Array, problem: BoundaryValueProblem, x: Points) -> Array:
 
 
 def face_labels() -> list[str]:
-    """Return what the six colours stand for, such as "u0: u = 0"."""
+    """Return the legend of the six colours, such as "u0: u = 0"."""
     return [f"{name}: {name[0]} = {name[1]}" for name in FACE_NAMES]
 
 

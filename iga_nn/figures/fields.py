@@ -32,7 +32,7 @@ STRESS = "von Mises"  # the name of the field that a body is drawn in
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Hold what is found at the same places of the cube.
+    """Hold values at the same places of the cube.
 
     patches: nine arrays (SAMPLES, SAMPLES, ...), on the faces in the order of FACE_NAMES, then on u, v, w = 1/2.
     lattice: (LATTICE, LATTICE, LATTICE, ...), at even steps of u, v and w, both ends included.
@@ -140,7 +140,7 @@ def quantity_of(solution: SplineField, quantity: Quantity, name: str, title: str
 
 @remembered
 def fields_of(solution: SplineField) -> list[Field]:
-    """Return what is shown of a solution, first what it is drawn in; of a body that is von Mises' stress."""
+    """Return the fields that show a solution, first the field of its picture; of a body that is von Mises' stress."""
     fields = [solution_of(solution)]
     if solution.coefficients.shape[3:] == (3,):
         fields += components_of(solution)

@@ -1,4 +1,4 @@
-"""Draws the shapes of vibrations: the body displaced by each, in the colours of how far it moves."""
+"""Draws the shapes of vibrations: the body displaced by each, coloured by its displacement."""
 
 from pathlib import Path
 
@@ -35,4 +35,4 @@ def draw_modes(path: str | Path | None, volume: BSplineVolume, modes: Modes) -> 
         ]
         panel.imshow(draw(patches, view_of(patches), PANEL))
         panel.set_title(f"{frequency:.4g} Hz", fontsize=13)
-    return save(figure, path, "The lowest modes, coloured by how far they move")
+    return save(figure, path, "The lowest modes, coloured by their displacement")

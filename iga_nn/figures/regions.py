@@ -21,11 +21,11 @@ from solve.forms.region import Region
 from .render import Patch
 from .style import panels_of, save, show_around
 
-REST = "0.82"  # the grey of what no region names
+REST = "0.82"  # the grey of the surface outside of all regions
 SAMPLES = 161  # a direction of a face of the solid
 CELLS = 40_000  # of a surface: large triangles are divided into as many
 FINEST = 100  # cells along a side of a triangle
-LINES_UP_TO = 3_000  # triangles are outlined on surfaces of at most so many
+LINES_UP_TO = 3_000  # triangles: surfaces with more are drawn without outlines
 LONGEST = 60  # letters of a name
 
 

@@ -1,4 +1,4 @@
-"""Holds what the figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
+"""Holds the parts that figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
 
 import io
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ def show_section(panel: Any, title: str, points: Array, colors: Array) -> None:
 
 
 def name_faces(figure: Figure) -> None:
-    """Write below the panels what the six colours stand for."""
+    """Write the legend of the six colours below the panels."""
     swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
     figure.legend(
         handles=swatches,

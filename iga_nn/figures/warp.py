@@ -20,7 +20,7 @@ def is_displacement(solution: SplineField) -> bool:
 
 
 def warp_of(solution: SplineField, size: float) -> float:
-    """Return the factor at which the largest displacement is drawn as 5 to 8 % of a size, 0 for what displaces nothing.
+    """Return the factor at which the largest displacement is drawn as 5 to 8 % of a size, 0 for no displacement.
 
     size: the diagonal of the body's box.
     """

@@ -70,7 +70,7 @@ def is_volume(path: str | Path) -> bool:
 
 
 def load_volume(path: str | Path) -> BSplineVolume:
-    """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh or splinepy JSON, told apart by their beginnings.
+    """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh or splinepy JSON, recognized by their beginnings.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def load_volume(path: str | Path) -> BSplineVolume:
     Raises
     ------
     InputError
-        Where the file is none of them, damaged, rational or of several patches, and where splinepy is needed and
+        Where the file has no such format, is damaged, rational or of several patches, and where splinepy is needed and
         missing.
 
     Examples
@@ -138,7 +138,7 @@ def export(
     samples : int, optional
         Of a view: cells a span of the solution and direction; by default 3, fewer where they were more than a million.
     quantity : names, optional
-        Of a view: what it shows in place of those quantities; names that the law gives, as "principal".
+        Of a view: the quantities in place of those; names of the law, as "principal".
     force : bool
         Replace a file that exists.
 
@@ -187,7 +187,7 @@ def export(
 
 
 def _load_solution(path: Path, volume: BSplineVolume) -> tuple[SplineField, BoundaryValueProblem | None]:
-    """Return a solution and the problem that the report beside it states, None where that is not known.
+    """Return a solution and the problem in the report beside it, None for a problem that is not known.
 
     Raises InputError where the solution does not belong to the volume: by its knots, or by the h of its report.
     """

@@ -38,7 +38,7 @@ WEIGHTS_ALIKE = 1e-12  # relative
 
 
 def write_gismo(path: Path, spline: BSplineVolume | SplineField, *_: object) -> None:
-    """Write a volume or a solution as G+Smo XML; what else is known of it has no place there."""
+    """Write a volume or a solution as G+Smo XML, which has no place for more."""
     splinepy = _splinepy()
     patches = splinepy.Multipatch([to_splinepy(spline)])
     patches.interfaces = np.full((1, 6), -1)  # no neighbours: splinepy cannot look for those of scalar splines
@@ -46,7 +46,7 @@ def write_gismo(path: Path, spline: BSplineVolume | SplineField, *_: object) -> 
 
 
 def write_json(path: Path, spline: BSplineVolume | SplineField, *_: object) -> None:
-    """Write a volume or a solution as splinepy's JSON; what else is known of it has no place there."""
+    """Write a volume or a solution as splinepy's JSON, which has no place for more."""
     _splinepy().io.json.export(str(path), [to_splinepy(spline)])
 
 
@@ -105,7 +105,7 @@ def _load(splinepy: Any, text: str, kind: str) -> Any:
         try:
             found = getattr(splinepy.io, kind).load(str(checked))
             return {"gismo": lambda: found[0].patches[0], "mfem": lambda: found, "json": lambda: found[0]}[kind]()
-        except Exception as error:  # splinepy and what it calls raise a dozen kinds on damaged content
+        except Exception as error:  # splinepy and its libraries raise a dozen kinds on damaged content
             raise ValueError(f"splinepy finds no spline in it ({one_line(error) or type(error).__name__})") from None
 
 

@@ -19,7 +19,7 @@ _EDGES = ["0 0 1", "0 3 2", "0 4 5", "0 7 6", "1 0 3", "1 1 2", "1 4 7", "1 5 6"
 
 
 def kind_of(path: Path) -> str | None:
-    """Return what a file is by its beginning: "gismo", "mfem", "json", "npz", or None. Raises OSError."""
+    """Return the kind of a file by its beginning: "gismo", "mfem", "json", "npz", or None. Raises OSError."""
     with path.open("rb") as stream:
         head = stream.read(4096).lstrip(b"\xef\xbb\xbf \t\r\n")
     if head.startswith(b"<") and re.search(rb"<xml\b", head):
@@ -29,7 +29,7 @@ def kind_of(path: Path) -> str | None:
 
 
 def checked_text(path: Path, kind: str) -> str:
-    """Return the text of the file, reduced to what splinepy should see of it."""
+    """Return the text of the file, reduced to the parts that splinepy should read."""
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise ValueError(f"has {size} bytes, more than {MAX_BYTES}")
@@ -77,7 +77,7 @@ def _check_mfem(text: str) -> str:
 
 
 def _mfem_sections(text: str) -> dict[str, list[str]]:
-    """Return the rows below each heading; the text behind a heading's colon is the first of them."""
+    """Return the rows below each heading; the text behind a heading's colon is the first row."""
     sections: dict[str, list[str]] = {}
     rows: list[str] = []
     for line in map(str.strip, text.splitlines()):

@@ -1,4 +1,4 @@
-"""Samples a volume, and what is solved on it, on linear cells, which ParaView slices, clips and contours rightly.
+"""Samples a volume, and a solution on it, on linear cells, which ParaView slices, clips and contours rightly.
 
 The nodes of the hexahedra lie on the spline, some a span of the solution and direction, with the values there of `arap`
 (distortion at volume 1), `det J`, and, with a solution, `u`, (the exact solution being known) `error` = |u - u_h|, and
@@ -140,7 +140,7 @@ def _of(
     rows: Rows,
     quantities: Quantities | None,
 ) -> dict[str, Array]:
-    """Return a solution on a grid, with its error where that is known, and quantities of its law.
+    """Return a solution on a grid, with its error where the exact solution is known, and quantities of its law.
 
     Raises InputError for quantities without a law, and for names that it does not give.
     """
@@ -168,7 +168,7 @@ def _of(
 
 
 def _default(given: Mapping[str, Quantity]) -> tuple[str, ...]:
-    """Return the quantities that a file holds of a law that gives these."""
+    """Return the quantities in a file of a law with these quantities."""
     return ("stress", "von_mises") if "stress" in given else ("gradient", "flux")
 
 

@@ -19,7 +19,7 @@ def serve(
     mapping: MapOptions,
     poisson: PoissonOptions,
 ) -> None:
-    """Serve the page until interrupted. say: is told the address. max_upload: in megabytes.
+    """Serve the page until interrupted. say: receives the address. max_upload: in megabytes.
 
     Raises InputError for options that cannot be run, where trame is missing and where the port is taken.
     """

@@ -1,13 +1,13 @@
-"""Follows a run: the share of it that is done, which never falls, and how long it still takes."""
+"""Follows a run: the share of its work that is done, which never falls, and the seconds that are left."""
 
 import time
 from collections import deque
 from collections.abc import Callable
 
 WINDOW = 20.0  # seconds over which estimates are compared
-SHORTEST = 8.0  # seconds of them that suffice
+SHORTEST = 8.0  # shortest span of estimates that suffices, in seconds
 SLIPPING = 0.5  # seconds by which the expected end moves in each second, from which on it is not known
-MOST = 0.9  # of the share left, how much is taken while nothing new is told
+MOST = 0.9  # largest part of the share left that is taken without a new estimate
 
 
 class Course:
@@ -15,8 +15,8 @@ class Course:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._done = 0.0  # share, when an estimate was told last
-        self._told: deque[tuple[float, float]] = deque()  # when estimates were told, and the ends they expect
+        self._done = 0.0  # share at the last estimate
+        self._told: deque[tuple[float, float]] = deque()  # times of estimates, and the ends that they expect
 
     def tell(self, left: float) -> None:
         """Take an estimate of the seconds that are left."""
@@ -44,7 +44,7 @@ class Course:
 
     @property
     def left(self) -> float | None:
-        """Return the seconds that are left; None where that is not known: nothing was told, or the end moves away."""
+        """Return the seconds that are left; None without an estimate, or while the expected end moves away."""
         if not self._told:
             return None
         (first, before), (last, end) = self._told[0], self._told[-1]

@@ -15,11 +15,11 @@ UNIT = ("unit", "Unit of lengths, such as mm", "none")  # of every problem
 
 @dataclass(frozen=True)
 class Sheet:
-    """Say what the page asks for of one problem.
+    """Hold the form of one problem on the page.
 
-    title: what the problem is called. equation: said above the fields. fields: options, what each is called on the
-    page, and what holds where it is left empty. lists: the same of options that hold data on regions of the part, an
-    entry a line, each with what is written behind a region that was clicked. signs: how options are called in one line.
+    title: name of the problem. equation: text above the fields. fields: of each field the option, its label, and the
+    value of an empty field. lists: the same of options with data on regions of the part, an entry a line, and the text
+    behind a region that was clicked. signs: symbols of options in a line of text.
     """
 
     title: str
@@ -75,7 +75,7 @@ EXCHANGE = "exchange"  # the other kind of data of a face of the cube is "flux"
 
 
 def described() -> dict[str, Any]:
-    """Return what the page lists: the problems with their fields and lists, fields of both, and the cube's faces."""
+    """Return the content of the form: problems with fields and lists, common fields, and the faces of the cube."""
     sheets = [
         {
             "name": name,
@@ -130,7 +130,7 @@ def _text(form: Mapping[str, Any], name: str) -> str:
 
 
 def _base(name: str, statement: ProblemOptions) -> ProblemOptions:
-    """Return options of that problem: those given, or new ones with the same meshes, degree and quadrature."""
+    """Return options of that problem: those given, or new ones with its meshes, degree and quadrature."""
     if statement.section == name:
         return statement
     shared = {field.name: getattr(statement, field.name) for field in fields(ProblemOptions) if field.name != "exact"}
@@ -163,7 +163,7 @@ def _of_faces(form: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]
 
 
 def filled(statement: ProblemOptions) -> dict[str, str]:
-    """Return the form that states these options, as `stated` reads it; what is not given is left out."""
+    """Return the form that states these options, as `stated` reads it; options that are not given are left out."""
     sheet, form = SHEETS[statement.section], {"problem": statement.section}
     known = ((name, getattr(statement, name)) for name, _, _ in (*sheet.fields, UNIT))
     form |= {name: f"{value:.12g}" if isinstance(value, float) else value for name, value in known if value}
@@ -180,7 +180,7 @@ def filled(statement: ProblemOptions) -> dict[str, str]:
 
 
 def in_words(statement: ProblemOptions) -> str:
-    """Return the data of a problem in one line, by which jobs are told apart."""
+    """Return the data of a problem in one line, which distinguishes jobs."""
     sheet, form = SHEETS[statement.section], filled(statement)
     said = [sheet.title] if isinstance(statement, ElasticityOptions) else []
     said += [f"{sign} = {form[name]}" for name, sign in sheet.signs.items() if name in form]

@@ -31,7 +31,7 @@ def picked(part: PartSurface, start: Array, end: Array) -> Picked | None:
 
 
 def _shares(part: PartSurface, start: Array, way: Array) -> Array:
-    """Return how far along the way each triangle is met (m,), infinite where it is not (Moller and Trumbore, 1997)."""
+    """Return the distance (m,) to each triangle along the way, infinite without one (Moller and Trumbore, 1997)."""
     a, b, c = np.moveaxis(part.vertices[part.faces], 1, 0)
     across = np.cross(way, c - a)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # triangles along the way are not met

@@ -119,7 +119,7 @@ class Jobs:
         return next((job for job in self if job.number == number), None)
 
     def before(self, job: Job) -> int:
-        """Return how many jobs are ahead of it in the queue, the running one among them."""
+        """Return the number of jobs ahead of a job in the queue, the running one included."""
         with self._lock:
             return self._queue.index(job) if job in self._queue else 0
 
@@ -195,7 +195,7 @@ class Jobs:
         self._changed(job)
 
     def close(self) -> None:
-        """Stop all jobs, wait until they have ended, and let go of them: libraries complain of what is left at exit."""
+        """Stop all jobs, wait until they have ended, and let go of them: libraries complain of running jobs at exit."""
         for job in self:
             self.stop(job)
         self._checker.shutdown(cancel_futures=True)

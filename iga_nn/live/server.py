@@ -1,7 +1,7 @@
 """Serves the live page through trame to this computer's browser alone: takes surfaces, runs jobs, gives out files.
 
 All open tabs share the list of jobs, which is gone when the server ends. Each tab keeps for itself which job it shows
-and what was typed into its forms, also when it is loaded again. The browser draws the pictures, so the server
+and the content of its forms, also when it is loaded again. The browser draws the pictures, so the server
 needs no graphics library for them.
 """
 
@@ -45,7 +45,7 @@ POLICY = (  # the browser itself refuses to fetch anything from elsewhere; Vue c
     f"connect-src 'self' ws://{HOST}:* ws://localhost:* data: blob:; frame-ancestors 'self'"
 )
 
-TICK = 1.0  # seconds between two looks at a running job
+TICK = 1.0  # seconds between two updates of a running job
 NUMBER = "{number:[1-9][0-9]{0,8}}"  # of a job, in a route: digits of ASCII
 FARTHEST = 1e6  # of a point on a line of sight from the part, whose volume is 1
 LONGEST = 255  # bytes of a path that is asked for
@@ -67,7 +67,7 @@ class Page:
         logging.getLogger("aiohttp.server").addFilter(_not_the_clients)
 
     def run(self, say: Callable[[str], None], port: int, open_browser: bool) -> None:
-        """Serve until interrupted; `say` is told the address."""
+        """Serve until interrupted; `say` receives the address."""
         server = self._server
         server.state.update({"jobs": [], "current": 0, "latest": 0, "trame__title": "iga-nn"})
         own = {"shown": 0, "paper": None, "webgl": True, "asked": 0, "picked": None, ENDED: ""}
@@ -104,7 +104,7 @@ class Page:
             client.Style("".join(sheet.read_text(encoding="utf-8") for sheet in sheets))
             client.Script((here / "app.js").read_text(encoding="utf-8"))
             layout.root.add_child((here / "app.html").read_text(encoding="utf-8"))
-        # What trame's client shows in place of the page when the server has ended: the page itself, so that it stays.
+        # The template that trame's client shows when the server has ended: the page itself, so that it stays.
         self._server.state["trame__template_error"] = layout.html
 
     # Jobs
@@ -208,7 +208,7 @@ class Page:
         return web.Response(text=str(job.number))
 
     async def _keep(self, request: web.Request, path: Path) -> int:
-        """Write the body to a file, up to the limit, and return how many bytes came."""
+        """Write the body to a file, up to the limit, and return the number of bytes."""
         size = 0
         with path.open("wb") as stream:
             async for part in request.content.iter_chunked(MEGABYTE):
@@ -251,7 +251,7 @@ class Page:
         return web.json_response(said)
 
     async def _start(self, request: web.Request) -> web.Response:
-        """Start a job; the form of the problem, where it was shown, says what is solved on the volume."""
+        """Start a job; the form, where it was shown, has the problem to solve on the volume."""
         job, given = self._named(request), await request.post()
         if job is None:
             raise web.HTTPNotFound

@@ -1,4 +1,4 @@
-"""Turns a job into what the browser shows of it: plain values, and arrays for vtk.js."""
+"""Turns a job into the content of the page: plain values, and arrays for vtk.js."""
 
 import base64
 import math
@@ -37,11 +37,11 @@ VIEW = Rotation.from_euler("yx", (-40.0, 25.0), degrees=True).as_matrix()  # sho
 ENDED = ("done", "failed", "stopped")
 GREY = 190  # of 255
 PICKED = (240, 140, 20)
-EDGES_UP_TO = 3_000  # edges are drawn on surfaces of at most so many faces
+EDGES_UP_TO = 3_000  # faces: surfaces with more are drawn without edges
 
 
 def row(job: Job, before: int, statement: ProblemOptions) -> dict[str, Any]:
-    """Return what the page shows of a job, in JSON's own types.
+    """Return the entry of a job on the page, in JSON's own types.
 
     before: jobs ahead of it in the queue. statement: the problem of the page's options.
     """
@@ -86,9 +86,9 @@ def is_ahead(job: Job) -> bool:
 
 
 def _facts(job: Job, now: Progress) -> list[list[str]]:
-    """Return what the page shows of a run: what each fact is, its value and a remark."""
+    """Return the facts of a run on the page: the name of each, its value and a remark."""
     is_spline = now.stage == "spline"
-    step = f"step {now.step}" if is_spline else f"step {now.step} of {now.steps}"  # how many it takes is not known
+    step = f"step {now.step}" if is_spline else f"step {now.step} of {now.steps}"  # their number is not known
     stage = [LAST, "the volume is made"] if job.is_mapped else [STAGES.get(now.stage, now.stage), step]
     aim = "between them the proof decides" if is_spline else "0 is the aim"
     facts = [
@@ -108,7 +108,7 @@ def _time_left(seconds: float | None) -> list[str]:
 
 
 def _files(job: Job) -> list[dict[str, Any]]:
-    """Return the result files that exist, their sizes and what they show."""
+    """Return the result files that exist, their sizes and their content in words."""
     found = [(name, job.results / name) for name in CONTENT if (job.results / name).is_file()]
     return [{"name": name, "size": _size(path.stat().st_size), "shows": CONTENT[name]} for name, path in found]
 

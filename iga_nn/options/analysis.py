@@ -53,7 +53,7 @@ class ElasticityStudyOptions(StudyOptions):
     Attributes:
         exact: the displacement, a vector: three formulas in x, y, z or X, Y, Z (scaled to volume 1 about the middle),
             separated by semicolons, in quotes: "x*y;0;sin(z)".
-        traction: faces with the traction of that displacement; the others carry the displacement itself.
+        traction: faces with the traction of that displacement; all other faces have the displacement itself.
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
     """
@@ -77,17 +77,17 @@ class ElasticityStudyOptions(StudyOptions):
 
 @dataclass(frozen=True)
 class ModesOptions(Checked):
-    """State which vibrations of an elastic body are sought, what it is made of and where it is held.
+    """Options of the vibrations of an elastic body: its material, its supports and the number of modes.
 
     Attributes:
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
         density: mass per volume, in units that agree with those of E and of the volume.
-        number: how many modes, from the lowest frequency on.
+        number: number of modes, from the lowest frequency on.
         fix: regions of the boundary that are held, as in `run elasticity`: "nz < -0.9", "face(x, y, z)", group:NAME,
             u0; without any the body is free, and its rigid motions are left out.
-        roller: regions held along their normal alone.
-        refine: how often every knot span of the map is halved.
+        roller: regions held along their normal only.
+        refine: number of times that every knot span of the map is halved.
         degree: degree of the trial space; that of the map by default.
     """
 

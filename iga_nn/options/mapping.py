@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceOptions(Checked):
-    """Say which surface is taken from a file.
+    """Options of the surface that is read from a file.
 
     Attributes:
-        component: number of the connected component to take, counted from 0.
+        component: number of the connected component that is taken, counted from 0.
         max_faces: refuse surfaces with more faces.
-        decimate: reduce surfaces with more faces to max_faces instead; a notice says how far they moved.
+        decimate: reduce surfaces with more faces to max_faces instead; a notice has the distance from the original.
     """
 
     component: int | None = None
@@ -36,23 +36,23 @@ class SurfaceOptions(Checked):
 
 @dataclass(frozen=True)
 class MapOptions(SurfaceOptions):
-    """Say how a surface becomes a volume.
+    """Options of the map from the cube to the solid inside a surface.
 
     Attributes:
         preset: "fast", made for two CPU cores; "grown", where every map grows from a cube, also of easy shapes; or
             "paper", the paper's own settings.
         seed: equal seeds give equal volumes, bit for bit.
         device: where the network is trained; "auto" takes CUDA where it is available.
-        control_points: number of control points per direction; "auto" starts with 30 and adds more where the surface is
-            not met, each direction its own, until the tolerance is met or there are max_control_points.
+        control_points: number of control points per direction; "auto" starts with 30 and adds more where the distance
+            is large, for each direction apart, until it meets the tolerance or max_control_points is reached.
         corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the
             cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
         resume: continue from the checkpoint in the output folder.
-        steps_factor: multiply the steps of every stage by this factor; a small one gives a quick look.
-        tolerance: of control_points "auto": root mean square distance between surface and spline, taken both ways, over
-            the diagonal of the surface's bounding box.
-        max_control_points: of control_points "auto": at most so many per direction, 30 or more, with which it starts.
+        steps_factor: factor of the training steps of every stage; a small factor gives a quick look.
+        tolerance: of control_points "auto": largest root mean square distance between surface and spline, in both
+            directions, over the diagonal of the surface's bounding box.
+        max_control_points: of control_points "auto": largest number per direction, 30 or more; "auto" starts with 30.
 
     Examples:
         >>> import iga_nn
@@ -85,12 +85,12 @@ class MapOptions(SurfaceOptions):
             _check_count("control points", self.control_points, config.spline.degree + 1)
             for name in ("tolerance", "max_control_points"):
                 if getattr(self, name) != getattr(MapOptions, name):
-                    raise InputError(f"{name.replace('_', ' ')}: has a meaning with --control-points auto alone")
+                    raise InputError(f"{name.replace('_', ' ')}: requires --control-points auto")
             return config.with_control_points(self.control_points)
 
     @property
     def most_control_points(self) -> int:
-        """Return how many control points a direction may get."""
+        """Return the largest number of control points a direction may get."""
         return self.max_control_points if self.control_points == "auto" else self.control_points
 
 

@@ -24,7 +24,7 @@ MOST_ITERATIONS = 3000  # of an elastic body; a bracket held at one end takes 68
 
 @dataclass(frozen=True)
 class Units:
-    """Hold the texts that stand behind the values of a solution and behind stresses, None where none is given."""
+    """Hold the units of a solution and of stresses, None for a unit that is not given."""
 
     displacement: str | None = None
     stress: str | None = None
@@ -35,7 +35,7 @@ NO_UNITS = Units()
 
 @dataclass(frozen=True)
 class ProblemOptions(Checked, ABC):
-    """Hold what every PDE of the command line is told: its exact solution, the meshes it is solved on, and how.
+    """Options of every PDE of the command line: its exact solution, its meshes, and its quadrature.
 
     A new PDE is a subclass with options of its own, entered in PROBLEMS.
 
@@ -44,7 +44,7 @@ class ProblemOptions(Checked, ABC):
         degree: degree of the trial space; that of the map by default.
         quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
             points a span; "gauss", degree points a span.
-        unit: of lengths, such as mm: free text, which stands behind lengths and places and changes no number.
+        unit: unit of lengths, such as mm; free text that is shown behind lengths and places and changes no number.
     """
 
     exact: Formula | None = None
@@ -71,7 +71,7 @@ class ProblemOptions(Checked, ABC):
 
     @property
     def units(self) -> Units:
-        """Return what stands beside colour bars."""
+        """Return the units beside colour bars."""
         return NO_UNITS
 
     def solve_options(self) -> SolveOptions:
@@ -173,12 +173,12 @@ class ElasticityOptions(ProblemOptions):
             normal, "nz > 0.9 and x < 2", a face of the part, "face(x, y, z)", a group of the mesh, group:NAME, a
             box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where regions are given, all else of the boundary is
             free.
-        roller: regions held along their normal alone.
-        symmetry: the same: where a plane of symmetry cuts the body.
+        roller: regions held along their normal only.
+        symmetry: regions where a plane of symmetry cuts the body; held along their normal as by a roller.
         load: regions with a force per area, each as "REGION=VECTOR".
         pressure: regions with a force per area against the outward normal, each as "REGION=FORMULA".
         spring: regions on an elastic foundation, force per area and displacement, each as "REGION=FORMULA".
-        stress_unit: of stresses, such as MPa: free text, which stands behind stresses and changes no number.
+        stress_unit: unit of stresses, such as MPa; free text that is shown behind stresses and changes no number.
 
     Examples:
         >>> import iga_nn
@@ -208,7 +208,7 @@ class ElasticityOptions(ProblemOptions):
 
     @property
     def units(self) -> Units:
-        """Return what stands beside colour bars."""
+        """Return the units beside colour bars."""
         return Units(self.unit, self.stress_unit)
 
     def problem(self) -> Elasticity:

@@ -26,8 +26,8 @@ def faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
 def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) -> dict[str, Any] | None:
     """Return REGION=DATA and REGION entries as a table, None without entries. Raises InputError for a region twice.
 
-    read: makes data of their text; an entry without data has None. The = of <= and >=, and what stands between quotes,
-    belongs to the region.
+    read: converts the text of the data; an entry without data has None. The = of <= and >=, and quoted text, belong to
+    the region.
     """
     found: dict[str, Any] = {}
     for entry in entries:
@@ -42,7 +42,7 @@ def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) ->
 
 
 def pair(text: str) -> tuple[str, str]:
-    """Return a factor and what the outside has, from ALPHA:OUTSIDE. Raises InputError."""
+    """Return the factor and the value outside of ALPHA:OUTSIDE. Raises InputError."""
     factor, colon, outside = text.partition(":")
     if not (factor.strip() and colon and outside.strip()):
         raise InputError(f"exchange {text!r:.80}: write REGION=ALPHA:OUTSIDE, such as 'nz > 0.9=25:20'")

@@ -6,18 +6,18 @@ from ..errors import InputError
 from ..type_check import Checked
 
 MAX_WORKERS = 256  # on one machine
-_LOCAL = ("workers", "threads_per_worker", "memory_limit")  # mean nothing for the workers of another scheduler
+_LOCAL = ("workers", "threads_per_worker", "memory_limit")  # options that another scheduler decides
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorkerOptions(Checked):
-    """Say which workers compute the surfaces of a batch.
+    """Options of the workers that compute the surfaces of a batch.
 
     Attributes:
         workers: worker processes on this machine; each computes one surface at a time.
-        threads_per_worker: threads that a surface is computed with; the result does not depend on them.
-        memory_limit: memory of a worker, such as 4GiB; one that takes more is ended, and 0 sets no limit.
-        retries: how often a surface goes on from its checkpoint after its worker was lost or its run failed.
+        threads_per_worker: number of threads for a surface; the result does not depend on it.
+        memory_limit: largest memory of a worker, such as 4GiB; a worker that takes more is ended, and 0 sets no limit.
+        retries: number of restarts of a surface from its checkpoint after its worker was lost or its run failed.
         scheduler: address of a dask scheduler, such as tcp://host:8786, whose workers compute instead of workers on
             this machine; they must see the same folders under the same paths.
 
@@ -46,4 +46,4 @@ class WorkerOptions(Checked):
         given = [field.name for field in fields(self) if getattr(self, field.name) != field.default]
         if self.scheduler is not None and (local := [name for name in _LOCAL if name in given]):
             flag = "--" + local[0].replace("_", "-")
-            raise InputError(f"{flag}: is for workers on this machine; leave it out with --scheduler")
+            raise InputError(f"{flag}: applies to workers on this machine; leave it out with --scheduler")

@@ -1,1 +1,1 @@
-"""Writes what a run found: report.json, report.html and tables."""
+"""Writes the results of a run: report.json, report.html and tables."""

@@ -1,4 +1,4 @@
-"""Says where a map is not certified, and what to try."""
+"""Advice on a map that is not certified: the places without a proof, and the remedies."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ def span_places(volume: BSplineVolume, spans: IntArray) -> Array:
 
 
 def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
-    """Return an entry of the section `parameterization`: how many spans are not proved, and the places of a few.
+    """Return an entry of the section `parameterization`: the number of spans without a proof, and the places of a few.
 
     The first place is the worst fold found, where there is one.
     """

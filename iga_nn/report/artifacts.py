@@ -1,4 +1,4 @@
-"""Lists every file of an output folder: what it shows, which part of a run writes it, how a figure is drawn.
+"""Lists every file of an output folder: its content, the part of a run that writes it, the function of a figure.
 
 The output folder, the report page, the live page and the table of docs/output.md are made from this table. A new figure
 needs a function in `iga_nn.figures` and a row here; `make docs` writes the table of docs/output.md anew.
@@ -23,7 +23,7 @@ SECTIONS: dict[str, Part] = {"config": "map", **dict.fromkeys(PROBLEMS, "solutio
 class Artifact:
     """Describe one file of an output folder.
 
-    part: the part of a run that writes it. shows: what the file holds or the figure shows; the heading of a figure.
+    part: the part of a run that writes it. shows: the content of the file or the heading of the figure.
     draw: module and function of `iga_nn.figures` that draw the figure from `takes`, the names of what must be known;
     the figure is left out where one of them is not. arrays: names in an archive.
     """
@@ -37,11 +37,11 @@ class Artifact:
 
     @property
     def is_curve(self) -> bool:
-        """Return whether the figure is drawn without VTK, and written as PDF, too, where that is wanted."""
+        """Return whether the figure is drawn without VTK, and may also be written as PDF."""
         return self.draw.startswith("curves.")
 
     def draw_to(self, path: Path, known: Mapping[str, Any]) -> None:
-        """Draw the figure from what is known, and write it."""
+        """Draw the figure from the known values, and write it."""
         module, function = self.draw.split(".")
         getattr(import_module(f"iga_nn.figures.{module}"), function)(path, *(known[name] for name in self.takes))
 

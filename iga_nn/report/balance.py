@@ -1,6 +1,6 @@
-"""Tells what acts on a body and what its supports answer, as a level of report.json holds it; older ones lack it.
+"""Shows the loads on a body and the reactions of its supports, from a level of report.json; older ones lack them.
 
-Of elasticity these are forces, of a scalar law what flows in. Forces have the unit of stresses times that of areas.
+Of elasticity these are forces, of a scalar law inflows. Forces have the unit of stresses times that of areas.
 """
 
 from typing import Any
@@ -12,14 +12,14 @@ TINY = 1e-6  # of the largest number: the linear solver's own error is smaller
 
 
 def heading(section: dict[str, Any]) -> str:
-    """Return what the table is called."""
+    """Return the title of the table."""
     return "What holds the body" if _is_force(section) else "What flows into the body"
 
 
 def table(section: dict[str, Any]) -> list[list[str]]:
     """Return the head of a table, and a row for the load, for each support and for the rest that is not balanced.
 
-    Empty where the finest level tells no reactions.
+    Empty where the finest level has no reactions.
     """
     level = _finest(section)
     if not level.get("reactions"):
@@ -34,7 +34,7 @@ def table(section: dict[str, Any]) -> list[list[str]]:
 
 
 def lines(section: dict[str, Any]) -> list[str]:
-    """Return a line for the load and one for each support; none where the finest level tells no reactions."""
+    """Return a line for the load and one for each support; none where the finest level has no reactions."""
     level = _finest(section)
     if not level.get("reactions"):
         return []
@@ -59,7 +59,7 @@ def _behind(section: dict[str, Any]) -> str:
 
 
 def _numbers(values: list[float], level: dict[str, Any]) -> list[str]:
-    """Return numbers as text; what is tiny beside the largest is 0."""
+    """Return numbers as text; a number that is tiny beside the largest is 0."""
     everything = [*level["load"], *(value for force in level["reactions"].values() for value in force)]
     least = TINY * max(map(abs, everything))
     return [f"{value if abs(value) > least else 0.0:.5g}" for value in values]

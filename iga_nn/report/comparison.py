@@ -13,7 +13,7 @@ from ..version import __version__
 from . import document as reports
 from . import extremes, html
 
-Cell = tuple[float | None, str]  # the number, where it is one, and how it is shown
+Cell = tuple[float | None, str]  # the number, None for a text, and its text
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def _of_regions(level: Mapping[str, Any]) -> dict[str, Cell]:
 def rows(one: Run, other: Run) -> dict[str, list[list[str]]]:
     """Return a table a group: the name of each number, its two values and the ratio of the second to the first.
 
-    A dash stands for what one of them lacks, and for a ratio to zero.
+    A dash stands for a number that a run lacks, and for a ratio to zero.
     """
     left, right = one.cells(), other.cells()
     found = {}
@@ -106,7 +106,7 @@ def as_text(one: Run, other: Run) -> str:
 
 
 def page(one: Run, other: Run) -> str:
-    """Return the page as text: what decides, the tables, the figures beside each other, and what each was told."""
+    """Return the page as text: the verdicts, the tables, the figures beside each other, and the commands."""
     runs = (one, other)
     drawn = [dict(html.figures(run.report, run.folder)) for run in runs]
     return html.filled(

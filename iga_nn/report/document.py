@@ -64,7 +64,7 @@ def read(folder: Path) -> Report | None:
     try:
         report = json.loads((folder / REPORT).read_text(encoding="utf-8"))
         if report["schema"] == SCHEMA and is_finished(report):
-            verdict(report, folder)  # which reads what is asked of it later
+            verdict(report, folder)  # it reads all entries that later calls need
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return None
     return report if report["schema"] == SCHEMA else None
@@ -82,7 +82,7 @@ def is_certified(report: Report) -> bool:
 
 
 def claim(report: Report) -> str:
-    """Return what a certificate proves: "det J > 0", of a left-handed volume "det J < 0"."""
+    """Return the claim of a certificate: "det J > 0", of a left-handed volume "det J < 0"."""
     return CLAIMS[report["parameterization"].get("orientation", "right-handed")]
 
 
@@ -98,7 +98,7 @@ def is_meaningful(report: Report) -> bool:
 
 
 def state(report: Report) -> Literal["certified", "not certified", "not solved"]:
-    """Return what a finished run has reached; "not solved" where the numbers of a solve are not to be trusted."""
+    """Return the state of a finished run; "not solved" where the numbers of a solve are not to be trusted."""
     if not is_certified(report):
         return "not certified"
     return "certified" if is_converged(report) and is_meaningful(report) else "not solved"
@@ -122,7 +122,7 @@ def one_to_one(report: Report) -> str:
 
 
 def control_points_in_words(report: Report) -> str:
-    """Return how many control points `auto` took and why no more; empty where their number was given."""
+    """Return the number of control points of `auto`, and the reason for no more; empty where the number was given."""
     if not (told := report["parameterization"].get("refinement")):
         return ""
     first, last, asked = told["levels"][0], told["levels"][-1], f"tolerance {told['tolerance']:.2g}"
@@ -152,7 +152,7 @@ def surface_distance(report: Report) -> Report:
 
 
 def verdict(report: Report, folder: Path) -> Report:
-    """Return what decides whether a result is used: what `--json` prints."""
+    """Return the entries that decide whether a result is used, as `--json` prints them."""
     quality = report["parameterization"]
     short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
     short |= {"orientation": quality["orientation"]} if "orientation" in quality else {}

@@ -10,7 +10,7 @@ from typing import Any
 
 Level = dict[str, Any]
 
-SAYINGS = {  # quantity -> what is said of it, which of its extremes that is, and the section's unit of its values
+SAYINGS = {  # quantity -> its words, the extreme that they name, and the section's unit of its values
     "u": ("u at least", "least", ""),
     "magnitude": ("largest displacement", "largest", "unit"),
     "von_mises": ("von Mises at most", "largest", "stress_unit"),
@@ -21,7 +21,7 @@ SAYINGS = {  # quantity -> what is said of it, which of its extremes that is, an
 }
 DERIVATIVES = {"von_mises": "von Mises stress", "flux_magnitude": "|flux|", "gradient_magnitude": "|gradient|"}
 GROWTH = 1.1  # of the largest stress while h is halved; smooth ones, resolved, grow less, at clamped rims 1.2 and more
-TINY = 1e-6  # of the largest coordinate: what is smaller is shown as 0
+TINY = 1e-6  # of the largest coordinate: smaller ones are shown as 0
 
 
 def lines(section: dict[str, Any]) -> list[str]:
@@ -39,7 +39,7 @@ def table(section: dict[str, Any]) -> list[list[str]]:
 
 
 def finest(section: dict[str, Any]) -> dict[str, tuple[float, str]]:
-    """Return the extremes of the finest level: what is said of each, with the unit -> its value, and this as text with
+    """Return the extremes of the finest level: the words of each, with the unit -> its value, and this as text with
     its place.
     """
     found = {}
@@ -86,7 +86,7 @@ def _known(section: dict[str, Any]) -> list[Level]:
 
 
 def _rows(section: dict[str, Any]) -> list[list[str]]:
-    """Return what is said of each extreme, its value on each level, and where it is on the finest."""
+    """Return the words for each extreme, its value on each level, and its place on the finest."""
     rows = []
     for name, said, end, unit in _told(section):
         levels = [level["extremes"].get(name) for level in _known(section)]
@@ -97,7 +97,7 @@ def _rows(section: dict[str, Any]) -> list[list[str]]:
 
 
 def _told(section: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return the quantities of the finest level, each with what is said of it, by which end and in which unit."""
+    """Return the quantities of the finest level, each with its words, its end and its unit."""
     levels, told = _known(section), []
     for name in levels[-1]["extremes"] if levels else ():
         told.append((name, *SAYINGS.get(name, (f"{name} at most", "largest", ""))))

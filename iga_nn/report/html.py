@@ -1,4 +1,4 @@
-"""Writes report.html: what report.json says, the figures and an interactive view, in one file that fetches nothing.
+"""Writes report.html: the content of report.json, the figures and a view, in one file that fetches nothing.
 
 The page is laid out by the template page.html, which escapes whatever it is given; this module chooses its content.
 """
@@ -33,7 +33,7 @@ ERRORS = (  # keys of a level: the absolute error, and the relative one that sta
 
 MEANINGS = {
     "certified": "{claim} is proved on the whole cube, rounding errors included.",
-    "folded": "The map folds: det J has the wrong sign somewhere. Do not trust what is solved on it.",
+    "folded": "The map folds: det J has the wrong sign somewhere. Do not trust a solution on it.",
     "undecided": "Neither {claim} on the whole cube nor a fold could be proved.",
 }
 ORIGINS = {
@@ -100,7 +100,7 @@ def filled(template: str, **content: Any) -> str:
 
 
 def verdicts(report: Report) -> list[tuple[str, str, str]]:
-    """Return what decides whether the result is used: the colour, the heading and the meaning of each verdict."""
+    """Return the verdicts that decide whether the result is used: colour, heading and meaning of each."""
     quality, answer = report["parameterization"], reports.one_to_one(report)
     claim = reports.claim(report)
     meaning = MEANINGS[quality["bijective"]].format(claim=claim)
@@ -128,7 +128,7 @@ def _point(coordinates: list[float]) -> str:
 
 
 def _facts(report: Report) -> list[tuple[str, str, str]]:
-    """Return the numbers that matter: what each is, the number and a remark."""
+    """Return the numbers that matter: the name of each, the number and a remark."""
     quality = report["parameterization"]
     facts = []
     if "arap" in quality:
@@ -193,7 +193,7 @@ def _drawn(report: Report, folder: Path) -> list[tuple[str, str, str]]:
 
 
 def _details(report: Report) -> dict[str, dict[str, Any]]:
-    """Return what was given, how long each step took, and which versions were used."""
+    """Return the input, the seconds of each step, and the versions of the packages."""
     given = {name: value for name, value in report["input"].items() if name in ("file", "sha256", "vertices", "faces")}
     given |= {name: report[name] for name in ("seed", "device") if name in report}
     if "config" in report:

@@ -1,4 +1,4 @@
-"""Lays out what a notebook shows of a result: its facts as a table, without pictures."""
+"""Shows a result in a notebook: its facts as a table, without pictures."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict

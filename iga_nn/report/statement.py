@@ -6,7 +6,7 @@ from typing import Any
 from . import document as reports
 from .document import Report
 
-Row = tuple[str, str]  # what it is, and the formula or number
+Row = tuple[str, str]  # a name, and the formula or number
 
 FROM_EXACT = "from the exact solution"
 
@@ -59,12 +59,12 @@ def _elasticity(section: Report) -> list[Row]:
 
 
 def _derived(section: Report) -> str:
-    """Return what data are that are not given."""
+    """Return the meaning of data that are not given."""
     return FROM_EXACT if section.get("exact") else "0"
 
 
 def _rest(section: Report, essential: str, key: str, natural: str, faces: Sequence[Row]) -> Row:
-    """Return what is given on the rest of the boundary: natural data where regions are named, else essential ones.
+    """Return the data on the rest of the boundary: natural data where regions are named, else essential ones.
 
     key: under which the section has them. faces: those with data of their own.
     """

@@ -51,7 +51,7 @@ EVEN = 0.01  # of a field's range: where half of the boundary varies less, the v
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Hold one mode, or one step in time: what is shown of it, and its name beside the slider.
+    """Hold one mode, or one step in time: its fields, and its name beside the slider.
 
     label: such as "mode 1: 12.5 Hz" or "t = 0.1 s". fields: the first is shown first. vectors: (..., 3), or None.
     displaces: whether the vectors displace the body. knots: of the mesh that is drawn, those of the volume by default.
@@ -93,7 +93,7 @@ def scene_of(
     units: Units = NO_UNITS,
     coarser: int = 1,
 ) -> Scene:
-    """Return what the script draws, in JSON's own types; solution and error only where they are known and finite.
+    """Return the content for the script, in JSON's own types; solution and error only where known and finite.
 
     units: behind the titles of the bars. coarser: 2 leaves out every second point.
     """
@@ -166,7 +166,7 @@ def _scene(volume: BSplineVolume, frames: Sequence[Frame], coarser: int) -> Scen
         "low": low.tolist(),
         "high": high.tolist(),
         "view": np.stack([view.right, view.up, view.towards]).tolist(),
-        "octant": list(octant),  # what the cut leaves out
+        "octant": list(octant),  # the octant that the cut leaves out
         "places": _both(points, coarser, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
         "axes": list(AXES),
         "spans": [breakpoints(row).tolist() for row in frames[0].knots or volume.knots],
@@ -189,7 +189,7 @@ def _bound(frames: Sequence[Frame]) -> float:
 
 
 def _opening(frame: Frame) -> dict[str, str]:
-    """Return what is seen first: the first field, on the boundary, unless half of that has nearly one value.
+    """Return the first view: the first field, on the boundary, unless half of that has nearly one value.
 
     A body is seen as a whole: its shape says more than the colours of its inside.
     """
@@ -202,7 +202,7 @@ def _opening(frame: Frame) -> dict[str, str]:
 
 
 def _described(field: Field, frame: Frame) -> dict[str, Any]:
-    """Return what the controls and the bar say of a field; the page finds its values from vectors where it can."""
+    """Return the words of a field for the controls and the bar; the page finds its values from vectors where it can."""
     limits = field.limits
     described = {"name": field.name, "title": field.title, "low": limits.low, "high": limits.high}
     described |= {"logarithmic": limits.logarithmic, "remark": limits.remark}

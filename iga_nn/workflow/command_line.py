@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-SILENT = ("resume",)  # changes how a result is reached, not what it is
+SILENT = ("resume",)  # changes the way to a result, not the result
 
 
 def command_line(command: str, source: str | Path, *chosen: Any, **given: Any) -> str:
@@ -28,7 +28,7 @@ def command_line(command: str, source: str | Path, *chosen: Any, **given: Any) -
 def gives_the_same(one: str, other: str) -> bool:
     """Return whether two such lines give the same result.
 
-    They differ at most in the output folder, and in how they name the same file.
+    They differ at most in the output folder, and in the names of the same file.
     """
     return _without_folder(one) == _without_folder(other)
 

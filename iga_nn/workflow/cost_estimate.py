@@ -1,8 +1,8 @@
 """Estimates the time and the memory of a run, and the memory of a solve, before it starts.
 
-That of a run comes from counts and the time of two small pieces of work on all threads: a pass (the network forward and
-backward on 1000 points) and a product with the second derivative of the spline's distortion. How many of them a run
-takes is known from conch and duck, and of hard surfaces from bone and homer. That of a solve comes from counts alone.
+The cost of a run comes from counts and the time of two small pieces of work on all threads: a pass (the network forward
+and backward on 1000 points) and a product with the second derivative of the spline's distortion. Their number in a run
+was measured on conch and duck, and for hard surfaces on bone and homer. The cost of a solve comes from counts alone.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ LARGEST = 30  # control points per direction that the product is timed with; bey
 # Passes
 TRAINING_STEP = 1.3e-3  # for each of its points
 NEWTON_VERTEX, LAST_VERTEX = 6e-4, 0.04  # for each vertex of the surface: a Newton step, and all that comes after them
-CALLS = 0.12  # what a product takes however small it is
+CALLS = 0.12  # least cost of a product
 UNKNOWN = 2.4e-3  # for each unknown of the problem solved
 REST = 1000.0  # libraries loaded, figures drawn
 
 # Products
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
 EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round, on all control points
-HARD_AFTER = (3, 14)  # likewise each time that knots were inserted
+HARD_AFTER = (3, 14)  # rounds, and Newton steps a round, after each insertion of knots
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
 
-# Of a solve, counted in numbers of 8 bytes; tests compare them with what a solve takes.
+# Of a solve, counted in numbers of 8 bytes; tests compare them with the memory of real solves.
 SYMMETRIC, OTHER = 25, 85  # an unknown: vectors of conjugate gradients or GMRES, preconditioner, norms
 BLOCK, CONSTANT = 6, 9  # a quadrature point: a tensor, kept or for a moment; the geometry of a constant law
 PLANES = 30  # arrays of a plane of points, where the error is measured
@@ -70,7 +70,7 @@ class Forecast:
     after: tuple[float, float] = (0.0, 0.0)
 
     def seconds_after(self, stage: str) -> float:
-        """Return how long a usual run takes after the training stages, or after the stage "spline"."""
+        """Return the seconds of a usual run after the training stages, or after the stage "spline"."""
         return self.after[stage == "spline"]
 
     def __str__(self) -> str:
@@ -99,7 +99,7 @@ def forecast(
 
     spline, vertices = config.spline, len(surface.vertices)
     points = points_of_a_step(surface.unit_vertices, surface.faces, config.train)
-    with one_thread_an_operation():  # as the run does: a helping thread keeps what it begins with
+    with one_thread_an_operation():  # as the run does: a helping thread keeps its first settings
         one_pass = _pass_seconds(config, device, clock)
         product = _product_seconds(spline, clock) + CALLS * one_pass
     last = (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
@@ -173,7 +173,7 @@ def _fastest(work: Callable[[], object], clock: Clock) -> float:
 def available_memory_mb(processes: int = 1) -> float | None:
     """Return the megabytes of memory that each of some processes can still take, None where the system does not say.
 
-    That is what the machine has free, and what the limit on this process's address space (`ulimit -v`) leaves.
+    That is the free memory of the machine, within the limit on this process's address space (`ulimit -v`).
     """
     try:
         lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
@@ -190,7 +190,7 @@ def available_memory_mb(processes: int = 1) -> float | None:
 
 
 def warn_of_memory(wanted_mb: float, what: str, remedy: str) -> None:
-    """Warn where so many megabytes are not free. what: takes them, in words."""
+    """Warn where `wanted_mb` megabytes are not free. what: the need for memory, in words."""
     free = available_memory_mb()
     if free is not None and wanted_mb > free:
         log.warning("%s, %s GB are free: %s", what, rounded(free / 1000.0, 1), remedy)
@@ -198,7 +198,7 @@ def warn_of_memory(wanted_mb: float, what: str, remedy: str) -> None:
 
 @dataclass(frozen=True)
 class SolveMemory:
-    """Hold what a solve takes beside the program: megabytes that processes share, and those that each of them takes."""
+    """Hold the memory of a solve beside the program, in megabytes: shared by the processes, and of each process."""
 
     shared_mb: float
     each_mb: float

@@ -48,7 +48,7 @@ _LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """Hold what a training starts from.
+    """Hold the input of a training.
 
     corners: vertices or points; marks: the points (8, 3) that they are, for figures.
     """
@@ -75,7 +75,7 @@ def map_surface(
     with compilation_told():
         given = _prepare(state, mesh, mapping, problem, unknowns)
         result = _train(given, mapping, progress, state.folder / CHECKPOINT)
-    state.begin("map", "solution")  # what was left until the checkpoint of a resumed run was accepted
+    state.begin("map", "solution")  # files that stay until the checkpoint of a resumed run is accepted
     state.seconds.update(result.seconds)
     _write(state, given, result, command, mapping)
     _draw(state, given, result)
@@ -85,9 +85,9 @@ def map_surface(
 def _prepare(
     state: RunFolder, mesh: str | Path, mapping: MapOptions, problem: BoundaryValueProblem | None, unknowns: int
 ) -> _Given:
-    """Check the options, read the surface and the corners, check the problem's data, and announce what the run takes.
+    """Check the options, read the surface and the corners, check the problem's data, and announce the cost of the run.
 
-    The folder is cleared once all of them are accepted; where a run is resumed, only when its map is there: the
+    The folder is cleared once all input is accepted; where a run is resumed, only when its map is there: the
     checkpoint may be refused.
     """
     from parameterize.run import corner_vertices

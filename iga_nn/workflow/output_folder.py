@@ -25,7 +25,7 @@ CHECKPOINT = "checkpoint"
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Hold a finished output folder and what its report.json says."""
+    """Hold a finished output folder and the content of its report.json."""
 
     folder: Path
     report: reports.Report
@@ -36,7 +36,7 @@ class RunFolder:
     """Fill one output folder: its report so far, and the clock.
 
     vector: write plots of curves as PDF, too. finished: the result that a resumed run found; nothing is left to do.
-    guarded: files of which no report tells are the user's own, and not replaced. make: makes the folder, where it is
+    guarded: files without a report are the user's own, and not replaced. make: makes the folder, where it is
     not there.
     """
 
@@ -131,7 +131,7 @@ def open_folder(
 ) -> Iterator[RunFolder]:
     """Hold the output folder for one run and yield it; one that is not there is made by `RunFolder.begin`.
 
-    An input that is refused so leaves nothing behind; what was made and stays empty is removed again at the end.
+    A refused input leaves nothing behind: a folder that was made and stays empty is removed again at the end.
     Raises InputError, before anything costly is computed, where the folder cannot be written or another run uses it,
     and where it holds a result or an interrupted run that neither `force` nor `resume` allows to touch.
     """

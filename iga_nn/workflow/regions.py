@@ -1,4 +1,4 @@
-"""What regions are on the surface of a part: looked at before anything is computed."""
+"""Checks regions on the surface of a part, before a run."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ _SEED = 0
 
 
 def check_regions(problem: BoundaryValueProblem, surface: Surface) -> None:
-    """Raise ValueError where a region of a problem holds at no point of a surface, or names what it lacks.
+    """Raise ValueError where a region of a problem holds at no point of a surface, or names a group that it lacks.
 
     problem: with its regions placed. Regions of the cube's faces are not known yet.
     """
@@ -84,7 +84,7 @@ def _draw(picture: Path, surface: Surface, regions: Sequence[Region]) -> None:
 
 
 def facts_of(region: Region, surface: Surface) -> dict[str, Any]:
-    """Return a region's text, its area, its share of the surface's, and how many triangles lie mostly in it.
+    """Return a region's text, its area, its share of the surface's, and the number of triangles mostly in it.
 
     Raises ValueError where no point of the surface lies in it.
     """
@@ -112,7 +112,7 @@ def cover(region: Region, surface: Surface) -> Array:
 def share_of(region: Region, surface: Surface) -> float:
     """Return the share of a surface's area that a region has, of points without a pattern on it.
 
-    A region without any of them, but with vertices, has the least share that is not zero.
+    A region without such points, but with vertices, has the least share that is not zero.
     """
     rng = np.random.default_rng(_SEED)
     cross = doubled_areas(surface.vertices, surface.faces)

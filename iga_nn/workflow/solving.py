@@ -1,4 +1,4 @@
-"""Solves a problem on the volume of an output folder, level after level, and writes what is found."""
+"""Solves a problem on the volume of an output folder, level after level, and writes the results."""
 
 import logging
 import time
@@ -72,7 +72,7 @@ def level_of(solution: Solution) -> dict[str, Any]:
     try:
         extremes = {name: found.as_dict() for name, found in solution.all_extremes().items()}
     except ValueError as error:  # not finite: the solver broke down, or det J is zero somewhere
-        log.info("no extremes are told: %s", one_line(error))
+        log.info("no extremes: %s", one_line(error))
     seconds = level["seconds"] | {"extremes": time.process_time() - started}
     return level | {"extremes": extremes, "seconds": seconds}
 
@@ -99,7 +99,7 @@ def each_level(
 
 @contextmanager
 def reported(state: RunFolder, volume: BSplineVolume) -> Iterator[None]:
-    """Say in the report why the block did not solve the problem, and write the page of what is known without it."""
+    """Write the reason into the report where the block does not solve the problem, and the page without a solution."""
     try:
         yield
     except (InputError, ConvergenceError) as error:
@@ -150,7 +150,7 @@ def _draw(
 def regions_of(problem: BoundaryValueProblem, report: SolveReport) -> list[dict[str, Any]]:
     """Return the conditions of a problem for a report: the kind, the region and the data as text, and the area.
 
-    Of whole faces of the cube the area is not told.
+    Whole faces of the cube have no area.
     """
     areas = report.balance.areas if report.balance else {}
     return [
@@ -161,7 +161,7 @@ def regions_of(problem: BoundaryValueProblem, report: SolveReport) -> list[dict[
 
 
 def _as_text(condition: Condition) -> str:
-    """Return data as text: of an exchange or a spring the factor and what stands outside, where it is not zero."""
+    """Return data as text: of an exchange or a spring the factor and the value outside, where it is not zero."""
     if condition.kind in WITH_FACTOR:
         factor, outside = map(_joined, condition.data)
         return (
@@ -181,7 +181,7 @@ def _joined(data: Any, free: Sequence[bool] = ()) -> str:
 
 
 def described(problem: BoundaryValueProblem, volume: BSplineVolume) -> dict[str, Any]:
-    """Return what the report says of a problem beside the options: the exact solution, and the meaning of X, Y, Z."""
+    """Return the entries of a problem in the report beside its options: the exact solution and the frame of X, Y, Z."""
     given: dict[str, Any] = {"exact": problem.exact} if isinstance(problem.exact, str) else {}
     return given | ({"frame": UnitFrame.of(volume).as_dict()} if problem.is_scaled else {})
 
@@ -192,7 +192,7 @@ def notices_of(found: Iterable[SolveReport]) -> list[str]:
 
 
 def scene_of(state: RunFolder, volume: BSplineVolume, *solved: Any, units: Units = NO_UNITS) -> Any:
-    """Return the interactive view of a volume and what is solved on it; None where it cannot be drawn."""
+    """Return the interactive view of a volume and a solution on it; None where it cannot be drawn."""
     with state.timed("report"), state.drawing("interactive view"):
         from ..report import viewer
 

@@ -1,4 +1,4 @@
-"""Says what is proved of a volume: for `check`, the report and the terminal."""
+"""The verdict on a volume: for `check`, the report and the terminal."""
 
 import hashlib
 import logging
@@ -29,7 +29,7 @@ def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
 
 
 def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, command: str) -> None:
-    """Certify a saved volume, and write the sections of report.json that say what was given and what is proved."""
+    """Certify a saved volume, and write the sections of report.json on the input and on the proof."""
     with state.timed("certify"):
         facts = certified_facts(volume)
     state.write(
@@ -42,7 +42,7 @@ def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, comma
 
 
 def tell(state: RunFolder, mapping: MapOptions | None = None) -> None:
-    """Log the verdict of the report; where the map is not certified, add what to try to the report.
+    """Log the verdict of the report; where the map is not certified, add the remedies to the report.
 
     mapping: those the map was made with, where they are known.
     """

@@ -149,7 +149,7 @@ def _to_unit_magnitude(derivatives: list[tuple[Array, IntArray]]) -> tuple[list[
     """Return the three derivatives' control points m * 2**e / 2**(r_a + c_b), and the sum of all r_a and c_b.
 
     r_a belongs to a component and c_b to a derivative. All magnitudes are below 1, and in each row and each column of J
-    some reach 1/4. This is the only rounding: what is below 2**-1022 then is off by at most 2**-1075.
+    some reach 1/4. This is the only rounding: a number below 2**-1022 is then off by at most 2**-1075.
     """
     largest = np.array([[np.where(m[a] != 0.0, e[a], _NO_EXPONENT).max() for m, e in derivatives] for a in range(3)])
     rows = largest.max(axis=1)
@@ -184,7 +184,7 @@ def _roundings(degrees: tuple[int, int, int]) -> int:
 
     Underflow is gradual: sums and differences lose nothing; a product, a quotient or a scaling loses at most 2**-1075,
     call it h. All numbers are at most 1, or with their binomials at most these, and C(q, i) C(r, j) is at most
-    C(q + r, i + j), by which the result is divided: what is lost in one factor the others do not enlarge. Lost are
+    C(q + r, i + j), by which the result is divided: the other factors do not enlarge the loss in one of them. Lost are
     - by a control point of a derivative h, in its scaling alone;
     - by a weight of the extraction 4 p h, by the sums with p + 1 of them (p + 1) h a direction;
     - by a coefficient of det J h for each product that it passes through: at most 2 (p_u + 1) p_v p_w products for each

@@ -16,6 +16,7 @@ from ..surface.part import PartSurface
 from .cube import damped_fit, snap
 from .cutting import CutMesh, cut_along_rays
 from .flips import orientation, untangle_whole
+from .layout import CubeLayout
 
 PART = ("part_faces", "group_names", "group_sizes", "group_faces")  # arrays of boundary.npz that older files lack
 _SAME = 1e-7  # share of an edge's length: a cut this close to a vertex takes the vertex
@@ -167,15 +168,15 @@ def _on_faces(parameters: Array) -> Mask:
     return np.stack([parameters == 0.0, parameters == 1.0], axis=-1).reshape(-1, len(FACE_NAMES))
 
 
-def boundary_map(volume: BSplineVolume, vertices: Array, faces: IntArray, parameters: Array) -> BoundaryMap:
-    """Return the map of a surface (vertices (n, 3), user's units) that is cut where it crosses the cube's edges.
+def boundary_map(volume: BSplineVolume, layout: CubeLayout) -> BoundaryMap:
+    """Return the map of a surface (user's units) that is cut where it crosses the cube's edges.
 
-    parameters (n, 3): closest points of the volume's boundary. Where the spline smooths a detail away they may flip a
-    few triangles, which are untangled first. The cut vertices follow the input's, and are fitted to the volume.
+    layout: its places are closest points of the volume's boundary. Where the spline smooths a detail away they may flip
+    a few triangles, which are untangled first. The cut vertices follow the others, and are fitted to the volume.
     """
-    placed = untangle_whole(parameters, faces)
+    vertices, placed = layout.points, untangle_whole(layout.places, layout.faces)
     for number in range(_NUDGES):
-        cut = cut_along_rays(placed, faces, _SAME)
+        cut = cut_along_rays(placed, layout.faces, _SAME)
         spread = snap(cut.carry(placed))
         spread[: len(placed)] = placed
         plain = BoundaryMap(cut.carry(vertices), spread, cut.faces)

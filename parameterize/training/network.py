@@ -52,7 +52,7 @@ class InverseMap(nn.Module):
 
     @torch.no_grad()
     def turn(self, rotation: Tensor) -> None:
-        """Turn what G maps to about the middle of the cube, in place: rotation (3, 3)."""
+        """Turn the image of G about the middle of the cube, in place: rotation (3, 3)."""
         for part in (self.affine, self.last.weight, self.last.bias):
             part.copy_(rotation.to(part) @ part)
 

@@ -26,7 +26,7 @@ def boundary_coefficients(
 
     values: takes points (3, ...) and the name of a face on which they lie, and returns (c, ...), one row for each of
     the components. Corners are interpolated,
-    then edges and faces projected in L2, in the parametric measure; each takes up what the smaller ones have fixed.
+    then edges and faces projected in L2, in the parametric measure; each keeps the coefficients of the smaller ones.
     """
     coefficients = np.zeros((components, *space.shape))
     points, bases, projections = zip(*map(_projection, space.knots, space.degrees), strict=True)

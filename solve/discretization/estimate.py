@@ -24,7 +24,7 @@ from .errors import Errors, ratio
 from .quadrature import gauss_rule
 from .space import TrialSpace
 
-ON_FACE = np.linspace(0.05, 0.95, 7)  # parameters a direction at which Robin's alpha is looked at
+ON_FACE = np.linspace(0.05, 0.95, 7)  # parameters a direction at which Robin's alpha is evaluated
 SIGNS = tuple(product((1.0,), (1.0, -1.0), (1.0, -1.0)))  # of the waves that make up a standing one
 INSIDE = (-5, -3, -1)  # the axes of blocks that run over the points of a span
 
@@ -44,7 +44,7 @@ def error_estimate(
 
     energy: a(u_h, u_h), of a symmetric law whose given values are zero, else None. The work of the loads on the error
     is then the square of its energy norm, and as large a share of u_h is added: bodies that bend are too stiff by it.
-    None where the residual tells too little: in a space that is only continuous somewhere, whose derivatives jump, of a
+    None where the residual does not suffice: in a space that is only continuous somewhere, whose derivatives jump, of a
     law with a caveat, and where the derivatives of its coefficients are unknown.
     """
     if space.is_only_continuous or problem.not_differentiable or problem.form.caveat:

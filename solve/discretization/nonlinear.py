@@ -24,7 +24,7 @@ class Forces(MatrixFree):
 
     @classmethod
     def of(cls, operator: Operator | FormOperator, volume: BSplineVolume, form: Form) -> "Forces":
-        """Return the forces of a law with the rule, and what faces add, of an operator."""
+        """Return the forces of a law with the rule and the terms on faces of an operator."""
         return cls(operator.space, operator.rule, operator.threads, volume, form, faces=operator.faces)
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:

@@ -1,4 +1,4 @@
-"""What a problem's conditions on regions give at the points of a face: the terms of `weak.WeakFace`."""
+"""The terms of a problem's conditions on regions at the points of a face, for `weak.WeakFace`."""
 
 from __future__ import annotations
 
@@ -180,9 +180,9 @@ class _Builder:
         return "(" + ", ".join(f"{value:.4g}" for value in self.rule.at.x[:, point]) + ")"
 
     def _natural(self, x: Points, normal: Array, projector: Array) -> tuple[Array, Array]:
-        """Return what is given as flux into the body (c, m), and the factor (m,) of exchanges.
+        """Return the given flux into the body (c, m), and the factor (m,) of exchanges.
 
-        Raises ValueError where a load acts on what is held.
+        Raises ValueError where a load acts on a held part of the boundary.
         """
         loads, factor = np.zeros((self.problem.form.components, len(self.rule.weights))), np.zeros(len(x[0]))
         named = np.zeros(len(factor), dtype=bool)
@@ -207,7 +207,7 @@ class _Builder:
         return loads, factor
 
     def _partly_held(self, projector: Array, named: Array) -> Array:
-        """Return where the exact solution's flux is that of the components which a value leaves free."""
+        """Return the mask of points with the exact solution's flux in the components that a value leaves free."""
         natural = np.zeros(len(named), dtype=bool)
         for i, condition in enumerate(self.problem.conditions):
             natural |= self._holding(i) & (not condition.is_essential)
@@ -217,7 +217,7 @@ class _Builder:
     def _refuse_load(self, condition: Condition, point: int) -> None:
         held = [c for i, c in enumerate(self.problem.conditions) if c.is_essential and self._holding(i)[point]]
         raise ValueError(
-            f"{condition.role} acts on what {held[0].role} holds, as at {self._place(point)}: "
+            f"{condition.role} acts where {held[0].role} holds the body, as at {self._place(point)}: "
             f"write '{condition.region} and not ({held[0].region})'"
         )
 
@@ -226,7 +226,7 @@ class _Builder:
 
         On the span behind a face |t(u)|^2 integrates to at most (p + 1)^2 / thickness times the energy, times the
         largest eigenvalue of the law's matrix n . C . n (a polynomial of degree p on [0, 1] has
-        f(0)^2 <= (p + 1)^2 int f^2), times what the map's change across the span adds.
+        f(0)^2 <= (p + 1)^2 int f^2), times a factor for the map's change across the span.
         """
         at, (axis, side) = self.rule.at, divmod(FACE_NAMES.index(self.name), 2)
         strength = np.linalg.eigvalsh(self.problem.form.matrix_along(normal, x))[..., -1]
@@ -237,7 +237,7 @@ class _Builder:
         return steepest * strength / thickness, strength * span / thickness
 
     def _change(self, axis: int, side: int, span: float) -> Array:
-        """Return by how much (m,) the map may lower the energy inside the span behind each point, against the face."""
+        """Return the factor (m,) by which the map may lower the energy inside the span behind each point."""
         at, change = self.rule.at, np.ones(len(self.rule.weights))
         inverse, det = np.linalg.inv(at.jacobian), np.abs(np.linalg.det(at.jacobian))
         for depth in DEPTHS:
@@ -249,7 +249,7 @@ class _Builder:
         return change
 
     def _sharing(self) -> Array:
-        """Return how many faces (m,) may take their part of the energy of the span behind each point."""
+        """Return the number (m,) of faces that share the energy of the span behind each point."""
         axis = FACE_NAMES.index(self.name) // 2
         count = np.ones(len(self.rule.weights))
         for a in range(3):

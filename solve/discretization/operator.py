@@ -36,7 +36,7 @@ class FaceTerm(Protocol):
         """Add the diagonal of a component's block to an array (n_u, n_v, n_w)."""
 
     def add_lumped(self, component: int, diagonal: Array) -> None:
-        """Add what each function has of the integral of the factor of u . v, to an array (n_u, n_v, n_w)."""
+        """Add the integral of the factor of u . v with each function to an array (n_u, n_v, n_w)."""
 
     def stiffness(self, component: int) -> float:
         """Return the integral of the factor of u . v, of one component: its mean over the face's parameters."""
@@ -64,7 +64,7 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
 class MatrixFree:
     """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
 
-    threads: of a product. folded: at how many of the points of all processes det J has the wrong sign.
+    threads: of a product. folded: number of points of all processes where det J has the wrong sign.
     faces: the terms on the faces of the cube that have some, as far as this process integrates.
     """
 
@@ -202,7 +202,7 @@ def assemble(
     component: int | None = 0,
     threads: int = 1,
 ) -> tuple[Operator | FormOperator, Array]:
-    """Return operator and load (c, n_u, n_v, n_w) of a law on a volume; of a slab the load is what it integrates.
+    """Return operator and load (c, n_u, n_v, n_w) of a law on a volume; a slab has its part of the load.
 
     source: takes the points (3, q_w, q_v) of a plane and returns (c, q_w, q_v); None for zero.
     component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
@@ -250,7 +250,7 @@ def assemble(
 def with_mass(
     volume: BSplineVolume, operator: Operator | FormOperator, form: Form, factor: float
 ) -> Operator | FormOperator:
-    """Return the operator of a law on a volume with `factor` times the mass matrix added, what faces add included."""
+    """Return the operator of a law on a volume plus `factor` times the mass matrix, its terms on faces included."""
     law = WithMass(form, factor)
     if isinstance(operator, FormOperator):
         return replace(operator, form=law, rows=None)

@@ -28,7 +28,7 @@ LARGEST_STEP = 0.4  # of a weight over itself, and of a point over the distance 
 QUADRATURES = ("spline", "gauss", "gauss+1")
 SAMPLES = 6  # places a direction, each three neighbouring spans, at which a map is measured
 LIMIT = 0.03  # trained maps reach 0.06 and more after two refinements, the twisted cube 0.02 with 14 elements
-TIMES = (1.0, 2.0, 2.0, 1.0, 2.0, 1.0)  # how often each of the six entries stands in a symmetric matrix
+TIMES = (1.0, 2.0, 2.0, 1.0, 2.0, 1.0)  # number of times that each of the six entries stands in a symmetric matrix
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,7 @@ class GaussRule:
         return w_u[q] * (w_w[:, None] * w_v)
 
     def strips(self, most: int) -> list["GaussRule"]:
-        """Return rules of consecutive points of w that make up this one, with at most so many points in a plane."""
+        """Return rules of consecutive points of w that make up this one, with at most `most` points in a plane."""
         (u, v, w), (weights_u, weights_v, weights_w) = self.points, self.weights
         step = max(1, most // len(v))
         parts = [slice(start, start + step) for start in range(0, len(w), step)]

@@ -15,8 +15,8 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 Window = tuple[slice, slice, slice]
 
-LAYERS = 8  # of elements that are measured at a time: what they take stays in the cache
-MOST_ELEMENTS = 1e12  # of a trial space: no computer solves on so many, and halving on and on would not end
+LAYERS = 8  # of elements that are measured at a time: their arrays stay in the cache
+MOST_ELEMENTS = 1e12  # of a trial space: no computer solves on more, and endless halving would not return
 MOST_DEGREE = 8
 
 

@@ -22,9 +22,9 @@ from .space import TrialSpace
 Mask = NDArray[np.bool_]
 Codes = Callable[[Array, Array], IntArray]  # of points (3, m) and outward unit normals (3, m)
 
-SAMPLES = 5  # points a direction at which the code of a cell is looked at, its ends included
-FEWEST = 120  # of these a direction and face: a mesh of few spans is looked at as finely as one of many
-PIECES = 8  # intervals of a line, in each of which a jump is looked for
+SAMPLES = 5  # points a direction at which a cell's code is evaluated, its ends included
+FEWEST = 120  # of these a direction and face, so that a mesh of few spans is sampled as finely as one of many
+PIECES = 8  # intervals of a line, each searched for a jump
 BISECTIONS = 20
 TOLERANCE = 1e-4  # share of the area of a face's regions by which it may be wrong
 SPREAD = 0.05  # of a cell in which lines differ, its usual error; these are of either sign
@@ -35,7 +35,7 @@ TANGENTS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 @dataclass(frozen=True, eq=False)
 class FacePoints:
-    """Points of a face at parameters (m, 3), their images and what the map does there.
+    """Points of a face at parameters (m, 3), their images, and the map's derivatives there.
 
     x, area: (3, m), the points in space and the outward normals as long as the surface element. jacobian: (m, 3, 3).
     """

@@ -31,8 +31,8 @@ class WeakFace:
     x, normal: (3, m), points in space and outward unit normals. weights: (m,), of integrals in space. inverse:
     (3, 3, m), J^-1. codes: (m,), bit i + 1 where condition i holds.
     projector: (c, c, m), P. values: (c, m), P g. gamma: (m,). slowest: (m,), the law's factor over the depth of the
-    cube behind the face: gamma without its constants on a single span. factor: (m,), of exchange. loads: (c, m), what
-    is given as flux into the body, outside of P. is_whole: whether some P is given at all points of the face.
+    cube behind the face: gamma without its constants on a single span. factor: (m,), of exchange. loads: (c, m), the
+    given flux into the body, outside of P. is_whole: whether some P is given at all points of the face.
     tables: values of the face's functions and their derivatives in its two directions, (m, n_b n_c) each. slope: the
     derivative across the face of its layer's functions, less that of the next layer's. layers: the coefficients of the
     face's functions and of the next ones in an array (n_u, n_v, n_w).
@@ -73,7 +73,7 @@ class WeakFace:
         return FACE_NAMES.index(self.name) // 2
 
     def holds(self, condition: int) -> Any:
-        """Return at which points (m,) a condition, by its number, holds."""
+        """Return the mask (m,) of the points of a condition, which is given by its number."""
         return self.codes >> (condition + 1) & 1 == 1
 
     def traces(self, coefficients: Array) -> tuple[Array, Array]:
@@ -127,7 +127,7 @@ class WeakFace:
         return loose + (fast if self.is_whole else float(np.sqrt(fast * slow)))
 
     def force(self, coefficients: Array, points: Any) -> Array:
-        """Return what holds u at some of the points: the integral (c,) of P t - gamma P (u - g).
+        """Return the reaction that holds u at some of the points: the integral (c,) of P t - gamma P (u - g).
 
         Of all points, together with loads and sources, it is zero to the accuracy of the linear solver: so tests that
         are constant say.
@@ -145,7 +145,7 @@ class WeakFace:
         return np.asarray(self.form.flux(u, grad, self.x), dtype=np.float64)
 
     def _pulled(self, vectors: Array) -> Array:
-        """Return flux(d (x) n) (c, 3, m) of vectors d (c, m), pulled back to the parameters: what tests t(v) . d."""
+        """Return flux(d (x) n) (c, 3, m) of vectors d (c, m), pulled back to the parameters, for the tests t(v) . d."""
         flux = self._flux(np.zeros_like(vectors), vectors[:, None] * self.normal)
         return np.einsum("adm,cdm->cam", self.inverse, flux)
 

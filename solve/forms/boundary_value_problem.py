@@ -26,7 +26,7 @@ Robin = Mapping[str, tuple[Data, Data | None]]
 
 
 class BoundaryValueProblem:
-    """What the solver asks of a problem: its law, and its data at points (3, ...), components first.
+    """A law and its data at points (3, ...), components first: the interface of a problem to the solver.
 
     Data have roles: exact, source, boundary; "neumann u0", "robin u0" and "robin u0: alpha" of a face; and those of the
     law's own coefficients. Every method raises ExpressionError where data are not finite.
@@ -35,7 +35,7 @@ class BoundaryValueProblem:
     form: Form
     exact: Data | None
     of_coordinates: ClassVar[bool] = False  # whether functions as data take three arrays x, y, z
-    labels: ClassVar[Mapping[str, str]] = {}  # role -> name in messages, where that is another
+    labels: ClassVar[Mapping[str, str]] = {}  # role -> its name in messages, where it has another
     natural: tuple[str, ...]  # faces on which the flux through them is given
     dirichlet: tuple[str, ...]  # faces on which u itself is given
     conditions: tuple[Condition, ...]  # on regions of the boundary; where there are any, all else of it is free
@@ -51,36 +51,18 @@ class BoundaryValueProblem:
     ) -> None:
         """Parse the data. Raises ValueError where they do not fit together or cannot be known.
 
-        counts: role -> how many entries its datum has, where these are not the law's components.
+        counts: role -> number of entries of its datum, where this is not the number of the law's components.
         """
-        if not isinstance(count := self.form.components, int) or count < 1:
-            raise ValueError(
-                f"{type(self.form).__name__}.components must be a whole number, 1 or more, got {count!r:.80}"
-            )
-        for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
-            if not isinstance(faces, Mapping):
-                raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
-            for face in faces:
-                if face not in FACE_NAMES:
-                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
-        if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
-            raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
-        if both := neumann.keys() & robin.keys():
-            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give one of them")
+        self._check_components()
+        self._check_faces(neumann, robin)
         on_faces = {f"neumann {face}": entry for face, entry in neumann.items()}
         for face, (alpha, entry) in robin.items():
             on_faces |= {f"robin {face}: alpha": alpha, f"robin {face}": entry}
-        data = {}
-        for role, entry in {**given, **on_faces}.items():
-            if entry is not None:
-                count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
-                face = role.split(":")[0].partition(" ")[2]
-                data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
         on_regions = {role: pair for condition in conditions for role, pair in condition.given().items()}
+        data = self._parsed({**given, **on_faces}, counts)
         for role, (entry, size) in on_regions.items():
             if entry is not None:
-                count = size or self.form.components
-                data[role] = parse(role, entry, count, of_coordinates=self.of_coordinates)
+                data[role] = parse(role, entry, size or self.form.components, of_coordinates=self.of_coordinates)
         dirichlet = tuple(face for face in FACE_NAMES if face not in neumann and face not in robin)
         if conditions:
             if on_faces or given.get("boundary") is not None:
@@ -100,6 +82,37 @@ class BoundaryValueProblem:
         for role in ("source", *on_faces, *on_regions):
             if role not in data:
                 self._check_derived(role)
+
+    def _check_components(self) -> None:
+        """Raise ValueError for a law whose number of components is not a whole number."""
+        count = self.form.components
+        if not isinstance(count, int) or count < 1:
+            raise ValueError(
+                f"{type(self.form).__name__}.components must be a whole number, 1 or more, got {count!r:.80}"
+            )
+
+    def _check_faces(self, neumann: Natural, robin: Robin) -> None:
+        """Raise ValueError for names that are no faces, faces with two kinds of data, and incomplete Robin data."""
+        for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
+            if not isinstance(faces, Mapping):
+                raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
+            for face in faces:
+                if face not in FACE_NAMES:
+                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
+        if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
+            raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
+        if both := neumann.keys() & robin.keys():
+            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give only one")
+
+    def _parsed(self, given: Mapping[str, Data | None], counts: Mapping[str, int]) -> dict[str, Datum]:
+        """Return the data of the volume and of faces by role, without roles that have none."""
+        data = {}
+        for role, entry in given.items():
+            if entry is not None:
+                count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
+                face = role.split(":")[0].partition(" ")[2]
+                data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
+        return data
 
     def _check_derived(self, role: str) -> None:
         """Raise ValueError where data that are not given do not follow from `exact`."""
@@ -243,7 +256,7 @@ class BoundaryValueProblem:
         return finite(f"{self.label(role)} (from exact)", flux, x, self._first_formula)
 
     def values_on(self, condition: Condition, direction: Array, x: Array) -> Array:
-        """Return what an essential condition gives of u along a direction (c, m) at points (3, m): (m,)."""
+        """Return the values (m,) of an essential condition along a direction (c, m) at points (3, m)."""
         role = condition.role if condition.role in self.data else "exact"
         found = self.data[role](x)
         return found[0] if len(found) != len(direction) else np.asarray((found * direction).sum(axis=0))
@@ -251,7 +264,7 @@ class BoundaryValueProblem:
     def flux_on(self, condition: Condition | None, x: Array, normal: Array) -> Array:
         """Return the flux (c, m) into the body that a condition gives at points (3, m) with normals (3, m).
 
-        None stands for the flux of `exact`, or none, on what no region names. That of a factor is for u = 0.
+        None stands for the rest of the boundary, with the flux of `exact` or none. The flux of a factor is for u = 0.
         """
         if condition is None or (condition.data is None and condition.role not in self.data):
             if not self.exact_formulas:

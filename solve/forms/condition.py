@@ -1,4 +1,4 @@
-"""Condition: what is given on a region of the boundary - values, a flux, or an exchange with the outside."""
+"""Condition: data on a region of the boundary - values, a flux, or an exchange with the outside."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ GivenRegions = Regions | Mapping[Any, Any]  # Region or str -> data
 
 @dataclass(frozen=True)
 class Condition:
-    """What is given on a region.
+    """Data of one kind on a region.
 
-    kind: its name. data: of a factor the pair (factor, what the outside has); None for what follows from the exact
-    solution. free: of a value, the components that are left free.
+    kind: its name. data: of a factor the pair (factor, value outside); None for the data of the exact solution.
+    free: of a value, the components that are left free.
     """
 
     kind: Kind
@@ -97,9 +97,7 @@ def _condition(kind: Kind, region: Region, data: Any, components: int) -> Condit
     if kind in WITH_FACTOR:
         pair = data if isinstance(data, tuple | list) and len(data) == 2 else (data, [0.0] * components)
         if pair[0] is None or (kind == "exchange" and pair is not data):
-            raise ValueError(
-                f"{kind} {str(region)!r}: give two entries (factor, what the outside has), got {data!r:.80}"
-            )
+            raise ValueError(f"{kind} {str(region)!r}: give two entries (factor, value outside), got {data!r:.80}")
         return Condition(kind, region, tuple(pair))
     free: tuple[bool, ...] = ()
     if kind == "fix" and isinstance(data, Sequence) and not isinstance(data, str) and None in data:

@@ -77,7 +77,7 @@ class Datum:
         return np.stack(parts).reshape(self.components, *x.shape[1:])
 
     def _called(self, function: Callable[[Array], ArrayLike], x: Array) -> ArrayLike:
-        """Return what a user's function returns; ValueError where it fails names the datum."""
+        """Return the values of a user's function. Raises ValueError that names the datum where the function fails."""
         try:
             return function(x)
         except Exception as error:
@@ -85,10 +85,10 @@ class Datum:
 
 
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:
-    """Translate what a user gives for c components; a number is the formula of that constant.
+    """Translate a user's datum of c components; a number is the formula of that constant.
 
     of_coordinates: functions take three arrays x, y, z instead of one array (3, ...).
-    Raises ExpressionError for a formula that is refused, ValueError for what is no datum; both name it.
+    Raises ExpressionError for a refused formula, ValueError for an object that is no datum; both name the datum.
     """
     data = data.tolist() if isinstance(data, np.ndarray) else data
     is_vector = isinstance(data, Sequence) and not isinstance(data, str | bytes)
@@ -120,7 +120,7 @@ def _of_coordinates(function: Callable[[Array, Array, Array], ArrayLike], x: Arr
 def finite(name: str, found: Array, x: Array, entry: Entry | None = None) -> Array:
     """Return values unchanged; raise ExpressionError at the first point where they are not finite, or beyond LARGEST.
 
-    x: points (3, ...). entry: what the values come from, for the remedy.
+    x: points (3, ...). entry: the source of the values, for the remedy.
     """
     bad = ~(np.abs(found) <= LARGEST)  # NaN included
     if bad.any():

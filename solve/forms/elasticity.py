@@ -37,7 +37,7 @@ class Elasticity(LawWithData):
         The displacement u, where it is known. As formulas it gives force and boundary data, and the report's errors;
         functions need them beside it, and leave the H1 seminorm out.
     force : three entries, optional
-        f, per volume; overrides what follows from `exact`, and is zero without it where `displacement` or `traction`
+        f, per volume; overrides the force of `exact`, and is zero without it where `displacement` or `traction`
         are given.
     displacement : three entries, optional
         Values of u on the faces that are not in `traction`; default: `exact`, or zero.
@@ -50,7 +50,7 @@ class Elasticity(LawWithData):
         -1 < nu < 1/2. `lame` converts from lambda and mu.
     fix : regions, or dict of region to three entries or None, optional
         Displacement on regions of the boundary (`Region`, or its text), zero for regions alone; an entry that is None
-        leaves that component free. Where a region is given, what no region names is free, or has the traction of
+        leaves that component free. Where a region is given, the rest of the boundary is free, or has the traction of
         `exact`; `displacement` and `traction` are left out then.
     roller, symmetry : regions, or dict of region to entry, optional
         The displacement along the normal alone, zero for regions alone: two names for one condition.

@@ -78,7 +78,7 @@ class Form:
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """What can be asked of a solution of this law, by name; a law of one's own may add to it.
+        """The quantities of a solution of this law, by name; a law of one's own may add some.
 
         `magnitude` is the length of u, `gradient_magnitude` and `flux_magnitude` those of the others.
         """
@@ -93,7 +93,7 @@ class Form:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """The quantities of one number a point whose extremes a report tells."""
+        """The names of quantities with one number a point whose extremes a report shows."""
         return ("u" if self.components == 1 else "magnitude", "gradient_magnitude", "flux_magnitude")
 
     @property

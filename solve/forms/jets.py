@@ -42,7 +42,7 @@ def _operation(rule: Callable[["Jet", "Jet"], "Jet"]) -> Callable[["Jet", Any], 
 class Jet:
     """A function's value, gradient and Hessian (xx, xy, xz, yy, yz, zz) at the points of an array.
 
-    What is constant is a scalar. Variables seeded without Hessian carry none, and no work is spent on it.
+    Constant derivatives are scalars. Variables seeded without Hessian carry none, and no work is spent on it.
     """
 
     value: Number

@@ -43,7 +43,7 @@ FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
     **{name: getattr(Jet, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh")},
     "abs": abs,
 }
-CHOICES = {"min": 2, "max": 2, "where": 3}  # functions that choose among values, and how many arguments they take
+CHOICES = {"min": 2, "max": 2, "where": 3}  # functions that choose among values -> number of their arguments
 COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
@@ -74,7 +74,7 @@ class ExpressionError(ValueError):
 class Expression:
     """A formula in x, y, z and X, Y, Z.
 
-    frame: what X, Y, Z mean; a formula with one of them cannot be evaluated without it (`placed`).
+    frame: the meaning of X, Y, Z; a formula with one of them cannot be evaluated without it (`placed`).
     variables: those that occur in the formula. is_smooth: whether it is without where, min and max, whose results bend
         or jump: no source follows from such a formula.
     Raises ExpressionError, naming the place, for anything outside the whitelist.
@@ -144,10 +144,10 @@ def _shorten(text: str, length: int = 40) -> str:
 
 
 class Translator:
-    """Turns a text into nested closures, refusing what is not on the list.
+    """Turns a text into nested closures, and refuses every construct that is not on the list.
 
     variables: the names of numbers. marks: the names of conditions. used: the names that occur. chooses: whether where,
-    min or max does. Raises ExpressionError, here and in `number` and `condition`, for what is refused.
+    min or max does. Raises ExpressionError, here and in `number` and `condition`, for a refused construct.
     """
 
     def __init__(self, text: str, variables: Sequence[str] = VARIABLES, marks: Sequence[str] = ()) -> None:
@@ -167,7 +167,7 @@ class Translator:
                 raise ExpressionError(f"expression, column {column}: more than {MAX_DEPTH} nested parentheses")
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # Python's, of what is refused below
+                warnings.simplefilter("ignore")  # Python's, on texts that are refused below
                 tree = ast.parse(self.text, mode="eval")
         except SyntaxError as error:
             place = f", column {error.offset}" if error.offset else ""

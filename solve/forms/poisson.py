@@ -39,7 +39,7 @@ class Poisson(LawWithData):
         f; overrides the one that follows from `exact`.
     boundary : entry, optional
         Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
-    kappa : entry, six or nine of them, or three rows of three, optional
+    kappa : one, six or nine entries, or three rows of three, optional
         A scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz, as nine by rows, or as three rows: lists
         or a 3 x 3 array; default 1. Positive definite.
     reaction : entry, optional
@@ -50,8 +50,8 @@ class Poisson(LawWithData):
         (alpha, g) of kappa grad u . n + alpha u = g; alpha not negative; None for g: from `exact`.
     value : dict of region to entry or None, or regions, optional
         Values of u on regions of the boundary (`Region`, or its text), zero for regions alone; None: from `exact`.
-        Where a region is given, what no region names has no flux, or that of `exact`, the source is zero unless it is
-        given or follows from `exact`, and `boundary`, `neumann` and `robin` are left out.
+        Where a region is given, the rest of the boundary has no flux, or that of `exact`; the source is zero unless it
+        is given or follows from `exact`; and `boundary`, `neumann` and `robin` are left out.
     inflow : dict of region to entry or None, optional
         kappa grad u . n on regions.
     exchange : dict of region to (entry, entry or None), optional

@@ -54,7 +54,7 @@ class Problem(BoundaryValueProblem):
     Raises
     ------
     TypeError
-        For what is no instance of a subclass of `Form`.
+        For a law that is no instance of a subclass of `Form`.
     ExpressionError
         For a formula that is refused.
     ValueError

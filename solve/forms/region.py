@@ -54,8 +54,8 @@ class Region:
         A condition in x, y, z or X, Y, Z (scaled to volume 1 about the middle) and in the outward unit normal nx, ny,
         nz, such as "nz > 0.99 and abs(x) < 2": comparisons, and, or, not, and the functions of formulas. Also
         conditions: u0, u1, v0, v1, w0, w1, the images of the cube's faces; box(x0, y0, z0, x1, y1, z1);
-        group:NAME, a group of the input mesh; and face(x, y, z), what is reached from the part's surface nearest to
-        that point up to edges that bend by more than 30 degrees, or by a fourth number in degrees.
+        group:NAME, a group of the input mesh; and face(x, y, z), the part of the surface around the place nearest to
+        that point, up to edges that bend by more than 30 degrees, or by a fourth number in degrees.
     surface : Part, optional
         The part's surface mesh (`result.boundary.part`), which group:NAME and face(x, y, z) need. Where it is known,
         normals are those of its triangles: a spline rounds the edges off, and there its own normals turn.
@@ -158,7 +158,7 @@ class Region:
         """Return at which of the points (3, ...) with outward unit normals (3, ...) the condition holds, (...).
 
         face: the cube's face on whose image they lie, if any.
-        Raises ExpressionError where X, Y, Z mean nothing, ValueError where the surface lacks what is asked for.
+        Raises ExpressionError where X, Y, Z mean nothing, ValueError where the surface lacks a face or group.
         """
         x, normal = np.asarray(x), np.asarray(normal)
         jets = [Jet(row, (), ()) for row in x]
@@ -202,7 +202,7 @@ class Region:
 
 
 def regions_of(given: Region | str | Sequence[Region | str]) -> list[Region]:
-    """Return a region, a text, or several of these as regions. Raises ExpressionError for what is none."""
+    """Return a region, a text, or several of these as regions. Raises ExpressionError for anything else."""
     if isinstance(given, Region):
         return [given]
     if isinstance(given, str) or not isinstance(given, Sequence):
@@ -229,7 +229,7 @@ def _check_mark(entry: str) -> None:
 
 
 def _readable(message: str, marks: Sequence[str]) -> str:
-    """Return a message with what the user wrote in place of the marks."""
+    """Return a message with the user's words in place of the marks."""
     for i in range(len(marks) - 1, len(FACE_NAMES) - 1, -1):
         kind, argument = marks[i].split(" ", 1)
         shown = f"group:{argument}" if kind == "group" else f"{kind}({argument})"

@@ -35,7 +35,7 @@ class FastDiagonalization:
     vectors: per direction (n, n), generalized eigenvectors in columns. inverse, scaling: (n_u, n_v, n_w), the diagonals
     L^-1 and D. singular: constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin face), and
     the preconditioner keeps to their orthogonal complement. local: of a sheared map, what is added (`shear`).
-    weakness: what had to be left out, a sentence of the report; "" for nothing.
+    weakness: the part that had to be left out, a sentence of the report; "" for none.
     Of a slab `inverse` has the columns that `space.to_columns` gives, everything else its own rows.
     """
 

@@ -25,7 +25,7 @@ from ..forms.jets import PAIRS
 OFFSETS = np.array(list(product((-1, 0, 1), repeat=3)))[:14]  # to the 13 neighbours that come before a node, to itself
 SAMPLES, FLAT, SHARE = 16, 0.1, 0.02
 PIVOT = 0.01  # least share of the diagonal that a pivot has
-SHIFTS = (0.0, *(0.01 * 2.0**k for k in range(8)))  # what the diagonal grows by, in turn, as a share of itself
+SHIFTS = (0.0, *(0.01 * 2.0**k for k in range(8)))  # shares by which the diagonal grows, tried in turn
 HIGHEST = 3  # degree: of degree 4 the iterations saved just pay for the factors, of degree 5 they become more
 
 
@@ -99,7 +99,7 @@ def incomplete_cholesky(operator: Operator) -> IncompleteCholesky | None:
 def _factor(operator: Operator, shift: float) -> tuple[Array, IntArray] | None:
     """Return `factor` and `steps` of an IncompleteCholesky; None where a pivot of any process is too small.
 
-    Processes work one after another, also behind one that has failed: what they find is dropped.
+    Processes work one after another, also behind one that has failed, whose result is dropped with theirs.
     """
     space, factor = operator.space, _stencils(operator)
     strides = np.array([factor.shape[1] * factor.shape[2], factor.shape[2], 1])

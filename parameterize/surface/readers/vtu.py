@@ -45,7 +45,7 @@ def read_vtu(data: bytes, max_faces: int) -> Content:
 
 
 def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
-    """Return the tree of the file without its appended data, and what decodes its arrays."""
+    """Return the tree of the file without its appended data, and the decoder of its arrays."""
     mark = APPENDED.search(data)
     text = data[: mark.start()] + b"</VTKFile>" if mark else data
     try:
@@ -65,7 +65,7 @@ def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
 
 
 def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tuple[str, Rows]], Marks]:
-    """Return points (n, 3), cells of a piece, by kind, and numbers of these; of one without cells, nothing."""
+    """Return a piece's points (n, 3), its cells by kind and their numbers; nothing for a piece without cells."""
     n, m = (header_count(piece.get(name, "")) for name in ("NumberOfPoints", "NumberOfCells"))
     if not m:
         return np.empty((0, 3)), [], {}
