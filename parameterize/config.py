@@ -52,7 +52,7 @@ class TrainConfig:
 
 @dataclass(frozen=True)
 class SplineConfig:
-    """Fit and control-point optimisation (section 4.3.2); weights refer to a domain of volume 1."""
+    """Fit and control-point optimisation (section 4.3.2); what the terms of the energy read stands beside them."""
 
     control_points: int = 30
     degree: int = 3

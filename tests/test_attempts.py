@@ -19,7 +19,9 @@ FAR, NEAR = 2.0 * GROWTH.far, 0.5 * GROWTH.far
 def tried(start, unproved=0, *, meets=False, distance=NEAR):
     """A start that was tried and the map that it has made, of which so much is proved."""
     faults = (unproved, meets)
-    found = SimpleNamespace(faults=faults, rank=(*faults, False), meets_itself=meets, control=None)
+    found = SimpleNamespace(
+        faults=faults, rank=(*faults, False), meets_itself=meets, spline=SimpleNamespace(control=None)
+    )
     fit = SimpleNamespace(mean_square=lambda _: distance**2)
     return Tried(start, Attempt(found, Course({}, {}, Reason.STALLED), fit, None), {})
 

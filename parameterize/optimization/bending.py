@@ -62,7 +62,7 @@ class Fairness:
         self.bend, self._rough = (bending_operator(matrices, 2.0 * weight, dtype) for dtype in (np.float64, np.float32))
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return 1: the operators hold the fairness."""
+        """Return 1: the operators are weighted already."""
         return 1.0
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:

@@ -46,7 +46,7 @@ class ContactPenalty:
     near: IntArray
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return a multiple of that of the distance from the surface."""
+        """Return a multiple of the weight of the surface's data."""
         return _WEIGHT * weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:

@@ -116,7 +116,7 @@ class DeterminantPenalty:
         self._pieces = [_Spans(first[b], volumes[b], floors[b], shares[b], bezier[b], back[b]) for b in blocks]
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return that of the penalties on what is folded."""
+        """Return the weight of all penalties on folds."""
         return weights.penalty
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:

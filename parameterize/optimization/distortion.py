@@ -70,7 +70,7 @@ class Distortion:
         return np.asarray(shares)
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return 1: the unit of all weights; that of the penalty is taken at the start of a round."""
+        """Return 1: other weights are in units of the distortion's; the penalty has its own from `start_round`."""
         return 1.0
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:

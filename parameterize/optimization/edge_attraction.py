@@ -46,7 +46,7 @@ class EdgeAnchors:
         self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return their share of that of the distance from the surface."""
+        """Return a share of the weight of the surface's data."""
         return _WEIGHT * weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:

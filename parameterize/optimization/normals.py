@@ -34,7 +34,7 @@ class FacingPenalty:
     floor: float
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return that of the penalties on what is folded."""
+        """Return the weight of all penalties on folds."""
         return weights.penalty
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:

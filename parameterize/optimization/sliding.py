@@ -31,13 +31,7 @@ class SlidingParameters:
     triangles (m, 3) between the points: `relax` and `slide` keep the layout on the cube one-to-one.
     """
 
-    def __init__(
-        self,
-        knots: Knots,
-        degree: int,
-        parameters: Array,
-        triangles: IntArray = _NO_TRIANGLES,
-    ) -> None:
+    def __init__(self, knots: Knots, degree: int, parameters: Array, triangles: IntArray = _NO_TRIANGLES) -> None:
         self.knots, self.degree = knots, degree
         self.triangles = triangles
         self.place(parameters, nearest_faces(parameters))

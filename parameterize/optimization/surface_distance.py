@@ -64,7 +64,7 @@ class SurfaceFit:
         self.give_way(self.yielding)
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return that of the distance from the surface."""
+        """Return the weight of the surface's data."""
         return weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:

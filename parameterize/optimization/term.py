@@ -1,4 +1,4 @@
-"""What every term of a map's energy offers, and by what terms are weighed."""
+"""The terms of a map's energy: their protocol, and their weights."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -22,7 +22,7 @@ class Weights:
 
 @dataclass(frozen=True)
 class RoundWeights:
-    """Weights of one round: of the penalties on what is folded, and of the distance from the surface."""
+    """Weights of one round: `penalty` of the penalties on folds, `surface` of the surface's data."""
 
     penalty: float
     surface: float
@@ -32,10 +32,10 @@ class Term(Protocol):
     """A summand of the energy in control points (3, n_u, n_v, n_w), in double precision."""
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return what the term counts in a round."""
+        """Return the weight of the term in a round."""
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the term without its weight, and its gradient (3, n_u, n_v, n_w)."""
+        """Return the unweighted term at `control`, and its gradient (3, n_u, n_v, n_w)."""
 
     def curvature(self, control: Array) -> PiecewiseOperator:
         """Return a positive semidefinite second derivative at `control`, as an operator in single precision."""
