@@ -1,6 +1,7 @@
-"""Holds the options of a surface and of the map that is made of it."""
+"""Holds the options of a surface and of the map that is made of it.
 
-from __future__ import annotations
+Annotations are evaluated here: a subclass in another module would look their names up there.
+"""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -70,7 +71,7 @@ class MapOptions(SurfaceOptions):
     tolerance: float = 5e-4
     max_control_points: int = 60
 
-    def config(self) -> Config:
+    def config(self) -> "Config":
         """Return the configuration of these options. Raises InputError for values that cannot be run."""
         from parameterize.config import preset
 
