@@ -167,14 +167,14 @@ def extremes(field: SplineField, form: Form, what: str | Quantity) -> Extremes:
 
 
 def all_extremes(field: SplineField, form: Form) -> dict[str, Extremes]:
-    """Return the extremes of the quantities that reports show (`Form.told`), by name, from one search for all of them.
+    """Return the extremes of the quantities in reports (`Form.reported`), by name, from one search for all of them.
 
     It takes fewer samples a span than `extremes`, so that it costs a small share of a solve.
     """
     spans = math.prod(len(breakpoints(knots)) - 1 for knots in field.knots)
     per_span = max(1, min(_PER_SPAN, int((_SAMPLES / spans) ** (1.0 / 3.0))))
-    found = _extremes_of(field, [quantity_of(form, name) for name in form.told], per_span)
-    return dict(zip(form.told, found, strict=True))
+    found = _extremes_of(field, [quantity_of(form, name) for name in form.reported], per_span)
+    return dict(zip(form.reported, found, strict=True))
 
 
 def _extremes_of(field: SplineField, quantities: Sequence[Quantity], per_span: int) -> list[Extremes]:

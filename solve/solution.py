@@ -169,7 +169,7 @@ class Solution(SplineField, Shown):
         return extremes(self, self.problem.form, what)
 
     def all_extremes(self) -> dict[str, Extremes]:
-        """Return the extremes that a report shows, by name (`problem.form.told`), from one search for all of them.
+        """Return the extremes that a report shows, by name (`problem.form.reported`), from one search for all of them.
 
         It takes fewer samples than `extremes` does on fine meshes.
         """

@@ -34,8 +34,8 @@ def verdict_in_words(outcome: Outcome) -> str:
     for scale, arap in verdict.get("arap", {}).items():
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max")
     if distance := verdict.get("surface_distance"):
-        told = f"rms {distance['rms']:.3g}, largest {distance['max']:.3g} of the box's diagonal"
-        lines.append(f"distance         {told}; surface to spline and back")
+        said = f"rms {distance['rms']:.3g}, largest {distance['max']:.3g} of the box's diagonal"
+        lines.append(f"distance         {said}; surface to spline and back")
     if chosen := reports.control_points_in_words(outcome.report):
         lines.append(f"control points   {chosen}")
     levels = [_level(level) for level in verdict.get("levels", [])]

@@ -16,19 +16,19 @@ class Course:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._done = 0.0  # share at the last estimate
-        self._told: deque[tuple[float, float]] = deque()  # times of estimates, and the ends that they expect
+        self._estimates: deque[tuple[float, float]] = deque()  # times of estimates, and the ends that they expect
 
     def tell(self, left: float) -> None:
         """Take an estimate of the seconds that are left."""
         self._done, now = self.share, self._clock()
-        self._told.append((now, now + max(left, 1e-3)))
-        while self._told[0][0] < now - WINDOW:
-            self._told.popleft()
+        self._estimates.append((now, now + max(left, 1e-3)))
+        while self._estimates[0][0] < now - WINDOW:
+            self._estimates.popleft()
 
     def pause(self) -> None:
         """Keep the share that is done, and forget the estimates: time goes by in which nothing runs."""
         self._done = self.share
-        self._told.clear()
+        self._estimates.clear()
 
     @property
     def share(self) -> float:
@@ -36,18 +36,18 @@ class Course:
 
         It rises linearly as long as the estimates expect the same end, and goes on from where it is where they change.
         """
-        if not self._told:
+        if not self._estimates:
             return self._done
-        told, end = self._told[-1]
-        passed = min((self._clock() - told) / (end - told), MOST)
+        at, end = self._estimates[-1]
+        passed = min((self._clock() - at) / (end - at), MOST)
         return self._done + (1.0 - self._done) * passed
 
     @property
     def left(self) -> float | None:
         """Return the seconds that are left; None without an estimate, or while the expected end moves away."""
-        if not self._told:
+        if not self._estimates:
             return None
-        (first, before), (last, end) = self._told[0], self._told[-1]
+        (first, before), (last, end) = self._estimates[0], self._estimates[-1]
         slips = last - first >= SHORTEST and end - before > SLIPPING * (last - first)
         left = end - self._clock()
         return None if slips or left <= 0.0 else left

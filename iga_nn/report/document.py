@@ -123,14 +123,14 @@ def one_to_one(report: Report) -> str:
 
 def control_points_in_words(report: Report) -> str:
     """Return the number of control points of `auto`, and the reason for no more; empty where the number was given."""
-    if not (told := report["parameterization"].get("refinement")):
+    if not (refinement := report["parameterization"].get("refinement")):
         return ""
-    first, last, asked = told["levels"][0], told["levels"][-1], f"tolerance {told['tolerance']:.2g}"
+    first, last, asked = refinement["levels"][0], refinement["levels"][-1], f"tolerance {refinement['tolerance']:.2g}"
     reason = f"{asked} met"
-    if told["stopped"] == "limit reached":
-        reason = f"{asked} not met with at most {told['max_control_points']} per direction"
-    elif told["stopped"] == "no better map":
-        reason = f"{asked} not met: no better map that is certified was found with {_size(told['dropped'])}"
+    if refinement["stopped"] == "limit reached":
+        reason = f"{asked} not met with at most {refinement['max_control_points']} per direction"
+    elif refinement["stopped"] == "no better map":
+        reason = f"{asked} not met: no better map that is certified was found with {_size(refinement['dropped'])}"
     start = f", {_size(first)} at first" if first != last else ""
     if "boundary" in last:  # of an older version, which knew the distance at the mesh's vertices alone
         return f"{_size(last)}{start}; rms distance {last['boundary']:.2g} of the diagonal at the vertices, {reason}"

@@ -43,7 +43,7 @@ def finest(section: dict[str, Any]) -> dict[str, tuple[float, str]]:
     its place.
     """
     found = {}
-    for name, said, end, unit in _told(section):
+    for name, said, end, unit in _worded(section):
         extreme = _known(section)[-1]["extremes"][name]
         title = f"{said} [{section[unit]}]" if section.get(unit) else said
         found[title] = (extreme[end], f"{extreme[end]:.4g} at {_place(extreme[f'{end}_at'], section)}")
@@ -88,7 +88,7 @@ def _known(section: dict[str, Any]) -> list[Level]:
 def _rows(section: dict[str, Any]) -> list[list[str]]:
     """Return the words for each extreme, its value on each level, and its place on the finest."""
     rows = []
-    for name, said, end, unit in _told(section):
+    for name, said, end, unit in _worded(section):
         levels = [level["extremes"].get(name) for level in _known(section)]
         values = ["–" if level is None else f"{level[end]:.4g}" for level in levels]
         values[-1] += _behind(section.get(unit))
@@ -96,11 +96,11 @@ def _rows(section: dict[str, Any]) -> list[list[str]]:
     return rows
 
 
-def _told(section: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+def _worded(section: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """Return the quantities of the finest level, each with its words, its end and its unit."""
-    levels, told = _known(section), []
+    levels, found = _known(section), []
     for name in levels[-1]["extremes"] if levels else ():
-        told.append((name, *SAYINGS.get(name, (f"{name} at most", "largest", ""))))
+        found.append((name, *SAYINGS.get(name, (f"{name} at most", "largest", ""))))
         if name == "u":
-            told.append((name, "u at most", "largest", ""))
-    return told
+            found.append((name, "u at most", "largest", ""))
+    return found

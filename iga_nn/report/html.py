@@ -147,8 +147,8 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
     facts.append(("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"]))))
     if "origin" in quality:
         facts.append(("The map comes from", *ORIGINS[quality["origin"]]))
-    if told := quality.get("refinement"):
-        facts.append(("Control points chosen", told["stopped"], reports.control_points_in_words(report)))
+    if refinement := quality.get("refinement"):
+        facts.append(("Control points chosen", refinement["stopped"], reports.control_points_in_words(report)))
     return facts
 
 

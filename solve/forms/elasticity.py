@@ -166,7 +166,7 @@ class Elasticity(LawWithData):
         }
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def reported(self) -> tuple[str, ...]:
         """The displacement's length, von Mises' stress, the largest and the smallest principal stress."""
         return ("magnitude", "von_mises", "first_principal", "third_principal")
 

@@ -92,7 +92,7 @@ class Form:
         }
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def reported(self) -> tuple[str, ...]:
         """The names of quantities with one number a point whose extremes a report shows."""
         return ("u" if self.components == 1 else "magnitude", "gradient_magnitude", "flux_magnitude")
 

@@ -108,9 +108,9 @@ class Poisson(LawWithData):
         return np.stack(rows, axis=1)
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def reported(self) -> tuple[str, ...]:
         """The value, and the lengths of gradient and flux, which are one without kappa."""
-        return super().told if "kappa" in self.data else ("u", "gradient_magnitude")
+        return super().reported if "kappa" in self.data else ("u", "gradient_magnitude")
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
         """Return c u."""
