@@ -57,15 +57,25 @@ def test_a_refinement_has_limits(tolerance, most, words):
     assert config.refined(1e-3, 100).refinement.max_control_points == 100
 
 
-def test_control_points_have_an_upper_limit():
+@pytest.mark.parametrize(
+    "count, words",
+    [
+        (1, "needs at least 4 control points, got 1"),
+        (3, "needs at least 4 control points, got 3"),
+        (101, "at most 100 control points per direction can be run, got 101"),
+        (8.5, "must be a whole number, got 8.5"),
+    ],
+)
+def test_control_points_have_limits(count, words):
     config = iga_nn.preset("fast")
-    raises(ValueError, "at most 100 control points per direction can be run, got 101", lambda: most(101))
-    raises(ValueError, "needs at least 4 control points, got 3", lambda: config.with_control_points(3))
-    assert most(100).spline.control_points == 100
+    raises(ValueError, words, lambda: config.with_control_points(count))
+    assert config.with_control_points(4).spline.control_points == 4
+    assert config.with_control_points(100).spline.control_points == 100
 
 
-def most(count):
-    return iga_nn.preset("fast").with_control_points(count)
+def test_a_seed_is_not_negative():
+    raises(ValueError, "seed must not be negative, got -1", lambda: iga_nn.parameterize(iga_nn.sample("cube"), seed=-1))
+    raises(InputError, "seed", lambda: iga_nn.run("poisson", "cube", seed=-1))
 
 
 def test_a_progress_that_cannot_be_called_is_refused_before_anything_begins(in_folder, monkeypatch):
