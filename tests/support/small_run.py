@@ -23,7 +23,7 @@ def shortened(config):
         train=replace(config.train, cell=0.2, triangles=200, easy_loss=None),
         stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
         spline=replace(config.spline, fit_cell=0.1, steps=3, rounds=2),
-        steps_factor=0.25,
+        steps_factor=0.25 * config.steps_factor,
     )
 
 
