@@ -160,7 +160,7 @@ class SplineEnergy:
         return control + moved
 
     def newton_direction(self, control: Array, right: Array, damping: float = 0.0) -> Array:
-        """Solve roughly (Hessian + damping) x = right at `control`, the parameters of the surface held."""
+        """Return an approximate solution of (Hessian + damping) x = right at `control`, with fixed parameters."""
         self.distortion.damping = damping
         terms = [(term.weight(self._round), term.curvature(control)) for term in (*self.inner, *self.outer)]
         direction = conjugate_gradients(

@@ -165,7 +165,7 @@ class Polish(Phase):
         energy.anchors.aim(state.spline.control, hold=False)
 
     def amended(self, state: State, found: Optimized) -> Optimized:
-        """Move what folds again back to where it was certified; return the map found where that brings nothing."""
+        """Move the spans that fold again back to their certified shape; return the given map where that fails."""
         energy, folded, mended = state.energy, found.certificate.unproved, found
         held = np.zeros(energy.determinants.weights.shape, dtype=bool)
         for _ in range(_MENDINGS):
@@ -190,7 +190,7 @@ class Polish(Phase):
         return mended
 
     def done(self, state: State) -> Reason | None:
-        """End when nothing is left to take back, where F folds more and more, or after the last of these rounds."""
+        """Return a reason to end: all weight is restored, F folds more and more, or the rounds are used up."""
         if not (count := state.rounds[self.name]):
             return None
         if state.settled and not state.energy.yields:
