@@ -23,7 +23,7 @@ from ..options import (
 
 
 def converted(kind: Any, tokens: Sequence[Token]) -> Any:
-    """Convert an argument as cyclopts does, but refuse a fraction for a whole number: it would be rounded."""
+    """Convert an argument as cyclopts does, but refuse a fraction for a whole number, which cyclopts would round."""
     if int in (kind, *get_args(kind)) and (wrong := [token for token in tokens if "." in token.value]):
         raise CycloptsError(msg=f"{wrong[0].keyword}: must be a whole number, got {wrong[0].value}")
     return convert(kind, tokens)

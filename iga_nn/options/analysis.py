@@ -115,7 +115,7 @@ class ModesOptions(Checked):
 
 
 def _range(text: str) -> list[int]:
-    """Return a level, or all from the first to the last of "0..4". Raises InputError."""
+    """Return a level, or all levels from the first to the last of "0..4". Raises InputError."""
     first, dots, last = text.partition("..")
     if not (first.isdecimal() and (last.isdecimal() or not dots)):
         raise InputError(f"refine {text!r}: write levels such as 0 1 2, or a range such as 0..2")

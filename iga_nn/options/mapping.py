@@ -1,6 +1,6 @@
-"""Holds the options of a surface and of the map that is made of it.
+"""Holds the options of a surface and of the map that is made from it.
 
-Annotations are evaluated here: a subclass in another module would look their names up there.
+Annotations are evaluated in this module: a subclass in another module would look up their names in that module.
 """
 
 from dataclasses import dataclass, fields
@@ -91,7 +91,7 @@ class MapOptions(SurfaceOptions):
 
     @property
     def most_control_points(self) -> int:
-        """Return the largest number of control points a direction may get."""
+        """Return the largest number of control points that a direction may have."""
         return self.max_control_points if self.control_points == "auto" else self.control_points
 
 

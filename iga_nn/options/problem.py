@@ -71,7 +71,7 @@ class ProblemOptions(Checked, ABC):
 
     @property
     def units(self) -> Units:
-        """Return the units beside colour bars."""
+        """Return the units for colour bars."""
         return NO_UNITS
 
     def solve_options(self) -> SolveOptions:
@@ -203,12 +203,12 @@ class ElasticityOptions(ProblemOptions):
     title: ClassVar[str] = "linear elasticity"
 
     def solve_options(self) -> SolveOptions:
-        """Return the options of the solve on the finest mesh: a slender body takes more iterations than a scalar."""
+        """Return the options of the solve on the finest mesh; a slender body needs more iterations than a scalar."""
         return replace(super().solve_options(), max_iterations=MOST_ITERATIONS)
 
     @property
     def units(self) -> Units:
-        """Return the units beside colour bars."""
+        """Return the units for colour bars."""
         return Units(self.unit, self.stress_unit)
 
     def problem(self) -> Elasticity:
