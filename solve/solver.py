@@ -107,12 +107,12 @@ def discretize(
     quadrature: str = SolveOptions.quadrature,
     comm: Any = None,
 ) -> System:
-    """Return the linear system of a problem, for loops of one's own.
+    """Return the linear system of a problem, for a loop of the user's own.
 
     Parameters
     ----------
     volume, problem, refine, degree, threads, quadrature, comm
-        As in `iga_nn.solve`, whose errors are raised.
+        As in `iga_nn.solve`; the errors are the same, too.
 
     Returns
     -------

@@ -73,7 +73,7 @@ def convergence(
     Parameters
     ----------
     volume, problem, degree, certified
-        As in `iga_nn.solve`, whose errors are raised.
+        As in `iga_nn.solve`; the errors are the same, too.
     refine : iterable of int
         Levels; level n halves every span n times.
     tolerance : float

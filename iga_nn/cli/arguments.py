@@ -43,7 +43,7 @@ Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.
 
 @dataclass(frozen=True)
 class OutputOptions:
-    """Options of the output folder and of the terminal.
+    """Hold the options of the output folder and of the terminal.
 
     Args:
         out: output folder; the input's stem in the current folder by default.
@@ -66,7 +66,7 @@ class OutputOptions:
 
 @dataclass(frozen=True)
 class PageOptions(MapOptions):
-    """Options of the map for all surfaces of the live page, without those of a single surface."""
+    """Hold the options of the map for all surfaces of the live page, without those of a single surface."""
 
     corners: Annotated[Path | None, Parameter(parse=False)] = None
     resume: Annotated[bool, Parameter(parse=False)] = False

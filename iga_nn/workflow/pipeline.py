@@ -287,7 +287,7 @@ def modes_to(
 ) -> tuple[Outcome, str]:
     """Find the lowest vibrations of a saved volume; return the output folder with its report, and their table.
 
-    The other options are those of `run`, and so are the errors, with ConvergenceError in addition.
+    The other options are those of `run`. Raises the errors of `run`, and ConvergenceError.
     """
     check_type("volume", volume, str | Path)
     modes_options, path = modes_options or ModesOptions(), Path(volume)

@@ -90,7 +90,7 @@ class BoundaryMap(Brief):
 
     @cached_property
     def part(self) -> PartSurface:
-        """Return the surface before it was cut, with its groups; or the cut surface, where the file lacks the other."""
+        """Return the surface before it was cut, with its groups; where the file lacks that surface, the cut surface."""
         faces = self.faces if self.part_faces is None else self.part_faces
         return PartSurface(self.vertices[: faces.max(initial=-1) + 1], faces, self.groups)
 

@@ -25,7 +25,7 @@ def nearest_on_cube(points: Tensor) -> Tensor:
 
 
 def nearest_places(points: Array) -> Array:
-    """Return the nearest points (m, 3) on the boundary of [0, 1]^3 as arrays, see `nearest_on_cube`."""
+    """Return the nearest points (m, 3) on the boundary of [0, 1]^3, for an array of points (m, 3)."""
     return np.asarray(nearest_on_cube(torch.as_tensor(points)))
 
 

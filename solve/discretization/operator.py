@@ -89,7 +89,7 @@ class MatrixFree:
             in_parallel(task, pieces, self.threads)
 
     def apply(self, coefficients: Array) -> Array:
-        """Return the product with all coefficients, fixed ones included; of a slab, the integrals over its spans."""
+        """Return the product with all coefficients, fixed ones included; for a slab, the integrals over its spans."""
         source = np.ascontiguousarray(coefficients).reshape(math.prod(coefficients.shape[:-3]), *self.space.shape)
         result = np.zeros_like(source)
         self.on_planes(lambda points: self._multiply(points, source, result))
