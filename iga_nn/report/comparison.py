@@ -31,7 +31,7 @@ class Run:
         if report is None or "parameterization" not in report:
             raise InputError(f"{path}: is no output folder of a run: its report.json is missing, damaged or unfinished")
         if not reports.is_finished(report):
-            raise InputError(f"{path}: the run there is not finished; compare it when it is")
+            raise InputError(f"{path}: the run in this folder is not finished; compare it after its end")
         return cls(path, report)
 
     def cells(self) -> dict[str, dict[str, Cell]]:

@@ -39,7 +39,7 @@ def _nowhere(surface: Surface) -> str:
 
 
 def frame_of(surface: Surface) -> UnitFrame:
-    """Return the frame of X, Y, Z before there is a volume, from the surface."""
+    """Return the frame of X, Y, Z from the surface, before there is a volume."""
     low, high = surface.bbox
     x, y, z = ((low + high) / 2.0).tolist()
     return UnitFrame((x, y, z), 1.0 / surface.scale)

@@ -1,9 +1,10 @@
-"""Penalty on parts of F's boundary that run into one another, or nearly so.
+"""Penalises parts of F's boundary that run into one another, or nearly so.
 
-Det J > 0 everywhere does not keep two sheets of the boundary apart: the walls of a narrow valley may reach through one
-another. A sample of the boundary lies in another sheet where the boundary winds around the point just outside of it.
-The nearest sample that faces the opposite way is what it has run into, and the two are pushed apart along the normal
-there, as in contact mechanics (node to surface, Wriggers, Computational Contact Mechanics, 2006, chapter 6).
+Det J > 0 everywhere does not keep two sheets of the boundary apart: the walls of a narrow valley may pass through one
+another. A sample of the boundary lies in another sheet where the boundary winds around the point just outside of the
+sample. The other sheet is that of the nearest sample with the opposite normal, and the penalty pushes the two samples
+apart along the normal there, as in contact mechanics (node to surface, Wriggers, Computational Contact Mechanics, 2006,
+chapter 6).
 """
 
 from dataclasses import dataclass, replace

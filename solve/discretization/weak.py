@@ -1,4 +1,4 @@
-"""WeakFace: conditions on regions of a face, in weak form - Nitsche's method for values, loads, exchange.
+"""Imposes conditions on regions of a face in weak form: values by Nitsche's method, loads and exchange.
 
 Values u . d = h along directions d are held by Nitsche's symmetric method (Freund and Stenberg 1995), P the projector
 on the directions, t = flux(u) . n:
