@@ -1,4 +1,4 @@
-"""Holds the errors that the user's input causes, and puts them in one line."""
+"""Defines the errors that the user's input causes, and puts them in one line."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -21,7 +21,7 @@ class InputError(ValueError):
 
 @contextmanager
 def input_errors() -> Iterator[None]:
-    """Turn ValueError and OSError of the block into InputError; the block only reads or checks a user's input."""
+    """Turn ValueError and OSError of the block into InputError; the block must only read or check a user's input."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -45,7 +45,7 @@ def one_line(error: BaseException) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return the end of a message that asks for the known name nearest to a mistyped one; empty where none is near."""
+    """Return the end of a message that proposes the known name nearest to a mistyped name; "" where none is near."""
     spelled = {each.casefold(): each for each in known}
     near = get_close_matches(name.casefold(), spelled, n=1)
     return f"; did you mean {spelled[near[0]]}?" if near else ""

@@ -8,7 +8,7 @@ from .errors import InputError
 
 
 def check_new(path: str | Path, ending: str, flag: str = "--out") -> Path:
-    """Return the path of a file to write, given by an option. Raises InputError where it cannot be one."""
+    """Return the path of a file to write, given by an option. Raises InputError where no such file can be written."""
     target = Path(path)
     if target.is_dir() or not target.name:
         raise InputError(f"{target}: is a directory: name the file to write with {flag}")
@@ -22,9 +22,9 @@ def check_new(path: str | Path, ending: str, flag: str = "--out") -> Path:
 
 
 def save_new(target: Path, content: bytes, force: bool) -> None:
-    """Write a file that does not exist or has that content already; replace another one only where `force`.
+    """Write a file that does not exist or already has that content; replace other content only where `force`.
 
-    Raises InputError.
+    Raises InputError where the file may not be replaced or cannot be written.
     """
     try:
         if not target.exists() or force:

@@ -22,7 +22,7 @@ _KINDS: dict[Any, tuple[tuple[type, ...], str]] = {
 
 @dataclass(frozen=True)
 class Checked:
-    """A base of dataclasses that refuse a value of another type than its annotation, with an InputError."""
+    """Provide a base of dataclasses that refuse, with an InputError, a value of another type than its annotation."""
 
     def __post_init__(self) -> None:
         """Refuse the first field whose value has another type."""
@@ -59,5 +59,5 @@ def _in_words(hint: Any) -> str:
 
 
 def _known(hint: Any) -> tuple[tuple[type, ...], str]:
-    """Return the classes that an annotation allows, and how a message names them."""
+    """Return the classes that an annotation allows, and their name in messages."""
     return _KINDS.get(hint) or ((hint,), f"{hint.__name__}(...)")

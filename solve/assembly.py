@@ -1,4 +1,4 @@
-"""Assembles the operator and the load of a problem, the data on faces and regions included."""
+"""Assembles the operator and the load of a problem, with the data on faces and regions."""
 
 from dataclasses import replace
 from typing import Any
@@ -27,7 +27,10 @@ LARGEST_IMBALANCE = 0.01  # of the data's size; quadrature leaves far less of da
 def assemble_data(
     volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, options: SolveOptions
 ) -> tuple[Operator | FormOperator, Array, Array]:
-    """Return operator and load, the data on faces included, and the coefficients that are fixed."""
+    """Return the operator, the load with the data on faces and regions, and the fixed coefficients.
+
+    The load and the coefficients have the shape (c, n_u, n_v, n_w).
+    """
     form, couples = problem.form, False
     if isinstance(problem, Problem):
         samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
@@ -53,7 +56,7 @@ def assemble_data(
 def _on_faces(
     volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, load: Array
 ) -> dict[str, FaceRule]:
-    """Add the data on the images of the cube's faces to a load, and return the faces that have Robin's term."""
+    """Add the data on the images of the cube's faces to a load, and return the rules of the faces with Robin's term."""
     robin = {}
     for name in FACE_NAMES:
         if name in space.dirichlet or not has_face(space, name):
@@ -70,7 +73,7 @@ def _on_faces(
 def _on_regions(
     volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, load: Array
 ) -> dict[str, WeakFace]:
-    """Add the data on regions of the boundary to a load, and return the faces that have terms."""
+    """Add the data on regions of the boundary to a load, and return the faces of the cube with terms, by name."""
     faces = weak_faces(volume, problem, space)
     demand_area(volume, problem, space, faces)
     for face in faces:
@@ -79,10 +82,10 @@ def _on_regions(
 
 
 def balanced(load: Array, space: TrialSpace) -> Array:
-    """Return the free coefficients' load (1, ...) less its mean: of problems that leave the solution's constant open.
+    """Return the free coefficients' load (1, ...) minus its mean, for problems that leave the solution's constant open.
 
-    The basis functions sum to one, so the load is then orthogonal to constants.
-    Raises ValueError where the load's sum, the integral of source and fluxes, is not nearly zero.
+    The basis functions sum to one, so the returned load is orthogonal to constants. Raises ValueError where the load's
+    sum, the integral of source and fluxes, is not nearly zero.
     """
     total, size = float(space.total(load.sum())), float(space.total(np.abs(load).sum()))
     if abs(total) > LARGEST_IMBALANCE * size:

@@ -1,4 +1,4 @@
-"""Doubts about the numbers of a solve: notices on its data, its map, its mesh and its linear solver."""
+"""Judges the numbers of a solve: notices on its data, its map, its mesh and its linear solver."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -36,7 +36,7 @@ TWO_PROBLEMS = "the errors compare the solutions of two problems"
 
 
 class ConvergenceError(RuntimeError):
-    """The linear solver did not reach its tolerance; the last iterate is `solution`, None where not one was made.
+    """Raised where the linear solver misses its tolerance; `solution` is the last iterate, None where there is none.
 
     Examples
     --------
@@ -60,10 +60,10 @@ def judge(
     estimate: Errors | None,
     unknowns: int,
 ) -> tuple[list[str], bool]:
-    """Return the notices on a problem and on the errors of its solution, and whether these errors mean anything.
+    """Return the notices on a problem and on the errors of its solution, and whether the errors are meaningful.
 
-    They mean nothing where a decisive formula does not vary, or where the mesh does not resolve the exact
-    solution. An estimated error is no reason: it is said, and may be wrong.
+    The errors are not meaningful where a decisive formula does not vary, or where the mesh does not resolve the exact
+    solution. A large error estimate gives a notice only, because an estimate may be wrong.
     """
     points = Points.on(volume, SAMPLES, SAMPLES, SAMPLES)
     ends = {name: np.take(points, -int(name[1]), 1 + AXES.index(name[0])) for name in FACE_NAMES}
@@ -84,10 +84,10 @@ def judge(
 def empty_formulas(
     problem: BoundaryValueProblem, points: Array, faces: Mapping[str, Array] | None = None
 ) -> list[tuple[str, str]]:
-    """Return the data whose formulas underflow, or vary by less than rounding, at points (3, ...): role, notice.
+    """Return the data whose formulas underflow, or vary by less than rounding, at points (3, ...): role and notice.
 
-    faces: the points of each face, where data of that face are judged; without them at all points. A formula that is
-    constant everywhere else, too, is meant to be constant. Points where a formula is not finite do not count.
+    faces: the points of each face, for the data of that face; without `faces`, all points are used. A formula that is
+    constant at all other points as well is accepted as a constant. Points where a formula is not finite do not count.
     """
     found = []
     for role, datum, formula in problem.formulas:
@@ -109,9 +109,9 @@ def _fault(low: float, high: float) -> str | None:
 
 
 def _is_constant(formula: Expression, where: Array) -> bool:
-    """Whether a formula has one value anywhere, coordinates that do not vary at the points (3, ...) apart.
+    """Return whether a formula has one value everywhere.
 
-    On a face x = 0 the formula x*y is meant to be zero.
+    Coordinates that do not vary at the points (3, ...) are fixed: on a face x = 0 the formula x*y is accepted as zero.
     """
     if not formula.variables:
         return True
@@ -125,7 +125,7 @@ def _is_constant(formula: Expression, where: Array) -> bool:
 
 
 def _exact_on(problem: BoundaryValueProblem, points: Array) -> tuple[str, str]:
-    """Return a description of `exact` at points (3, ...), and the remedy where its scale is the trouble."""
+    """Return a description of `exact` at points (3, ...), and a remedy where its scale causes the error."""
     exact = problem.exact_formulas
     ends = _range(np.array([formula(*points) for formula in exact]))
     described = "exact"
@@ -136,7 +136,7 @@ def _exact_on(problem: BoundaryValueProblem, points: Array) -> tuple[str, str]:
 
 
 def _range(values: Array) -> tuple[float, float] | None:
-    """Lowest and highest of the values that are finite; None where there is none."""
+    """Return the lowest and the highest finite value; None where no value is finite."""
     finite = values[np.isfinite(values)]
     return (float(finite.min()), float(finite.max())) if finite.size else None
 
@@ -144,8 +144,8 @@ def _range(values: Array) -> tuple[float, float] | None:
 def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list[str]:
     """Return the data that contradict a problem's exact formulas on the volume, one line each; none without formulas.
 
-    Source and Dirichlet data are compared with those of the formulas at 7 points per direction, unless these are not
-    finite there.
+    Source and Dirichlet data are compared with those of the formulas at 7 points per direction, unless the latter are
+    not finite there.
     """
     found = []
     if not problem.exact_formulas:
@@ -172,7 +172,10 @@ def _values_fit(volume: BSplineVolume, problem: BoundaryValueProblem, face: str)
 
 
 def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:
-    """Whether data are those of `exact`; of_exact: returns these, and the size of the terms that cancel in them."""
+    """Return whether data agree with the data of `exact`.
+
+    of_exact: a function that returns the data of `exact`, and the size of the terms that cancel in these data.
+    """
     try:
         derived, size = of_exact()
     except ExpressionError:  # perhaps the reason why they are given
@@ -186,7 +189,7 @@ def map_notices(
 ) -> list[str]:
     """Return the notices on the map, and on a preconditioner that lacks a part.
 
-    weaknesses: of the preconditioner of each component.
+    weaknesses: the weakness of the preconditioner of each component.
     """
     notices = []
     if certified not in (None, "certified"):
@@ -199,9 +202,9 @@ def map_notices(
 
 
 def failure(volume: BSplineVolume, space: TrialSpace, result: LinearResult, caveat: str = "") -> str:
-    """Return why the linear solver did not converge, and where to look, in one line; "" where it did.
+    """Return in one line why the linear solver did not converge and where the map is worst; "" where it converged.
 
-    caveat: of the law.
+    caveat: the caveat of the law.
     """
     if result.converged:
         return ""
@@ -224,10 +227,10 @@ def failure(volume: BSplineVolume, space: TrialSpace, result: LinearResult, cave
 
 
 def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array, float]:
-    """Return where the map's scaled Jacobian, |det J| over the product of its columns' lengths, is least.
+    """Return the place where the map's scaled Jacobian, |det J| over the product of its columns' lengths, is least.
 
-    Of all Gauss points: parameters (3,), the point in space (3,) and the value there, 1 where the parameter lines meet
-    at right angles, 0 where the map degenerates, negative where it is folded.
+    The result is the Gauss point with its parameters (3,) and its position (3,) in space, and the scaled Jacobian
+    there: 1 where the parameter lines meet at right angles, 0 where the map degenerates, negative where it is folded.
     """
     rule = gauss_rule(space)
     parameters, point, least, hand = np.zeros(3), np.zeros(3), np.inf, orientation(volume)

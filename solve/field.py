@@ -1,4 +1,4 @@
-"""SplineField: a function of the parameters, as solution.npz holds it; and points that know their parameters."""
+"""Defines SplineField, a function of the parameters as solution.npz stores it, and points with known parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ FARTHEST = 1e4  # of the volume's size: from there rounding hides which point of
 
 
 class Points(np.ndarray[Any, Any]):
-    """Points (3, ...) of a volume: an array that knows the parameters of its points, so that fields have values there.
+    """Hold points (3, ...) of a volume with their parameters, so that fields can be evaluated there.
 
-    rows: the parameters of a tensor grid, an array a direction; None where unknown, as for a part of the array.
-    order: the directions along which the axes (...) run.
-    places: the parameters (m, 3) of points (3, m) that are no grid.
+    rows: the parameters of a tensor grid, an array a direction; None where they are unknown, as for a part of the
+    array. order: the directions along which the axes (...) run. places: the parameters (m, 3) of points (3, m) without
+    a grid.
     """
 
     rows: Sequence[ArrayLike] | None = None
@@ -32,14 +32,14 @@ class Points(np.ndarray[Any, Any]):
 
     @classmethod
     def of(cls, x: Array, rows: Sequence[ArrayLike], order: tuple[int, ...] = (0, 1, 2)) -> Self:
-        """Return the points x (3, ...) that lie at the parameters `rows`."""
+        """Return the points x (3, ...) with the parameters `rows` of a tensor grid."""
         points = x.view(cls)
         points.rows, points.order = rows, order
         return points
 
     @classmethod
     def at(cls, x: Array, places: Array) -> Self:
-        """Return the points x (3, m) that lie at the parameters `places` (m, 3)."""
+        """Return the points x (3, m) with the parameters `places` (m, 3)."""
         points = x.view(cls)
         points.places = places
         return points
@@ -52,18 +52,18 @@ class Points(np.ndarray[Any, Any]):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SplineField(Brief):
-    """A function of the parameters.
+    """Evaluate a function of the parameters.
 
     Parameters
     ----------
     degrees : three int
-        One a direction.
+        The degrees of the three directions.
     knots : three arrays
         Open knot vectors on [0, 1].
     coefficients : (m_u, m_v, m_w) array
-        With c components (m_u, m_v, m_w, c).
+        The coefficients; (m_u, m_v, m_w, c) with c components.
     geometry : BSplineVolume, optional
-        The volume on which it was found, None for a function of any.
+        The volume on which the field was found; None for a function on any volume.
 
     Raises
     ------
@@ -92,14 +92,14 @@ class SplineField(Brief):
         object.__setattr__(self, "knots", checked_knots(self.degrees, self.knots, shape[:3], "coefficients"))
 
     def __call__(self, points: ArrayLike) -> Array:
-        """Return values (m,) or (m, c) at parameters (m, 3)."""
+        """Return the values (m,) or (m, c) at parameters (m, 3)."""
         return evaluate_at(self.degrees, self.knots, self.coefficients, points)
 
     def probe(self, points: ArrayLike, *, clip: bool = False) -> Array:
-        """Return values (m,) or (m, c) at points (m, 3) in space, in the units of the volume; NaN outside of it.
+        """Return the values (m,) or (m, c) at points (m, 3) in space, in the volume's units; NaN outside of the volume.
 
-        clip: take the value at the nearest point of the boundary for points outside.
-        Raises ValueError for points that are not finite or of another shape, and for a field without a volume.
+        clip: whether points outside have the value of the nearest point of the boundary. Raises ValueError for points
+        that are not finite or of another shape, and for a field without a volume.
         """
         if self.geometry is None:
             raise ValueError(
@@ -121,13 +121,13 @@ class SplineField(Brief):
         return values
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
-        """Return values (len(u), len(v), len(w)) or (.., c) on a tensor grid of parameters."""
+        """Return the values (len(u), len(v), len(w)) or (.., c) on a tensor grid of parameters."""
         return evaluate_grid(self.degrees, self.knots, self.coefficients, (u, v, w))
 
     def at(self, x: Array) -> Array:
-        """Return values (...) or (c, ...) at points x (3, ...) of the solver, as a law or a datum receives them.
+        """Return the values (...) or (c, ...) at points x (3, ...) of the solver, as a law or a datum receives them.
 
-        For parameters use `field(uvw)`. Raises ValueError for points whose parameters are not known.
+        For parameters use `field(uvw)`. Raises ValueError for points whose parameters are unknown.
         """
         if isinstance(x, Points) and x.places is not None:
             return np.moveaxis(self(x.places), 0, -1)
@@ -143,7 +143,7 @@ class SplineField(Brief):
         return values if self.coefficients.ndim == 4 else values[0]
 
     def fits(self, volume: BSplineVolume) -> bool:
-        """Return whether the field may be a datum on a volume: the field belongs to this volume or to none."""
+        """Return whether the field may be a datum on a volume: its own volume is this volume, or it has none."""
         own = self.geometry
         if own is None or own is volume:
             return True
@@ -151,14 +151,14 @@ class SplineField(Brief):
         return own.degrees == volume.degrees and all(np.array_equal(*pair) for pair in parts)
 
     def save(self, path: str | Path) -> None:
-        """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients); atomic."""
+        """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients) atomically."""
         save_spline(path, self.degrees, self.knots, coefficients=self.coefficients)
 
     @staticmethod
     def load(path: str | Path) -> "SplineField":
-        """Read solution.npz: the field alone, without map and report.
+        """Read the field of a solution.npz, without its map and report.
 
-        Raises FileNotFoundError, or ValueError that names the fault of the file.
+        Raises FileNotFoundError, or a ValueError that names the defect of the file.
         """
         degrees, knots, coefficients = load_spline(path, "coefficients")
         if coefficients.dtype.kind != "f" or not np.all(np.isfinite(coefficients)):

@@ -1,4 +1,4 @@
-"""Integrals over a body, or over regions of its boundary: volume, mass, areas, averages, resultants."""
+"""Integrates over a body, or over regions of its boundary: volume, mass, areas, averages, resultants."""
 
 from collections.abc import Callable, Iterator
 
@@ -35,10 +35,11 @@ def integrate(
     body : BSplineVolume or Solution
         The domain of the integral.
     what : str or function, optional
-        Nothing for 1, so that the integral is the volume or the area. Of a solution the name of a quantity, as in
-        `Solution.quantity`, or a function of u (c, ...), grad (c, 3, ...) and x (3, ...). Of a volume a function of x.
+        The integrand; by default 1, so that the integral is the volume or the area. For a solution the name of a
+        quantity, as in `Solution.quantity`, or a function of u (c, ...), grad (c, 3, ...) and x (3, ...). For a volume
+        a function of x.
     over : Region, str or list of these, optional
-        Regions of the boundary (`Region`, or its text), as "nz > 0.9" or "u0"; where several overlap, it counts once.
+        Regions of the boundary (`Region`, or its text), as "nz > 0.9" or "u0"; an overlap of several counts once.
         The whole body by default. The area is right to 1e-4 where a region ends inside a face of the cube.
 
     Raises
@@ -46,7 +47,7 @@ def integrate(
     TypeError
         For an object that is no volume or solution.
     ValueError
-        For a name that the law does not give, a region that is refused or has no area, and a function that fails or has
+        For a name that the law does not have, a region that is refused or has no area, and a function that fails or has
         another shape.
 
     Examples
@@ -72,13 +73,13 @@ def integrate(
 def resultant(solution: Solution, over: Regions) -> Array:
     """Return the integral of a law's flux through regions, outward (c,): of elasticity the force that acts on the body.
 
-    The flux is a derivative of the solution, so its integral is less accurate than a solution's values. What supports
-    do is known better from `solution.report.balance`.
+    The flux is a derivative of the solution, so its integral is less accurate than a solution's values. The reactions
+    of supports in `solution.report.balance` are more accurate.
 
     Parameters
     ----------
     solution : Solution
-        Of any law.
+        Solution of any law.
     over : Region, str or list of these
         Regions of the boundary, as in `integrate`.
 
@@ -110,13 +111,13 @@ def _volume_of(body: BSplineVolume | Solution) -> BSplineVolume:
 
 
 def _counts(body: BSplineVolume | Solution) -> list[int]:
-    """Return the number of Gauss points a span and direction: exact for a volume, as for the errors of a solution."""
+    """Return the numbers of Gauss points a span and direction: exact for a volume; of a solution, as for errors."""
     degrees = zip(_volume_of(body).degrees, body.degrees, strict=True)
     return [max((3 * of_map + 1) // 2, own + 2) for of_map, own in degrees]
 
 
 def _over_body(body: BSplineVolume | Solution, what: str | Integrand | None) -> Array:
-    """Return the integral over the body."""
+    """Return the integral (...) over the body."""
     pairs = [gauss_points(knots, count) for knots, count in zip(body.knots, _counts(body), strict=True)]
     rows, weights = ([part.ravel() for part in parts] for parts in zip(*pairs, strict=True))
     total: Array | float = 0.0
@@ -132,7 +133,7 @@ def _over_body(body: BSplineVolume | Solution, what: str | Integrand | None) -> 
 def _surface_rules(body: BSplineVolume | Solution, over: Regions) -> Iterator[SurfaceRule]:
     """Yield the quadrature rules, one a face of the cube, of the part of the boundary that is in one of the regions.
 
-    Raises ValueError where there is none.
+    Raises ValueError where that part is empty.
     """
     volume, regions = _volume_of(body), _placed(body, over)
     degree = max(_counts(body)) - 1  # a rule has a point more
@@ -155,7 +156,7 @@ def _surface_rules(body: BSplineVolume | Solution, over: Regions) -> Iterator[Su
 
 
 def _placed(body: BSplineVolume | Solution, over: Regions) -> list[Region]:
-    """Return regions with X, Y, Z measured in the body, and on the surface that a solution's problem knows."""
+    """Return regions with X, Y, Z measured in the body, and with the surface of the solution's problem."""
     if not over or not isinstance(over, Region | str | list | tuple):
         raise ValueError(f"over: give regions, such as 'nz > 0.9' or 'u0', got {over!r:.80}")
     regions = regions_of(over)
@@ -166,14 +167,14 @@ def _placed(body: BSplineVolume | Solution, over: Regions) -> list[Region]:
 
 
 def _on_grid(body: BSplineVolume | Solution, what: str | Integrand | None, u: Array, v: Array, w: Array) -> Array:
-    """Return the integrand (..., n_u, n_v, n_w) on a grid."""
+    """Return the values (..., n_u, n_v, n_w) of the integrand on a grid of parameters."""
     if what is not None and isinstance(body, Solution):
         return grid_values(body, quantity_of(body.problem.form, what), u, v, w)  # type: ignore[arg-type]
     return _of_position(what, Points.on(_volume_of(body), u, v, w))
 
 
 def _at_points(body: BSplineVolume | Solution, what: str | Integrand | None, rule: SurfaceRule) -> Array:
-    """Return the integrand (m, ...) at the points of a rule."""
+    """Return the values (m, ...) of the integrand at the points of a rule."""
     if what is not None and isinstance(body, Solution):
         return at_points(body, body.problem.form, what, rule.at.parameters)  # type: ignore[arg-type]
     x = Points.at(np.ascontiguousarray(rule.at.x), rule.at.parameters)
@@ -181,9 +182,9 @@ def _at_points(body: BSplineVolume | Solution, what: str | Integrand | None, rul
 
 
 def _of_position(what: str | Integrand | None, x: Points) -> Array:
-    """Return a function of x (..., shape) at points x (3, shape), or 1.
+    """Return the values (..., shape) at points x (3, shape) of an integrand that is a function of x, or 1.
 
-    Raises ValueError for an object that is no function, and for a function that fails or has another shape.
+    Raises ValueError for an object that is not a function, and for a function that fails or has another shape.
     """
     if what is None:
         return np.ones(x.shape[1:])

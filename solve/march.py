@@ -1,4 +1,4 @@
-"""Time stepping of M u' + A u = f(t): BDF2 and the trapezoidal rule, each step from the one before."""
+"""Marches through time with M u' + A u = f(t): BDF2 and the trapezoidal rule, step after step."""
 
 import logging
 from collections.abc import Callable
@@ -41,15 +41,16 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class March(Brief):
-    """The solution u at some of the times of a march.
+    """Hold the solution u at some of the times of a march.
 
     Attributes
     ----------
     times : (k,) array
-        The first is that of the start.
+        The times of the fields; the first is the time of the start.
     fields : tuple of k SplineField
+        The solution at these times.
     iterations : (steps,) array
-        Of the linear solver, in each step.
+        Number of iterations of the linear solver in each step.
 
     Examples
     --------
@@ -105,7 +106,7 @@ def march(
         A function changes the data from step to step: `lambda t: iga_nn.Poisson(source=f"{t}*x", boundary="0")`. The
         law stays that of the first time, and so do the faces where u is given.
     start : SplineField or datum
-        u at the first time: a field of the trial space or of a coarser one, or a datum, as a formula, a function or a
+        u at the first time: a field of the trial space or of a coarser space, or a datum: a formula, a function or a
         sequence.
     dt : float
         The time step.
@@ -118,9 +119,9 @@ def march(
     first : float
         The time of the start.
     every : int
-        Number of steps from one field that is kept to the next; the last field is kept in any case.
+        Number of steps between two fields that are kept; the last field is always kept.
     callback : function, optional
-        Called with time and field after every step.
+        Function that is called with time and field after every step.
     refine, degree, threads, quadrature, tolerance, max_iterations
         As in `iga_nn.solve`.
 
@@ -183,7 +184,10 @@ def _check(dt: float, steps: int, scheme: str, capacity: float, every: int) -> N
 
 @dataclass(frozen=True, eq=False)
 class _Data:
-    """A problem at any time, on one trial space. placed: that of the first time."""
+    """Evaluate a problem at any time, on one trial space.
+
+    placed: the problem of the first time, placed in the volume.
+    """
 
     volume: BSplineVolume
     problem_at: Callable[[float], Any]
@@ -193,7 +197,10 @@ class _Data:
     varies: bool
 
     def at(self, time: float) -> tuple[Array, Array]:
-        """Return load and coefficients given on faces, (c, n_u, n_v, n_w) each. Raises ValueError for other faces."""
+        """Return the load and the coefficients given on faces, (c, n_u, n_v, n_w) each.
+
+        Raises ValueError where the faces with given coefficients are others than at the first time.
+        """
         return self._found(self.problem_at(time), time) if self.varies else self._constant
 
     @cached_property
@@ -212,14 +219,17 @@ class _Data:
         return build(self.volume, self.placed, self.space, self.options, shift)
 
     def mass(self, rule: GaussRule) -> Operator:
-        """Return the mass matrix of all coefficients, by the rule of a system: one that differs would be a source."""
+        """Return the mass matrix of all coefficients, by the quadrature rule of a system.
+
+        The mass by another rule would act as a source.
+        """
         found, _ = assemble(self.volume, self.space, Mass(), rule=rule, threads=self.options.thread_count)
         assert isinstance(found, Operator)
         return found
 
 
 def _started(data: _Data, start: SplineField | Data, time: float) -> Array:
-    """Return the coefficients (c, n_u, n_v, n_w) of the start; those on faces follow from the data of its time."""
+    """Return the coefficients (c, n_u, n_v, n_w) of the start; coefficients on faces follow from the data at `time`."""
     space, components = data.space, data.placed.form.components
     if isinstance(start, SplineField):
         full = embedded(start.coefficients, start.degrees, start.knots, space)
@@ -237,10 +247,10 @@ def _started(data: _Data, start: SplineField | Data, time: float) -> Array:
 
 
 class _Path:
-    """Where a march is: time and coefficients (c, n_u, n_v, n_w), the last ones and those before."""
+    """Hold the state of a march: the time, and the last and earlier coefficients, (c, n_u, n_v, n_w) each."""
 
     def __init__(self, data: _Data, scheme: str, rate: float, start: Array, time: float) -> None:
-        """rate: capacity over dt."""
+        """Begin a march at a time; rate: the capacity over dt."""
         self.data, self.scheme, self.rate = data, scheme, rate
         self.time, self.last, self.load = time, start, data.at(time)[0]
         self.before: Array | None = None
@@ -249,13 +259,13 @@ class _Path:
 
     @property
     def field(self) -> SplineField:
-        """The spline of the last coefficients."""
+        """Return the spline of the last coefficients."""
         space = self.data.space
         coefficients = self.last[0] if len(self.last) == 1 else np.moveaxis(self.last, 0, -1)
         return SplineField(space.degrees, space.knots, coefficients, self.data.volume)
 
     def step(self, time: float) -> int:
-        """Go to a time, and return the number of iterations. Raises ConvergenceError."""
+        """March to a time, and return the number of iterations. Raises ConvergenceError."""
         load, known = self.data.at(time)
         system, right = self._equation(load)
         window = (slice(None), *self.data.space.window)
@@ -285,7 +295,7 @@ class _Path:
 
 
 def _solved(system: System, right: Array, guess: Array, options: IterationOptions) -> LinearResult:
-    """Return the solution of a step's system, sought from a guess; arrays (c, m_u, m_v, m_w)."""
+    """Return the solution of a step's system from an initial guess; all arrays have the shape (c, m_u, m_v, m_w)."""
 
     def precondition(residual: Array) -> Array:
         return np.stack([block(part) for block, part in zip(system.blocks, residual, strict=True)])

@@ -1,4 +1,4 @@
-"""Modes: the lowest vibrations of a body, or eigenfunctions of any symmetric law, by LOBPCG."""
+"""Computes modes by LOBPCG: the lowest vibrations of a body, or eigenfunctions of any symmetric law."""
 
 import math
 import warnings
@@ -32,20 +32,20 @@ RIGID = {1: 1, 3: 6}  # motions of a free body that take no energy, by the law's
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Modes(Brief):
-    """The lowest modes of a body.
+    """Hold the lowest modes of a body.
 
     Attributes
     ----------
     frequencies : (n,) array
-        omega / (2 pi), of K phi = omega^2 M phi: in Hz where the units are consistent and time is in seconds.
+        omega / (2 pi) for K phi = omega^2 M phi: in Hz where the units are consistent and time is in seconds.
     shapes : tuple of n SplineField
-        phi, of unit mass: the integral of density phi . phi is 1. The largest coefficient is positive.
+        phi with unit mass: the integral of density phi . phi is 1. The largest coefficient is positive.
     residuals : (n,) array
-        `|K phi - omega^2 M phi| / |K phi|`, of the free coefficients.
+        Residuals `|K phi - omega^2 M phi| / |K phi|` of the free coefficients.
     iterations : int
-        Of LOBPCG.
+        Number of iterations of LOBPCG.
     rigid : int
-        Motions of a free body that cost no energy; their frequency is zero, and they are left out.
+        Number of motions of a free body that need no energy; their frequency is zero, and they are left out.
 
     Examples
     --------
@@ -64,7 +64,7 @@ class Modes(Brief):
     rigid: int = 0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the numbers as report.json holds them."""
+        """Return the numbers of the modes for report.json."""
         return {
             "frequencies": self.frequencies,
             "residuals": self.residuals,
@@ -73,7 +73,7 @@ class Modes(Brief):
         }
 
     def save(self, path: str | Path) -> None:
-        """Write degrees, knots_u, knots_v, knots_w, coefficients (n, m_u, m_v, m_w, ..) and frequencies; atomic."""
+        """Write degrees, knots_u, knots_v, knots_w, coefficients (n, m_u, m_v, m_w, ..) and frequencies atomically."""
         first = self.shapes[0]
         rows = dict(zip(("knots_u", "knots_v", "knots_w"), first.knots, strict=True))
         coefficients = np.stack([shape.coefficients for shape in self.shapes])
@@ -108,7 +108,7 @@ def modes(
     volume : BSplineVolume
         The body.
     law : Elasticity, Poisson or Problem
-        A symmetric law; of its data only those of faces that are held, and Robin's alpha, count.
+        A symmetric law; only the data of held faces, and Robin's alpha, have an effect.
     density : float
         Mass per volume.
     n : int
@@ -116,9 +116,10 @@ def modes(
     refine, degree, threads, quadrature
         As in `iga_nn.solve`.
     tolerance : float
-        Of the residuals `|K phi - omega^2 M phi| / |K phi|`; the relative error of a frequency is about its square.
+        Tolerance of the residuals `|K phi - omega^2 M phi| / |K phi|`; its square is about the relative error of a
+        frequency.
     max_iterations : int
-        Of LOBPCG.
+        Largest number of iterations of LOBPCG.
 
     Returns
     -------
@@ -177,24 +178,24 @@ def check_modes(density: float, n: int, tolerance: float = 0.5, max_iterations: 
 
 
 def is_free(law: BoundaryValueProblem) -> bool:
-    """Return whether nothing may hold a body: regions can leave motions free."""
+    """Return whether nothing may hold a body; regions count as nothing, because they can leave motions free."""
     on_faces = not law.dirichlet and (bool(law.conditions) or len(law.natural) == 6)
     return on_faces and not law.form.has_reaction
 
 
 def _stiffness(volume: BSplineVolume, law: BoundaryValueProblem) -> float:
-    """Return the law's factor in the middle of a volume over its length squared: of the size of eigenvalues."""
+    """Return the law's factor in the middle of a volume over the squared length, which estimates the eigenvalues."""
     x = volume.grid([0.5], [0.5], [0.5]).reshape(3, 1)
     length = np.ptp(volume.control_points.reshape(-1, 3), axis=0).max()
     return float(law.on(volume).form.tensor(x)[0, 0] / length**2)
 
 
 def _lowest(system: System, n: int, tolerance: float, most: int) -> tuple[Array, Array, Array, int]:
-    """Return n eigenvalues, vectors (N, n) of unit mass, relative residuals, and the iterations made.
+    """Return n eigenvalues, vectors (N, n) of unit mass, relative residuals, and the number of iterations.
 
-    LOBPCG (Knyazev, SIAM J. Sci. Comput. 23 (2001)) iterates on more vectors than are wanted, and starts again from
-    them where the residuals are too large: SciPy's own tolerance is that of |K x - s M x|, which has units. A rough
-    solve with K preconditions it: a slender body then takes no more iterations than others.
+    LOBPCG (Knyazev, SIAM J. Sci. Comput. 23 (2001)) iterates on more vectors than n, and starts again from these
+    vectors where the residuals are too large: SciPy's own tolerance is that of |K x - s M x|, which has units. The
+    preconditioner is a rough solve with K, so that a slender body needs no more iterations than other bodies.
     """
     a, mass, size = system.operator, system.mass, len(system.load)
 
@@ -223,5 +224,5 @@ def _lowest(system: System, n: int, tolerance: float, most: int) -> tuple[Array,
 
 
 def _upright(x: Array) -> Array:
-    """Return a vector or its negative: that whose largest entry is positive."""
+    """Return a vector with the sign for which its largest entry in size is positive."""
     return x * np.sign(x[np.abs(x).argmax()])

@@ -1,4 +1,4 @@
-"""Newton's method for laws that are not linear: exact derivatives by jets, a line search, load steps."""
+"""Solves laws that are not linear by Newton's method: exact derivatives by jets, a line search, load steps."""
 
 import logging
 from dataclasses import dataclass
@@ -62,27 +62,27 @@ def newton(
     problem : Problem
         The law and its data.
     start : SplineField, optional
-        Where the iteration starts, a field of the same degree in the trial space or in a coarser one; zero by default.
+        Start of the iteration, a field of the same degree in the trial space or a coarser space; zero by default.
     load_steps : int
-        Number of equal steps in which source and data on faces rise to their values, each from the last solution.
+        Number of equal steps in which source and data on faces grow to their values; each starts at the last solution.
     refine, degree, threads, quadrature
         As in `iga_nn.solve`.
     tolerance : float
-        Of the forces that are not balanced, relative to all forces.
+        Tolerance of the forces that are not balanced, relative to all forces.
     max_iterations : int
-        Of Newton's method, in a load step.
+        Largest number of Newton steps in a load step.
     linear_iterations : int
-        Of the linear solver, in an iteration.
+        Largest number of iterations of the linear solver in a Newton step.
 
     Returns
     -------
     Solution
-        Its report has Newton's iterations and residuals, of all load steps one after another.
+        The solution; its report has Newton's iterations and residuals of all load steps, one after another.
 
     Raises
     ------
     ValueError
-        For arguments out of range, and a law that has no derivative or none as it says.
+        For arguments out of range, and for a law without a derivative, or whose derivative contradicts `symmetric`.
     ConvergenceError
         Where the tolerance is not met.
 
@@ -127,9 +127,9 @@ def newton(
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """The forces of a law against the loads; arrays are (c, n_u, n_v, n_w).
+    """Compare the forces of a law with the loads; arrays are (c, n_u, n_v, n_w).
 
-    known: the coefficients that are given on faces. is_fixed: the mask of these.
+    known: the coefficients that are given on faces. is_fixed: the mask of these coefficients.
     """
 
     forces: Forces
@@ -143,16 +143,19 @@ class _Balance:
     def of(
         cls, volume: BSplineVolume, problem: Any, space: TrialSpace, options: SolveOptions, linear_iterations: int
     ) -> "_Balance":
-        """Return the balance of a problem; linear_iterations: of the linear solver, in a step of Newton's method."""
+        """Return the balance of a problem.
+
+        linear_iterations: the largest number of iterations of the linear solver in a Newton step.
+        """
         operator, load, known = assemble_data(volume, _Loads(problem), space, options)  # type: ignore[arg-type]
         is_fixed = np.ones(load.shape, dtype=bool)
         is_fixed[:, *space.window] = False
         return cls(Forces.of(operator, volume, problem.form), load, known, is_fixed, options, linear_iterations)
 
     def found(self, full: Array, share: float, history: list[float]) -> Array:
-        """Return the coefficients that balance a share of the loads, from others; residuals go to the history.
+        """Return the coefficients for which the forces balance a share of the loads, starting from `full`.
 
-        Raises ConvergenceError.
+        The residuals are appended to the history. Raises ConvergenceError.
         """
         load, made = share * self.load, 0
         inner = self.forces.apply(full)
@@ -176,7 +179,7 @@ class _Balance:
             (full, inner), made = searched, made + 1
 
     def _step(self, full: Array, rest: Array, missing: Array, residual: float) -> Array:
-        """Return Newton's step, which brings the faces to their values."""
+        """Return Newton's step, after which the coefficients on faces have their given values."""
         tangent, form = self.forces.derivative(full), self.forces.form
         if form.symmetric and not tangent.is_symmetric:
             raise ValueError(f"{type(form).__name__} has a derivative that is not symmetric: set `symmetric = False`")
@@ -189,10 +192,10 @@ class _Balance:
     def _searched(
         self, full: Array, step: Array, inner: Array, load: Array, is_reached: bool
     ) -> tuple[Array, Array] | None:
-        """Return the coefficients after a step, or after a part of it, and the forces there; None where none serves.
+        """Return the coefficients after the step or a part of it, and the forces there; None where no part is accepted.
 
-        Along the step the forces must fall below a share of what they were, or all of them become smaller; a step that
-        moves faces as well (not `is_reached`) must lead to finite forces.
+        A part is accepted where the forces along the step fall below a share of their earlier size, or where all forces
+        become smaller; after a step that also changes coefficients on faces (not `is_reached`), finite forces suffice.
         """
         free, length = ~self.is_fixed, 1.0
         rest = (inner - load)[free]
@@ -209,7 +212,7 @@ class _Balance:
 
 
 class _Loads:
-    """A problem under a simple law, of which only the loads and the data on faces are assembled."""
+    """State a problem under a simple law, of which only the loads and the data on faces are assembled."""
 
     def __init__(self, problem: BoundaryValueProblem) -> None:
         self.problem, self.form = problem, _Simple()
@@ -220,7 +223,7 @@ class _Loads:
 
 
 class _Simple(Form):
-    """The law of Laplace."""
+    """Define the law of Laplace's equation."""
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the gradient."""
@@ -228,7 +231,7 @@ class _Simple(Form):
 
 
 def _solved(tangent: Tangent, right: Array, is_symmetric: bool, tolerance: float, most: int) -> Array:
-    """Return the solution of a linear system, as far as the iterations go; GMRES where the matrix is not definite."""
+    """Return the solution of a linear system within the given iterations, by GMRES where the matrix is not definite."""
     blocks = [fast_diagonalization(tangent.block(i)) for i in range(len(right))]
 
     def precondition(residual: Array) -> Array:
@@ -257,7 +260,7 @@ def _solution(
     history: list[float],
     more: int,
 ) -> Solution:
-    """Return the solution with its errors, where the exact one is known."""
+    """Return the solution, with its errors where the exact solution is known."""
     errors = None
     if problem.exact is not None:
         errors = error_norms(volume, space, full, problem.exact_at, balance.forces.threads)

@@ -1,4 +1,4 @@
-"""SolveOptions: the discretization of a problem, and the iteration for its linear system."""
+"""Defines SolveOptions: the discretization of a problem, and the iteration for its linear system."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class IterationOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class SolveOptions(IterationOptions):
-    """Hold all options of a solve, those of its discretization too: keywords of `iga_nn.solve`, which describes them.
+    """Hold all options of a solve, of its discretization too: keywords of `iga_nn.solve`, which describes them.
 
     Raises ValueError also where the number of threads is out of range.
     """
@@ -65,7 +65,11 @@ class SolveOptions(IterationOptions):
 
     @property
     def thread_count(self) -> int:
-        """Threads of a process: by default all at hand, or one where the processes of `comm` share the work."""
+        """Return the number of threads of a process.
+
+        By default a process uses all threads of the machine, or one thread where the processes of `comm` share the
+        work.
+        """
         return self.threads or (default_threads() if self.comm is None else 1)
 
 

@@ -1,7 +1,7 @@
-"""Quantities of a solution: its gradient, its flux, stresses, or an expression of one's own; and its extremes.
+"""Evaluates quantities of a solution: its gradient, its flux, stresses, or a user's expression; and their extremes.
 
-A quantity is a function of u (c, ...), grad (c, 3, ...) and x (3, ...), as a law's flux is, and returns (...) or
-(k, ...), (k, l, ...). A law names those it gives (`Form.quantities`). Derivatives of a spline converge one order more
+A quantity is a function of u (c, ...), grad (c, 3, ...) and x (3, ...), as a law's flux is, and returns (...) or (k,
+...), (k, l, ...). A law names its quantities in `Form.quantities`. Derivatives of a spline converge one order more
 slowly than the spline: a stress is less accurate than the displacement.
 """
 
@@ -31,7 +31,7 @@ _POINTS = 2**16  # evaluated at once
 
 @dataclass(frozen=True)
 class Extremes:
-    """The least and the largest value of a quantity that were found, where in space, and at which parameters.
+    """Hold the least and the largest value found of a quantity, with their points in space and their parameters.
 
     The search samples every span and refines the best samples, so a sharp peak between samples may be missed.
 
@@ -60,7 +60,7 @@ class Extremes:
     largest_parameters: Place
 
     def as_dict(self) -> dict[str, Any]:
-        """Return values and points as report.json holds them."""
+        """Return the values and the points for report.json."""
         return {name: getattr(self, name) for name in ("least", "least_at", "largest", "largest_at")}
 
     def __str__(self) -> str:
@@ -69,7 +69,7 @@ class Extremes:
 
 
 def quantity_of(form: Form, what: str | Quantity) -> Quantity:
-    """Return a quantity by its name, or the function itself. Raises ValueError for a name the law does not give."""
+    """Return a quantity by its name, or the function itself. Raises ValueError for a name the law does not have."""
     if callable(what):
         return what
     given = form.quantities
@@ -79,14 +79,14 @@ def quantity_of(form: Form, what: str | Quantity) -> Quantity:
 
 
 def volume_of(field: SplineField) -> BSplineVolume:
-    """Return the volume of a field. Raises ValueError where it is not known."""
+    """Return the volume of a field. Raises ValueError for a field without a volume."""
     if field.geometry is None:
         raise ValueError("a quantity needs the field's volume: dataclasses.replace(field, geometry=volume)")
     return field.geometry
 
 
 def at_points(field: SplineField, form: Form, what: str | Quantity, points: ArrayLike) -> Array:
-    """Return a quantity (m, ...) at parameters (m, 3); NaN where these are NaN, as of points outside of the volume."""
+    """Return a quantity (m, ...) at parameters (m, 3); NaN for parameters NaN, as of points outside of the volume."""
     where = np.atleast_2d(real_array(points, "points"))
     if where.ndim != 2 or where.shape[1] != 3:
         raise ValueError(f"points must have shape (m, 3), got {np.shape(points)}")
@@ -133,7 +133,7 @@ def grid_values(field: SplineField, quantity: Quantity, u: Array, v: Array, w: A
 
 
 def _vectors(field: SplineField) -> Array:
-    """Return the coefficients (m_u, m_v, m_w, c), also of one component."""
+    """Return the coefficients as (m_u, m_v, m_w, c), with c = 1 for one component."""
     return field.coefficients[..., None] if field.coefficients.ndim == 3 else field.coefficients
 
 
@@ -152,7 +152,7 @@ def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: 
 
 
 def _of_shape(found: Array, shape: tuple[int, ...]) -> Array:
-    """Return values (..., shape) at points of a shape; one number stands for all. Raises ValueError for others."""
+    """Return values (..., shape) at points of a shape; one number is repeated. Raises ValueError for other shapes."""
     if found.ndim == 0:
         return np.broadcast_to(found, shape)
     if found.shape[found.ndim - len(shape) :] != shape:
@@ -161,15 +161,15 @@ def _of_shape(found: Array, shape: tuple[int, ...]) -> Array:
 
 
 def extremes(field: SplineField, form: Form, what: str | Quantity) -> Extremes:
-    """Return the least and the largest value of a quantity of one number a point, and where they are."""
+    """Return the least and the largest value of a quantity of one number a point, and their places."""
     (found,) = _extremes_of(field, [quantity_of(form, what)], _PER_SPAN)
     return found
 
 
 def all_extremes(field: SplineField, form: Form) -> dict[str, Extremes]:
-    """Return the extremes of the quantities in reports (`Form.reported`), by name, from one search for all of them.
+    """Return the extremes of the quantities in reports (`Form.reported`), by name, from one search for all quantities.
 
-    It takes fewer samples a span than `extremes`, so that it costs a small share of a solve.
+    The search uses fewer samples a span than `extremes`, so that it takes a small part of the time of a solve.
     """
     spans = math.prod(len(breakpoints(knots)) - 1 for knots in field.knots)
     per_span = max(1, min(_PER_SPAN, int((_SAMPLES / spans) ** (1.0 / 3.0))))
@@ -178,10 +178,10 @@ def all_extremes(field: SplineField, form: Form) -> dict[str, Extremes]:
 
 
 def _extremes_of(field: SplineField, quantities: Sequence[Quantity], per_span: int) -> list[Extremes]:
-    """Return the extremes of q quantities: those of the best samples, refined.
+    """Return the extremes of q quantities, refined from the best samples.
 
-    Rows of the arrays within are the quantities with a minus, whose largest values are the least ones, then as they
-    are.
+    The arrays inside have 2 q rows: first the negative quantities, whose largest values give the least values, then the
+    quantities.
     """
 
     def together(u: Array, grad: Array, x: Array) -> Array:
@@ -205,7 +205,7 @@ def _extremes_of(field: SplineField, quantities: Sequence[Quantity], per_span: i
 
 
 def _one_number(found: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Return a quantity's values at points of that shape. Raises ValueError unless they are one finite number each."""
+    """Return a quantity's values at points of that shape. Raises ValueError unless each value is one finite number."""
     values = _of_shape(np.asarray(found, dtype=np.float64), shape)
     extra = values.shape[: values.ndim - len(shape)]
     if math.prod(extra) != 1:
@@ -223,8 +223,9 @@ def _signed(values: Array) -> Array:
 
 
 def _zoomed(field: SplineField, together: Quantity, places: Array, widths: Sequence[float]) -> tuple[Array, Array]:
-    """Return better places (r, k, 3) of each of r rows and their values: the best of the 27 points around each, in
-    ever smaller boxes.
+    """Return better places (r, k, 3) of each of r rows, and their values.
+
+    Each place moves to the best of the 27 points around it, in smaller and smaller boxes.
     """
     steps = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * widths
     own = np.arange(len(places))
@@ -246,7 +247,7 @@ def _peak(field: SplineField, places: Array, values: Array) -> tuple[float, Plac
 
 
 def slabs(u: Array, v: Array, w: Array) -> Iterator[Array]:
-    """Yield the parameters u in pieces, so that a grid over each and all v, w has not too many points."""
+    """Yield the parameters u in pieces, so that the grid of a piece and all v, w does not have too many points."""
     step = max(1, _POINTS // (len(v) * len(w)))
     for start in range(0, len(u), step):
         yield u[start : start + step]

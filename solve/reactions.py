@@ -1,4 +1,4 @@
-"""Reactions of the supports, from the residual of the equations, so that they balance the loads."""
+"""Computes the reactions of the supports from the residual of the equations, so that they balance the loads."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from .forms.condition import WITH_FACTOR
 
 @dataclass(frozen=True)
 class Balance:
-    """The loads on the body and the reactions of its supports: forces of elasticity, inflows of a scalar law.
+    """Hold the loads on the body and the reactions of its supports: forces of elasticity, inflows of a scalar law.
 
     Attributes
     ----------
     load : tuple of float
-        The integral of the source and of all that is given as flux, (c,).
+        The integral (c,) of the source and of all given fluxes.
     reactions : dict of str to tuple of float
-        By support, a region's condition or a face of the cube: the integral (c,) of its action on the body.
+        By support, which is a region's condition or a face of the cube: the integral (c,) of its action on the body.
     areas : dict of str to float
         By condition, the area of its region.
     imbalance : float or None
-        The largest component of the sum of load and reactions, over the sum of their sizes: what the linear solver
-        left. None for a law with a reaction, which takes its part inside.
+        The largest component of the sum of load and reactions, over the sum of their sizes: the error of the linear
+        solver. None for a law with a reaction, which takes a part of the load inside the body.
 
     Examples
     --------
@@ -59,7 +59,7 @@ class Balance:
 
     @property
     def is_told(self) -> bool:
-        """Whether a reader wants it: of a force, and where data are given on regions."""
+        """Return whether a report shows the balance: where it is one of forces, or where data are given on regions."""
         return len(self.load) > 1 or not set(self.reactions) <= set(FACE_NAMES)
 
     def __str__(self) -> str:
@@ -73,9 +73,10 @@ def _shown(force: Sequence[float]) -> str:
 
 
 def balance(problem: BoundaryValueProblem, matrix: MatrixFree, coefficients: Array, loads: Array) -> Balance:
-    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w); matrix: of the problem, with what faces add.
+    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w).
 
-    loads: those of the source and of all conditions, shaped alike, before what values fix is taken from them.
+    matrix: the matrix of the problem, with the terms on faces. loads: (c, n_u, n_v, n_w), the loads of the source and
+    of all conditions, before the part of the fixed coefficients is subtracted.
     """
     space, faces = matrix.space, [face for face in matrix.faces.values() if isinstance(face, WeakFace)]
     residual = matrix.apply(coefficients) - loads
@@ -101,7 +102,7 @@ def balance(problem: BoundaryValueProblem, matrix: MatrixFree, coefficients: Arr
 
 
 def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array) -> dict[str, Array]:
-    """Return the reactions of the fixed coefficients, by face of the cube or by the condition that names it."""
+    """Return the reactions of the fixed coefficients, by the face of the cube or by the condition that names it."""
     fixed = np.zeros(residual.shape[1:], dtype=bool)
     found: dict[str, Array] = {}
     for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
@@ -117,7 +118,7 @@ def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array)
 
 
 def _has_end(space: TrialSpace, name: str) -> bool:
-    """Return whether the first or the last row of u is among those of this process."""
+    """Return whether the first or the last row of u is among the rows of this process."""
     rows = space.rows
     if rows.start == rows.stop:
         return False

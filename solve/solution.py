@@ -1,4 +1,4 @@
-"""Solution: the spline that a solve returns, and SolveReport: its numbers."""
+"""Defines Solution, the spline that a solve returns, and SolveReport, its numbers."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -33,13 +33,13 @@ NORMS = {  # name in report.json -> name as shown
 
 
 def _known(part: str, norm: str) -> property:
-    """Return a property: a norm of a report's errors or estimate, None where it is unknown."""
+    """Return a property for a norm of a report's errors or estimate, None where the norm is unknown."""
     return property(lambda report: getattr(getattr(report, part), norm, None))
 
 
 @dataclass(frozen=True)
 class SolveReport:
-    """One entry of `poisson.levels` in report.json.
+    """Hold the numbers of one solve, an entry of `poisson.levels` in report.json.
 
     `l2`, `l2_relative`, `h1_seminorm`, `h1_relative`, `error_estimate` and `error_estimate_relative` are float, None
     where they are unknown; absolute ones in the units of u, and of u times length^(3/2).
@@ -47,7 +47,7 @@ class SolveReport:
     Attributes
     ----------
     elements, dofs : int
-        Totals; the unknowns fixed by boundary data count as dofs.
+        Numbers of elements and of unknowns; unknowns that boundary data fix are included.
     h : float
         Longest straight edge of a mapped element, in the volume's units.
     iterations : int
@@ -57,17 +57,17 @@ class SolveReport:
     seconds : dict of str to float
         Process CPU seconds of setup, solve and errors.
     errors : Errors or None
-        The norms, None without an exact solution.
+        Norms of the errors, None without an exact solution.
     estimate : Errors or None
-        Of the L2 error, from the residual, where there is no exact solution, or on request.
+        Estimate of the L2 error from the residual, where there is no exact solution, or on request.
     notices : tuple of str
         Warnings about these numbers, one line each.
     meaningful : bool
         False where a formula does not vary on the domain, or the mesh does not resolve the exact solution.
     residuals : tuple of float
-        The same before the first and after every iteration.
+        Relative norms of the residual before the first and after every iteration.
     traffic : dict of str to float
-        Of several processes, the bytes that all together send in a step of the linear solver: for copies of rows
+        With several processes, the bytes that all send together in a step of the linear solver: for copies of rows
         ("halo"), and in the preconditioner ("transposition", "substitution").
     balance : Balance or None
         The loads on the body and the reactions of its supports.
@@ -104,7 +104,7 @@ class SolveReport:
     error_estimate_relative = _known("estimate", "l2_relative")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the entry as report.json holds it; errors that are not known are absent."""
+        """Return the entry of report.json; unknown errors are absent."""
         names = ("elements", "dofs", "h", *NORMS, "iterations", "converged", "residual", "meaningful", "seconds")
         found = {name: value for name in names if (value := getattr(self, name)) is not None}
         found |= self.balance.as_dict() if self.balance and self.balance.is_told else {}
@@ -121,7 +121,7 @@ class SolveReport:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(SplineField, Shown):
-    """The discrete solution: a spline of the parameters, the map it lives on, the report, and the problem it solves.
+    """Hold the discrete solution: a spline of the parameters, its map, its report, and the problem that it solves.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Solution(SplineField, Shown):
     report : SolveReport
         Unknowns, errors, iterations and seconds.
     problem : Poisson, Elasticity or Problem
-        Whose solution it is.
+        The problem that the spline solves.
 
     Examples
     --------
@@ -147,31 +147,31 @@ class Solution(SplineField, Shown):
 
     @property
     def field(self) -> SplineField:
-        """The spline without the report: a datum for another problem on the same volume."""
+        """Return the spline without the report, as a datum for another problem on the same volume."""
         return SplineField(self.degrees, self.knots, self.coefficients, self.geometry)
 
     def quantity(self, what: str | Quantity, points: ArrayLike) -> Array:
-        """Return a quantity (m, ...) at parameters (m, 3), NaN at those that are NaN (points outside of the volume).
+        """Return a quantity (m, ...) at parameters (m, 3); NaN for parameters NaN, as of points outside of the volume.
 
-        what: a name that the law gives, as "gradient", "flux", of elasticity "stress", "von_mises" and others
-        (`problem.form.quantities`); or a function of u (c, m), grad (c, 3, m) and x (3, m) that returns (..., m).
-        For points in space: solution.quantity(what, solution.geometry.locate(points)).
-        Raises ValueError for another name, and a function that fails or returns another shape.
+        what: a name from the law's quantities, as "gradient", "flux", of elasticity "stress", "von_mises" and others
+        (`problem.form.quantities`); or a function of u (c, m), grad (c, 3, m) and x (3, m) that returns (..., m). For
+        points in space: solution.quantity(what, solution.geometry.locate(points)). Raises ValueError for another name,
+        and for a function that fails or returns another shape.
         """
         return at_points(self, self.problem.form, what, points)
 
     def quantity_grid(self, what: str | Quantity, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
-        """Return a quantity (len(u), len(v), len(w), ...) on a tensor grid of parameters; else as `quantity`."""
+        """Return a quantity (len(u), len(v), len(w), ...) on a tensor grid of parameters; `what` as in `quantity`."""
         return on_grid(self, self.problem.form, what, u, v, w)
 
     def extremes(self, what: str | Quantity) -> Extremes:
-        """Return the least and the largest value of a quantity of one number a point, and where they are."""
+        """Return the least and the largest value of a quantity of one number a point, and their places."""
         return extremes(self, self.problem.form, what)
 
     def all_extremes(self) -> dict[str, Extremes]:
-        """Return the extremes that a report shows, by name (`problem.form.reported`), from one search for all of them.
+        """Return the extremes of a report, by name (`problem.form.reported`), from one search for all quantities.
 
-        It takes fewer samples than `extremes` does on fine meshes.
+        The search uses fewer samples than `extremes` on fine meshes.
         """
         return all_extremes(self, self.problem.form)
 
@@ -180,11 +180,11 @@ class Solution(SplineField, Shown):
     ) -> "pyvista.UnstructuredGrid":
         """Return the volume as a grid of pyvista with the solution as point data `u`.
 
-        samples: None for exact Bezier cells; else the number of linear cells a span of the solution and direction, with
-        the distortion `arap`, `det J` and, where the exact solution is known, the `error`. Slice and clip these alone.
-        quantities: point data beside them, names that the law gives or a dictionary of functions (as in `quantity`);
-        by default stress and von_mises of elasticity, gradient and flux of other laws. () for none.
-        Raises ValueError for a name the law does not give, and for quantities without samples.
+        samples: None for exact Bezier cells; otherwise the number of linear cells a span of the solution and direction,
+        with the distortion `arap`, `det J` and, where the exact solution is known, the `error`. Only linear cells can
+        be sliced and clipped. quantities: further point data, as names from the law or a dictionary of functions (as in
+        `quantity`); by default stress and von_mises of elasticity, gradient and flux of other laws; () for none. Raises
+        ValueError for a name the law does not have, and for quantities without samples.
         """
         return above("io.view").grid(self.geometry, self, self.problem, samples, quantities)
 
@@ -196,9 +196,10 @@ class Solution(SplineField, Shown):
         return above("io.splinepy").to_splinepy(self)
 
     def plot(self, what: str = "values", file: str | Path | None = None) -> "Figure":
-        """Return a figure of the solution, drawn off screen; report.html shows the same.
+        """Return a figure of the solution, drawn off screen; report.html shows the same figure.
 
-        what: "values", or "error" where the problem has an exact solution. file: PNG to write the figure to, too.
-        Raises ValueError for another name or without an exact solution, RuntimeError where VTK cannot draw here.
+        what: "values", or "error" where the problem has an exact solution. file: the PNG to which the figure is also
+        written. Raises ValueError for another name or without an exact solution, RuntimeError where VTK cannot draw
+        here.
         """
         return above("figures.solution").plot_solution(self, what, file)

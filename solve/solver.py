@@ -1,4 +1,4 @@
-"""One entrance for all problems: check, discretize, solve."""
+"""Solves any problem: checks it, discretizes it, and solves the linear system."""
 
 import functools
 from typing import Any
@@ -39,30 +39,30 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     refine : int
         Number of times that every span of the map's knots is halved for the trial space; 0 by default.
     degree : int, optional
-        Of the trial space; the map's own by default.
+        Degree of the trial space; the degree of the map by default.
     threads : int, optional
-        The result is the same for any number. Default: NUMBA_NUM_THREADS, OMP_NUM_THREADS, or the cores at hand.
+        Number of threads; the result does not depend on it. Default: NUMBA_NUM_THREADS, OMP_NUM_THREADS, or all cores.
     quadrature : str
-        Of the operator: "spline", Gauss rules of the spline space, as many points as the map and the law need; "gauss",
-        `degree` Gauss points a span; "gauss+1", one more. Errors have degree + 2 points a span in any case.
+        Rule of the operator: "spline", Gauss rules of the spline space with the points that the map and the law need;
+        "gauss", `degree` Gauss points a span; "gauss+1", one point more. Errors always use degree + 2 points a span.
     comm : mpi4py.MPI.Comm, optional
-        Its processes share the work, a thread each by default, and each returns the whole solution.
+        Communicator whose processes share the work, by default with one thread each; each returns the whole solution.
     tolerance : float
-        Of the residual, relative to the right-hand side; 1e-10 by default.
+        Tolerance of the residual, relative to the right-hand side; 1e-10 by default.
     max_iterations : int
-        1000 by default.
+        Largest number of iterations of the linear solver; 1000 by default.
     certified : str, optional
-        The verdict of the map's certificate, if known; anything but "certified" is logged and noted.
+        Verdict of the map's certificate, if known; a verdict other than "certified" gives a notice.
     device : str
         "cpu", or "cuda" for the iteration on a GPU (Poisson's equation without Robin faces).
     start : SplineField, optional
-        A solution in a space that this one contains, as that of one refinement less: the iteration starts there instead
-        of at zero, and saves a third on maps that take many.
+        Solution in a subspace, such as the space of one refinement less: the iteration starts there instead of at zero,
+        which saves a third of the iterations on maps that need many.
     estimate : bool, optional
-        Of the error from the residual; by default where the problem has no exact solution.
+        Whether to estimate the error from the residual; by default where the problem has no exact solution.
     strict : bool
-        Raise ConvergenceError where the linear solver fails; otherwise `report.converged` is False. A solver that fails
-        before its first iteration has no solution to return, and raises it in any case.
+        Whether a failure of the linear solver raises ConvergenceError; otherwise `report.converged` is False. A failure
+        before the first iteration leaves no solution, and always raises ConvergenceError.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     TypeError
         For an object that is no problem or no volume, and for an unknown option.
     ConvergenceError
-        As `strict` says.
+        Where the linear solver fails, see `strict`.
 
     Examples
     --------
@@ -92,7 +92,7 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
 
 
 def solve_with(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> Solution:
-    """Return the solution of `solve_problem` for options as one object."""
+    """Return the solution of `solve_problem` for options in one object."""
     check_device(options.device, problem)
     return discretized(volume, problem, options).solve_with(options)
 
@@ -107,12 +107,12 @@ def discretize(
     quadrature: str = SolveOptions.quadrature,
     comm: Any = None,
 ) -> System:
-    """Return the linear system of a problem, for loops of one's own.
+    """Return the linear system of a problem, for a loop of the user's own.
 
     Parameters
     ----------
     volume, problem, refine, degree, threads, quadrature, comm
-        As in `iga_nn.solve`, whose errors are raised.
+        As in `iga_nn.solve`; the errors are the same, too.
 
     Returns
     -------
@@ -155,10 +155,10 @@ def prepared(
 
 
 def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
-    """Evaluate a problem's data where the coarsest solve needs them; finer levels need them at points between.
+    """Evaluate a problem's data at the points of the coarsest solve; finer levels use points between these.
 
-    comm: a communicator of mpi4py whose processes share the work.
-    Raises ExpressionError where they are not finite or have the wrong sign, ValueError where they do not balance.
+    comm: a communicator of mpi4py whose processes share the work. Raises ExpressionError where the data are not finite
+    or have the wrong sign, ValueError where they do not balance.
     """
     problem.demand_held()
     problem, space = problem.on(volume), shared_space(trial_space(volume, dirichlet=problem.dirichlet), comm)
@@ -174,7 +174,7 @@ def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: An
 
 @functools.cache
 def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool) -> None:
-    """Compile the kernels, or load them from the cache, so that no level's seconds contain it."""
+    """Compile the kernels, or load them from the cache, so that the seconds of no level include the compilation."""
     # A large block freed teaches glibc (mallopt(3), M_MMAP_THRESHOLD) to keep freed memory. Else every temporary of a
     # plane goes back to the system and is faulted in again: formulas take five times as long.
     np.empty(2**21)

@@ -1,4 +1,4 @@
-"""Convergence studies: one fixed map, refined exactly, and the rates that follow."""
+"""Makes convergence studies: one fixed map, refined exactly, and the observed rates."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -18,13 +18,13 @@ from .solver import solve_with
 
 @dataclass(frozen=True)
 class ConvergenceRow:
-    """One level of a study; printed, a line.
+    """Hold one level of a study, which is printed as one line.
 
     Attributes
     ----------
     report : SolveReport
     rate_l2, rate_h1 : float or None
-        Observed orders against the level before; None for the first, or without errors.
+        Observed orders from the level before; None for the first level, or without errors.
 
     Examples
     --------
@@ -45,7 +45,7 @@ class ConvergenceRow:
 
 
 class Convergence(list[ConvergenceRow], Shown):
-    """The levels of a study in the order they were solved: a list of rows, printed a line a level.
+    """Hold the levels of a study in the order of their solves: a list of rows, printed as one line a level.
 
     Examples
     --------
@@ -73,11 +73,11 @@ def convergence(
     Parameters
     ----------
     volume, problem, degree, certified
-        As in `iga_nn.solve`, whose errors are raised.
+        As in `iga_nn.solve`; the errors are the same, too.
     refine : iterable of int
         Levels; level n halves every span n times.
     tolerance : float
-        Of the linear solver; degree 5 requires a smaller one than the default of a solve to show its rate.
+        Tolerance of the linear solver; degree 5 needs a smaller one than the default of a solve to show its rate.
 
     Returns
     -------
@@ -103,10 +103,10 @@ def convergence(
 
 
 def rates(reports: Sequence[SolveReport]) -> dict[str, list[float | None]]:
-    """Observed orders between neighbouring levels: {"l2": [...], "h1": [...]}, a key absent without its error.
+    """Return the observed orders between neighbouring levels: {"l2": [...], "h1": [...]}.
 
-    The mesh size is that of the parametric mesh (elements^(-1/3)), so halving spans counts as exactly one half.
-    None stands where there is no order: between equal meshes, or next to an error of zero.
+    A key is absent where its error is unknown. The mesh size is that of the parametric mesh (elements^(-1/3)), so
+    halving spans counts as exactly one half. An order is None between equal meshes, and next to an error of zero.
     """
     found: dict[str, list[float | None]] = {}
     for key, name in (("l2", "l2"), ("h1", "h1_seminorm")):
@@ -124,10 +124,10 @@ def _rate(errors: list[float], sizes: list[float]) -> float | None:
 
 
 def benchmark_volume(n: int, degree: int = 3, amplitude: float = 0.08) -> BSplineVolume:
-    """The map on which solvers are compared: a twisted unit cube with n elements a direction, for tests and benchmarks.
+    """Return the map on which solvers are compared: a twisted unit cube with n elements a direction.
 
-    Control points P = g + amplitude (sin pi(g_y + g_z), sin pi(g_x + g_z), sin pi(g_x + g_y)) at the Greville points g.
-    Different n are different maps: for rates refine one of them. It folds at amplitude 0.20.
+    It has control points P = g + amplitude (sin pi(g_y + g_z), sin pi(g_x + g_z), sin pi(g_x + g_y)) at the Greville
+    points g. Different n give different maps: for rates refine one map. The map folds at amplitude 0.20.
     """
     points = greville(open_uniform_knots(n + degree, degree), degree)
     g = np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1)  # (n + degree, ..., 3)

@@ -1,4 +1,4 @@
-"""System: the linear system of a problem on a volume, to be solved here or in a loop of one's own."""
+"""Defines System: the linear system of a problem on a volume, for `solve` or for a loop of the user's own."""
 
 import functools
 import logging
@@ -39,11 +39,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """A problem on a volume as a linear system A x = b of its N free unknowns, in double precision, without matrices.
+    """State a problem on a volume as a linear system A x = b of N free unknowns, in double precision, matrix-free.
 
-    A vector (N,) holds the free coefficients in C order of (c, m_u, m_v, m_w): components, and functions a direction,
-    those that Dirichlet data fix left out; `operator`, `mass` and `preconditioner` are SciPy LinearOperators (N, N).
-    Where processes share the space, arrays hold a process's rows and vectors its own ones; all call each method.
+    A vector (N,) holds the free coefficients in C order of (c, m_u, m_v, m_w): components, and functions a direction
+    without those that Dirichlet data fix; `operator`, `mass` and `preconditioner` are SciPy LinearOperators (N, N).
+    Where processes share the space, arrays hold a process's rows and vectors its own rows; all processes call each
+    method.
 
     Examples
     --------
@@ -68,32 +69,32 @@ class System:
 
     @property
     def operator(self) -> LinearOperator:
-        """A, Robin's terms included."""
+        """Return A, with Robin's terms."""
         return self._linear(self.matrix.apply_free)
 
     @functools.cached_property
     def mass(self) -> LinearOperator:
-        """The mass matrix, the integrals of u . v."""
+        """Return the mass matrix, the integrals of u . v."""
         single, _ = assemble(self.volume, self.space, Mass(), threads=self.matrix.threads)
         return self._linear(single.apply_free)
 
     @property
     def weak(self) -> list[WeakFace]:
-        """The faces of the cube with terms of conditions on regions."""
+        """Return the faces of the cube with terms of conditions on regions."""
         return [face for face in self.matrix.faces.values() if isinstance(face, WeakFace)]
 
     @property
     def load(self) -> Array:
-        """The right-hand side b (N,): source and data on faces, less A times the coefficients that are fixed."""
+        """Return the right-hand side b (N,): source and data on faces, minus A times the fixed coefficients."""
         return self.right.ravel()
 
     @property
     def preconditioner(self) -> LinearOperator:
-        """An approximation of the inverse of A; symmetric, and positive unless the solution's constant is open."""
+        """Return an approximate inverse of A; it is symmetric, and positive unless the solution's constant is open."""
         return self._linear(self._precondition)
 
     def field(self, x: Array) -> SplineField:
-        """Return the spline of the free coefficients x (N,) and of those that are fixed.
+        """Return the spline of the free coefficients x (N,) and the fixed coefficients.
 
         Raises ValueError for another number of coefficients.
         """
@@ -102,14 +103,14 @@ class System:
         return self._spline(self._filled(np.reshape(x, self.right.shape)))
 
     def _filled(self, free: Array) -> Array:
-        """Return the coefficients (c, n_u, n_v, n_w), those that are fixed included."""
+        """Return all coefficients (c, n_u, n_v, n_w) from the free ones, with the fixed coefficients."""
         full = self.known.copy()
         full[:, *self.space.window] = free
         self.space.fill(full)
         return full
 
     def vector(self, field: SplineField) -> Array:
-        """Return the free coefficients (N,) of a field of this space, or of one that it contains.
+        """Return the free coefficients (N,) of a field in this space, or in a space that this one contains.
 
         Raises ValueError for any other field.
         """
@@ -118,7 +119,7 @@ class System:
         return full[:, *self.space.window].ravel()
 
     def _spline(self, full: Array) -> SplineField:
-        """Return the spline of coefficients (c, n_u, n_v, n_w), those of all processes together."""
+        """Return the spline of coefficients (c, n_u, n_v, n_w), gathered from all processes."""
         whole = self.space.gather(full[:, self.space.own])
         coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
@@ -137,15 +138,16 @@ class System:
         return LinearOperator((size, size), matvec=product, dtype=np.float64, **adjoint)
 
     def solve(self, **how: Any) -> Solution:
-        """Solve, and return the solution with its errors and notices.
+        """Solve the system, and return the solution with its errors and notices.
 
-        how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`.
-        Raises ConvergenceError where the linear solver fails before its first iteration, else only for `strict`.
+        how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`. Raises
+        ConvergenceError where the linear solver fails before its first iteration, or where it fails at all with
+        `strict`.
         """
         return self.solve_with(IterationOptions.of(how))
 
     def solve_with(self, options: IterationOptions) -> Solution:
-        """Return the solution of `solve` for options as one object."""
+        """Return the solution of `solve` for options in one object."""
         check_device(options.device, self.problem)
         with one_blas_thread():
             solution = self._solve(options)
@@ -199,9 +201,10 @@ class System:
         return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
 
     def _errors(self, full: Array, free: Array, is_estimated: bool | None) -> tuple[Errors | None, Errors | None]:
-        """Return the errors of a solution, where the exact one is known, and their estimate, where it is wanted.
+        """Return the errors of a solution, None without an exact one, and their estimate, None unless it is wanted.
 
-        full, free: all coefficients, and the free ones. is_estimated: None for where the exact solution is not known.
+        full: all coefficients. free: the free coefficients. is_estimated: whether to estimate; None for problems
+        without an exact solution only.
         """
         volume, problem, space = self.volume, self.problem, self.space
         errors = estimate = None
@@ -212,7 +215,7 @@ class System:
         return errors, estimate
 
     def _energy(self, free: Array) -> float | None:
-        """Return a(u_h, u_h) of free coefficients that solve the system, None where it is not the work of the loads."""
+        """Return a(u_h, u_h) of free coefficients that solve the system; None where it is not the work of the loads."""
         lifted = sum(int(np.count_nonzero(face.values)) for face in self.weak)
         if not self.problem.form.symmetric or self.space.total(np.count_nonzero(self.known) + lifted):
             return None
@@ -249,9 +252,9 @@ def build(
     options: SolveOptions,
     shift: float = 0.0,
 ) -> System:
-    """Return the system of a problem, its data placed in the volume (`problem.on`), on a trial space.
+    """Return the system of a problem on a trial space; the problem's data are placed in the volume (`problem.on`).
 
-    shift: factor of the mass matrix in A, beside the law's matrix.
+    shift: the factor of the mass matrix in A, which is added to the law's matrix.
     """
     start = time.process_time()
     with one_blas_thread():

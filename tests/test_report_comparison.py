@@ -74,7 +74,7 @@ def test_what_is_no_run_is_one_line(runs, in_folder, capsys):
     for other, says in (
         (".", ".: is no output folder of a run"),
         ("nowhere", "nowhere: is no output folder of a run"),
-        ("unfinished", "unfinished: the run there is not finished"),
+        ("unfinished", "unfinished: the run in this folder is not finished"),
         (str(runs[1]), "compare.html: exists; --force replaces it, --out names another file"),
     ):
         assert main(["compare", str(runs[0]), other]) == 2

@@ -1,4 +1,4 @@
-"""Lets dask compute the surfaces of a batch: worker processes of this machine, or those of a scheduler."""
+"""Lets dask compute the surfaces of a batch: worker processes of this machine, or the workers of a scheduler."""
 
 import logging
 import os
@@ -44,9 +44,10 @@ OnProgress = Callable[[int, str, float], None]  # number of a surface, its stage
 
 @contextmanager
 def connected(workers: WorkerOptions, most: int) -> Iterator[Client]:
-    """Yield a client of the workers; those of this machine end with the block, and their files go with them.
+    """Yield a client of the workers; workers of this machine end with the block, and their files are removed.
 
-    most: the number of surfaces, more workers are not started. Raises InputError where the scheduler does not answer.
+    most: the number of surfaces, which limits the number of workers. Raises InputError where the scheduler does not
+    answer.
     """
     with ExitStack() as stack:
         if workers.scheduler is not None:
@@ -61,10 +62,10 @@ def connected(workers: WorkerOptions, most: int) -> Iterator[Client]:
 
 
 class _OwnOutput(WorkerPlugin):  # type: ignore[misc]
-    """Sends the output of libraries in a worker to stderr: stdout is for the answer of the command."""
+    """Send the output of libraries in a worker to stderr, because stdout is for the answer of the command."""
 
     def setup(self, worker: Worker) -> None:
-        """Redirect the worker's process, which starts or has just started."""
+        """Redirect the output of the worker's process at its start or soon after it."""
         os.dup2(2, 1)
 
 
@@ -94,7 +95,7 @@ def _local(workers: WorkerOptions, most: int) -> Iterator[LocalCluster]:
 
 
 def memory_limit(workers: WorkerOptions) -> int:
-    """Return the bytes that a worker may take, 0 for any number. Raises InputError."""
+    """Return the number of bytes that a worker may use, 0 for no limit. Raises InputError."""
     text = workers.memory_limit
     try:
         limit = int(parse_bytes(text))
@@ -107,7 +108,7 @@ def memory_limit(workers: WorkerOptions) -> int:
 
 @contextmanager
 def _environment(values: dict[str, str]) -> Iterator[None]:
-    """Set variables that workers inherit, and leave the environment as it was: dask adds some of its own to it."""
+    """Set variables that workers inherit, and restore the environment at the end, because dask adds variables to it."""
     before = dict(os.environ)
     os.environ.update(values)
     try:
@@ -120,7 +121,7 @@ def _environment(values: dict[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back; threads and processes started in the block, and those that they start, never see it."""
+    """Hold Ctrl-C back: threads and processes that start in the block, and their own processes, never receive it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -135,9 +136,9 @@ def _interrupts_held() -> Iterator[None]:
 def computed(
     client: Client, tasks: Sequence[Task], workers: WorkerOptions, tell: OnProgress, work: Work = compute
 ) -> Generator[tuple[int, Ended], None, None]:
-    """Yield the number of each task and its end, in the order of the ends; a failed task is tried again before that.
+    """Yield the number of each task and its end, in the order of the ends; a failed task is first tried again.
 
-    A surface is handed out once a worker is free for it: one behind another would be lost with that other's worker.
+    A surface is sent to a worker once that worker is free: a surface that waits in a worker would be lost with it.
     Where the caller ends early, surfaces keep a checkpoint.
     """
     batch = f"iga-nn-{uuid4().hex}"
@@ -172,7 +173,7 @@ def computed(
 
 
 def _first_ended(futures: list[Future]) -> list[Future]:
-    """Wait a moment for futures to end, and return those that have."""
+    """Wait a moment for futures to end, and return the futures that have ended."""
     if not futures:  # no worker has come yet
         time.sleep(POLL)
         return []
@@ -194,7 +195,7 @@ def _ended(client: Client, future: Future) -> Ended:
 
 
 def _ran_out_of_memory(client: Client, worker: str) -> bool:
-    """Return whether that worker was ended for its memory; the scheduler may hear of it after the worker is gone."""
+    """Return whether that worker was ended for its memory; the scheduler may receive this after the worker's end."""
     until = time.monotonic() + 2.0
     while time.monotonic() < until:
         if any(event["worker"] == worker for _, event in client.get_events(MEMORY_TOPIC)):
@@ -204,7 +205,7 @@ def _ran_out_of_memory(client: Client, worker: str) -> bool:
 
 
 def _stop(client: Client, batch: str, futures: list[Future]) -> None:
-    """Ask the workers to end their surfaces of a batch, and wait a moment until they have."""
+    """Ask the workers to end their surfaces of a batch, and wait a moment for their ends."""
     with suppress(Exception):  # workers or the scheduler may be gone: their surfaces have earlier checkpoints
         client.run(stop, batch, on_error="ignore")
         wait(futures, timeout=GRACE)

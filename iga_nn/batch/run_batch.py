@@ -29,7 +29,10 @@ INSTALL = "pip install 'iga-nn[batch]'"
 
 @dataclass(frozen=True)
 class Running:
-    """Hold the progress of a surface. share: of its work that is done."""
+    """Hold the progress of a surface.
+
+    share: the finished share of its work.
+    """
 
     name: str
     stage: str
@@ -145,7 +148,7 @@ def run_tasks(
 
 
 def _found(task: Task, force: bool) -> Row:
-    """Return the row of a surface by the state of its folder: finished, refused for its content, or to be computed."""
+    """Return the row of a surface by the state of its folder: finished, refused for its content, or waiting."""
     row = Row(task)
     try:
         if force:
@@ -160,7 +163,7 @@ def _found(task: Task, force: bool) -> Row:
 
 
 def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progress: Progress, work: Work) -> Batch:
-    """Return the batch once the surfaces that wait are computed; write it after each."""
+    """Return the batch after the computation of all waiting surfaces; the batch is written after each surface."""
     try:
         from . import cluster
     except ModuleNotFoundError as error:
@@ -206,7 +209,7 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
 
 
 def _write(batch: Batch) -> None:
-    """Write the three files of the batch anew, each in one go. Raises InputError."""
+    """Write the three files of the batch anew, each one atomically. Raises InputError."""
     content = {"json": reports.as_json(batch.as_dict()) + "\n", "csv": batch.as_csv(), "html": page(batch)}
     with writable(batch.folder):
         for ending, text in content.items():

@@ -18,7 +18,8 @@ from ..workflow.output_folder import default_folder
 class Entry:
     """Hold one surface of a batch.
 
-    name: as the user knows it. mesh: its absolute path, or the name of a sample or a model. folder: of its results.
+    name: the user's name for it. mesh: its absolute path, or the name of a sample or a model. folder: the folder of its
+    results.
     """
 
     name: str
@@ -27,10 +28,10 @@ class Entry:
 
 
 def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
-    """Return the surfaces that are named, each once, in the order they are named, with different folders in `out`.
+    """Return the named surfaces, each once, in the order of the names, with different folders in `out`.
 
-    Files are known by their absolute paths: a worker with another current folder finds them, too. Raises InputError
-    where nothing is named, and where a folder or a pattern holds no surface.
+    Files are given by their absolute paths, so that a worker with another current folder finds them. Raises InputError
+    where nothing is named, and where a folder or a pattern contains no surface.
     """
     found: dict[str, str] = {}  # key of a surface -> name
     for given in surfaces:
@@ -46,13 +47,13 @@ def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
 
 
 def demand_one(entries: Sequence[Entry]) -> None:
-    """Raise MeshError where no named surface is there; where some are, the table has the others as refused."""
+    """Raise MeshError where no named surface exists; where some exist, the table shows the others as refused."""
     if not any(entry.mesh in SAMPLES or entry.mesh in MODELS or Path(entry.mesh).exists() for entry in entries):
         raise not_found(entries[0].name)
 
 
 def _names_in(given: str) -> Iterator[str]:
-    """Yield the files or names that one argument stands for. Raises InputError where it stands for none."""
+    """Yield the files or names that one argument means. Raises InputError where there are none."""
     path = Path(given)
     if path.is_file() or given in SAMPLES or given in MODELS or not given:
         yield given
@@ -79,10 +80,10 @@ def _is_surface(file: Path) -> bool:
 
 
 def distinct_folders(meshes: Sequence[str]) -> list[str]:
-    """Return a folder's name for each of some different surfaces.
+    """Return a different folder name for each of the surfaces.
 
-    It is the surface's stem, as `run` has it. Where several have the same, all of these take the file's name instead,
-    then with the folder it is in before it, and so on up the path; a number separates names that are still equal.
+    The name is the surface's stem, as in `run`. Surfaces with the same stem take the name of their file instead, then
+    that name after the name of the file's folder, and so on up the path; a number separates names that are still equal.
     """
     choices = [_folder_names(mesh) for mesh in meshes]
     level = [0] * len(meshes)
@@ -97,14 +98,14 @@ def distinct_folders(meshes: Sequence[str]) -> list[str]:
 
 
 def _folder_names(mesh: str) -> list[str]:
-    """Return names for a surface's folder, from the shortest to the one with the whole path in it."""
+    """Return names for a surface's folder, from the shortest to the longest, which contains the whole path."""
     path = Path(mesh)
     above = [part for part in path.parts[:-1] if part != path.anchor]
     return [str(default_folder(mesh)), *("_".join([*above[start:], path.name]) for start in range(len(above), -1, -1))]
 
 
 def _numbered(names: Sequence[str]) -> list[str]:
-    """Return the names with a number behind those that an earlier one has taken."""
+    """Return the names, with a number after each name that has already occurred."""
     taken: dict[str, str] = {}
     for name in names:
         number, free = 1, name
@@ -116,5 +117,5 @@ def _numbered(names: Sequence[str]) -> list[str]:
 
 
 def printable(text: str) -> str:
-    """Return the text as every terminal and file takes it: names of files may hold any bytes."""
+    """Return the text in a form for every terminal and file, because file names may contain any bytes."""
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)

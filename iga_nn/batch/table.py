@@ -1,4 +1,4 @@
-"""Keeps the table of a batch, one row a surface, and puts it into words, CSV, JSON and a page that fetches nothing."""
+"""Keeps the table of a batch, one row a surface, and writes it as text, CSV, JSON and a page without external files."""
 
 import base64
 import functools
@@ -51,7 +51,10 @@ WHOLE = ("seconds", "dofs", "iterations")
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """Hold the result of one surface. line: the reason of a refusal or failure."""
+    """Hold the result of one surface.
+
+    line: the reason of a refusal or failure.
+    """
 
     entry: Entry
     state: State = "waiting"
@@ -59,7 +62,7 @@ class Row:
     report: reports.Report | None = None
 
     def ended(self, how: Ended) -> Self:
-        """Return the row of the surface once its task has ended."""
+        """Return the row of the surface after the end of its task."""
         if how.report is not None:
             return replace(self, state=reports.state(how.report), line="", report=how.report)
         state: State = "refused" if how.state == "refused" else "failed" if how.state == "failed" else "waiting"
@@ -71,7 +74,7 @@ class Row:
         return reports.verdict(self.report, self.entry.folder) if self.report is not None else {}
 
     def figures(self) -> dict[str, Any]:
-        """Return the numbers of the page, at volume 1 and on the finest mesh; an unknown number is None."""
+        """Return the numbers of the page, at volume 1 and on the finest mesh; None for an unknown number."""
         known = self.verdict()
         known |= (known.get("levels") or [{}])[-1]
         for key, value in known.get("arap", {}).get("unit_volume", {}).items():
@@ -91,14 +94,14 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Hold all rows of a batch and the folder of its results, in the order the surfaces were named."""
+    """Hold all rows of a batch, in the order of the named surfaces, and the folder of its results."""
 
     folder: Path
     rows: tuple[Row, ...]
 
     @property
     def counts(self) -> dict[State, int]:
-        """Return the number of surfaces by state, without states that no surface is in."""
+        """Return the number of surfaces by state, without states that have no surface."""
         found = Counter(row.state for row in self.rows)
         return {state: found[state] for state in get_args(State) if found[state]}
 
@@ -109,7 +112,7 @@ class Batch:
         return f"{len(self.rows)} surface{'s' * (len(self.rows) != 1)}: {counts}"
 
     def with_row(self, number: int, row: Row) -> Self:
-        """Return the batch with another row in that place."""
+        """Return the batch with another row at position `number`."""
         return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
 
     def as_dict(self) -> dict[str, Any]:
@@ -146,7 +149,7 @@ def page(batch: Batch) -> str:
 
 
 def _row(row: Row) -> dict[str, Any]:
-    """Return the content of a row for the template; each figure as its text and the value it is sorted by."""
+    """Return the content of a row for the template; each figure has its text and the value by which it is sorted."""
     report = row.entry.folder / PAGE
     return {
         "name": row.entry.name,
@@ -180,7 +183,7 @@ def _picture(path: Path) -> str:
 
 @functools.lru_cache(maxsize=4096)
 def _thumbnail(path: Path, _written: int) -> str:
-    """Return the thumbnail of a picture; the page is written many times, and each picture is read once."""
+    """Return the thumbnail of a picture; each picture is read once, though the page is written many times."""
     stream = io.BytesIO()
     with Image.open(path) as image:
         small = image.convert("RGB")

@@ -22,7 +22,7 @@ _stopped: set[str] = set()  # batches that were interrupted
 class Task(Entry):
     """Hold a surface of a batch and all options of its result.
 
-    statement: the problem to solve, None to parameterize the surface alone. vector: write curves as PDF, too.
+    statement: the problem to solve, None for the map alone. vector: whether curves are also written as PDF.
     """
 
     mapping: MapOptions
@@ -36,7 +36,7 @@ Work = Callable[[Task, int, str], Ended]
 def compute(task: Task, number: int, batch: str) -> Ended:
     """Compute a surface into its folder, from its checkpoint where there is one, and return its end.
 
-    number: of the surface in the batch, for the messages of progress.
+    number: the number of the surface in the batch, for the messages of progress.
     """
     from distributed import get_worker
 

@@ -1,4 +1,4 @@
-"""The command line: the commands, their progress, their answers and these exit codes."""
+"""Holds the command line: its commands, their progress, their answers and these exit codes."""
 
 DONE = 0
 BAD_INPUT = 2

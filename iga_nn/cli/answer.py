@@ -1,4 +1,4 @@
-"""Words the answer of a command that is done, and finds its exit code."""
+"""Words the answer of a finished command, and chooses its exit code."""
 
 from itertools import zip_longest
 from typing import Any
@@ -28,7 +28,10 @@ def batch_exit_code(batch: Batch) -> int:
 
 
 def verdict_in_words(outcome: Outcome) -> str:
-    """Return a finished run for a reader: numbers, advice, and last the verdict, the error and the page to open."""
+    """Return a finished run as text for the terminal.
+
+    The text has the numbers and the advice, and last the verdict, the error and the page to open.
+    """
     verdict = reports.verdict(outcome.report, outcome.folder)
     lines = []
     for scale, arap in verdict.get("arap", {}).items():
@@ -49,14 +52,14 @@ def verdict_in_words(outcome: Outcome) -> str:
 
 
 def _level(level: dict[str, Any]) -> str:
-    """Return the errors of one mesh, its unknowns, and whether the numbers are to be trusted."""
+    """Return the errors of one mesh, its number of unknowns, and whether the numbers are to be trusted, as text."""
     errors = [f"{TITLES[key]} {level[key]:.3e}, " for key in SHOWN_ERRORS if level.get(key) is not None]
     end = ("" if level["converged"] else ", NOT CONVERGED") + ("" if level["meaningful"] else ", MEANINGLESS")
     return f"{''.join(errors)}{level['dofs']:,} unknowns, {level['iterations']} iterations{end}"
 
 
 def volume_in_words(facts: reports.Report) -> str:
-    """Return the facts that `check` found out about a volume, the verdicts first."""
+    """Return the facts of `check` about a volume as text, the verdicts first."""
     others = {key: value for key, value in facts.items() if key not in ("bijective", "boundary_injective")}
     report = {"parameterization": facts}
     proved = {reports.claim(report): facts["bijective"], "one-to-one": reports.one_to_one(report)}
@@ -64,7 +67,7 @@ def volume_in_words(facts: reports.Report) -> str:
 
 
 def surface_in_words(facts: dict[str, Any]) -> str:
-    """Return the facts that `check` found out about a surface, and a line for each group of faces and each region."""
+    """Return the facts of `check` about a surface as text, with a line for each group of faces and each region."""
     others = {key: value for key, value in facts.items() if key not in ("groups", "regions")}
     groups = [f"{'group:':16s} {g['name']}, {g['faces']} faces, area {g['area']:.6g}" for g in facts["groups"]]
     regions = [f"{'region:':16s} {_region(found)}" for found in facts.get("regions", ())]
@@ -77,7 +80,7 @@ def _region(found: dict[str, Any]) -> str:
 
 
 def facts_in_words(facts: dict[str, Any]) -> str:
-    """Return the facts that `check` found out, one a line."""
+    """Return the facts of `check` as text, one a line."""
     return "\n".join(f"{key + ':':16s} {_text(value)}" for key, value in facts.items())
 
 

@@ -23,7 +23,7 @@ from ..options import (
 
 
 def converted(kind: Any, tokens: Sequence[Token]) -> Any:
-    """Convert an argument as cyclopts does, but refuse a fraction for a whole number: it would be rounded."""
+    """Convert an argument as cyclopts does, but refuse a fraction for a whole number, which cyclopts would round."""
     if int in (kind, *get_args(kind)) and (wrong := [token for token in tokens if "." in token.value]):
         raise CycloptsError(msg=f"{wrong[0].keyword}: must be a whole number, got {wrong[0].value}")
     return convert(kind, tokens)
@@ -43,7 +43,7 @@ Json = Annotated[bool, Parameter(name="--json", help="print the verdict as JSON.
 
 @dataclass(frozen=True)
 class OutputOptions:
-    """Options of the output folder and of the terminal.
+    """Hold the options of the output folder and of the terminal.
 
     Args:
         out: output folder; the input's stem in the current folder by default.
@@ -66,7 +66,7 @@ class OutputOptions:
 
 @dataclass(frozen=True)
 class PageOptions(MapOptions):
-    """Options of the map for all surfaces of the live page, without those of a single surface."""
+    """Hold the options of the map for all surfaces of the live page, without those of a single surface."""
 
     corners: Annotated[Path | None, Parameter(parse=False)] = None
     resume: Annotated[bool, Parameter(parse=False)] = False

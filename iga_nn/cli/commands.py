@@ -248,10 +248,10 @@ def check(
     Args:
         path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
         strict: refuse a surface that intersects itself; by default this is a notice.
-        region: regions of the surface, such as "nz > 0.9 and x < 2"; the answer has the area of each and the number of
-            triangles that lie mostly in it, and a region without a point of the surface is refused.
+        region: regions of the surface, such as "nz > 0.9 and x < 2"; the answer has the area of each region and the
+            number of triangles that lie mostly in it; a region without a point of the surface is refused.
         picture: PNG of the surface to write, with the regions in colours.
-        force: replace that picture where it exists.
+        force: replace an existing picture.
     """
     from ..io.formats import is_volume, load_volume
     from ..models import resolve
@@ -300,7 +300,7 @@ def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) 
     """Write a published model as an OBJ file; download it where it is not at hand.
 
     Args:
-        name: one of the models, or g1 for all those of the set G1.
+        name: one of the models, or g1 for all models of the set G1.
     """
     from ..models import fetch_all
 
@@ -328,11 +328,11 @@ def export_volume(
         out: file to write; the volume's stem with the format's ending in the current folder by default.
         solution: solution.npz to export, too: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
             NAME_u.json).
-        samples: of a view, cells per span of the solution and direction; 3 by default, fewer where the view would have
-            more than a million cells.
-        quantity: of a view with a solution, quantities beside u, such as stress, von_mises, principal, strain,
-            gradient, flux.
-        force: replace that file where it exists.
+        samples: number of cells of a view per span of the solution and direction; 3 by default, fewer where the view
+            would have more than a million cells.
+        quantity: quantities in a view of a solution, beside u, such as stress, von_mises, principal, strain, gradient,
+            flux.
+        force: replace an existing file.
     """
     from ..io.formats import export
 
@@ -347,7 +347,7 @@ def compare_runs(one: Path, other: Path, /, *, out: Path = Path("compare.html"),
         one: output folder of a run.
         other: output folder of another run; ratios are its numbers over those of the first run.
         out: page to write.
-        force: replace that file where it exists.
+        force: replace an existing file.
     """
     from ..new_file import check_new, save_new
     from ..report import comparison

@@ -34,7 +34,7 @@ Show = Callable[..., None]  # Display.show
 
 
 class Display:
-    """Shows the progress of a command: a bar on a terminal, else a line at each new stage and every ten seconds."""
+    """Show the progress of a command: a bar on a terminal, otherwise a line at each new stage and every ten seconds."""
 
     def __init__(self, console: Console, *columns: ProgressColumn) -> None:
         state = TextColumn("{task.fields[state]}", table_column=Column(ratio=1, no_wrap=True))  # is cut off first
@@ -52,7 +52,7 @@ class Display:
         self._stage, self._printed = "", time.monotonic()
 
     def show(self, line: str, stage: str = "", **now: Any) -> None:
-        """Take the state after a change: as a line, and as the present task of the bar."""
+        """Show a new state of the command, as a line and as the present task of the bar."""
         self.bar.update(self._task, visible=True, **now)
         if self.bar.disable and (stage != self._stage or time.monotonic() - self._printed >= PLAIN_INTERVAL):
             self.bar.console.print(Text(line), soft_wrap=True)
@@ -60,14 +60,14 @@ class Display:
 
 
 def tell_run(show: Show, now: Progress) -> None:
-    """Show the state of a run: the stage, its steps, folds, time left and loss."""
+    """Show the state of a run: the stage, its steps, folded samples, time left and loss."""
     state = describe(now)
     line = f"{now.stage:8s} step {now.step}/{now.steps}, {state}"
     show(line, now.stage, description=now.stage, completed=now.step, total=now.steps, state=state)
 
 
 def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
-    """Show the state of a batch: the number of ended surfaces, and the stage and share of the running ones."""
+    """Show the state of a batch: the number of finished surfaces, and the stage and share of the running surfaces."""
     total = len(batch.rows)
     ended = total - batch.counts.get("waiting", 0)
     state = (
@@ -79,7 +79,7 @@ def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
 
 
 def describe(progress: Progress) -> str:
-    """Return folds, time left and loss as text; the seconds of the spline fit are known only while it runs."""
+    """Return folded samples, time left and loss as text; the seconds of the spline fit are known only while it runs."""
     minutes, seconds = divmod(math.ceil(max(0.0, progress.seconds_left)), 60)
     left = f"{minutes}:{seconds:02d} left"
     folds = f"{progress.folded} fold{'s' * (progress.folded != 1)}"
@@ -88,7 +88,7 @@ def describe(progress: Progress) -> str:
 
 
 class _ConsoleHandler(logging.Handler):
-    """Prints log records as single lines above the bar; the same warning once."""
+    """Print log records as single lines above the bar; a repeated warning is printed once."""
 
     def __init__(self, console: Console) -> None:
         super().__init__()
@@ -114,7 +114,7 @@ def shown_progress(quiet: bool) -> Iterator[ProgressCallback | None]:
 
 @contextmanager
 def shown_batch(quiet: bool) -> Iterator[BatchProgress | None]:
-    """Do the same for a batch."""
+    """Show the progress and the log of a batch on stderr while the block runs; only warnings where `quiet`."""
     with _shown(quiet, BarColumn(20), TextColumn("{task.fields[ended]}")) as show:
         yield show and partial(tell_batch, show)
 

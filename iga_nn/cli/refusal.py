@@ -14,7 +14,7 @@ _FAR_HINT = re.compile(r"(Unknown option: \W*(\w).*?) Did you mean --(?!\2).*")
 
 
 def refusal(error: Exception, argv: list[str]) -> str:
-    """Return the fault and its remedy, in one line."""
+    """Return the fault of a command line and its remedy, in one line."""
     if isinstance(error, UnusedCliTokensError):
         return f"unknown arguments: {' '.join(error.unused_tokens or ())}; --help lists the arguments"
     if isinstance(error, CycloptsError):
@@ -23,7 +23,7 @@ def refusal(error: Exception, argv: list[str]) -> str:
 
 
 def _minus_hint(argv: list[str]) -> str:
-    """Return the remedy where a formula was taken for an option; options of the type `Formula` take formulas."""
+    """Return the remedy where a formula was read as an option; options of the type `Formula` take formulas."""
     formulas = {field.name for kind in PROBLEMS.values() for field in fields(kind) if "Formula" in str(field.type)}
     for option, value in pairwise(argv):
         if option.removeprefix("--").replace("-", "_") in formulas and value.startswith("-"):

@@ -21,8 +21,8 @@ class StudyOptions(Checked):
 
     Attributes:
         exact: the solution, a formula in x, y, z or X, Y, Z (scaled to volume 1 about the middle); exp(X+Z)*sin(Y) by
-            default. One that starts with a minus is written --exact=-x.
-        degree: one or more degrees; that of the map by default.
+            default. A formula that starts with a minus is written --exact=-x.
+        degree: one or more degrees; the degree of the map by default.
         refine: levels to solve on, 0 1 2 or 0..2; level n halves every knot span of the map n times.
     """
 
@@ -77,7 +77,7 @@ class ElasticityStudyOptions(StudyOptions):
 
 @dataclass(frozen=True)
 class ModesOptions(Checked):
-    """Options of the vibrations of an elastic body: its material, its supports and the number of modes.
+    """Hold the options of the vibrations of an elastic body: its material, its supports and the number of modes.
 
     Attributes:
         young: Young's modulus E.
@@ -88,7 +88,7 @@ class ModesOptions(Checked):
             u0; without any the body is free, and its rigid motions are left out.
         roller: regions held along their normal only.
         refine: number of times that every knot span of the map is halved.
-        degree: degree of the trial space; that of the map by default.
+        degree: degree of the trial space; the degree of the map by default.
     """
 
     young: float = 1.0
@@ -115,7 +115,7 @@ class ModesOptions(Checked):
 
 
 def _range(text: str) -> list[int]:
-    """Return a level, or all from the first to the last of "0..4". Raises InputError."""
+    """Return a level, or all levels from the first to the last of "0..4". Raises InputError."""
     first, dots, last = text.partition("..")
     if not (first.isdecimal() and (last.isdecimal() or not dots)):
         raise InputError(f"refine {text!r}: write levels such as 0 1 2, or a range such as 0..2")

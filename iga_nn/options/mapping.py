@@ -1,6 +1,6 @@
-"""Holds the options of a surface and of the map that is made of it.
+"""Holds the options of a surface and of the map that is made from it.
 
-Annotations are evaluated here: a subclass in another module would look their names up there.
+Annotations are evaluated in this module: a subclass in another module would look up their names in that module.
 """
 
 from dataclasses import dataclass, fields
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceOptions(Checked):
-    """Options of the surface that is read from a file.
+    """Hold the options of the surface that is read from a file.
 
     Attributes:
-        component: number of the connected component that is taken, counted from 0.
+        component: number of the connected component to use, counted from 0.
         max_faces: refuse surfaces with more faces.
         decimate: reduce surfaces with more faces to max_faces instead; a notice has the distance from the original.
     """
@@ -37,7 +37,7 @@ class SurfaceOptions(Checked):
 
 @dataclass(frozen=True)
 class MapOptions(SurfaceOptions):
-    """Options of the map from the cube to the solid inside a surface.
+    """Hold the options of the map from the cube to the solid inside a surface.
 
     Attributes:
         preset: "fast", made for two CPU cores; "grown", where every map grows from a cube, also of easy shapes; or
@@ -51,9 +51,9 @@ class MapOptions(SurfaceOptions):
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
         resume: continue from the checkpoint in the output folder.
         steps_factor: factor of the training steps of every stage; a small factor gives a quick look.
-        tolerance: of control_points "auto": largest root mean square distance between surface and spline, in both
+        tolerance: largest root mean square distance between surface and spline for control_points "auto", in both
             directions, over the diagonal of the surface's bounding box.
-        max_control_points: of control_points "auto": largest number per direction, 30 or more; "auto" starts with 30.
+        max_control_points: largest number per direction for control_points "auto", 30 or more.
 
     Examples:
         >>> import iga_nn
@@ -91,7 +91,7 @@ class MapOptions(SurfaceOptions):
 
     @property
     def most_control_points(self) -> int:
-        """Return the largest number of control points a direction may get."""
+        """Return the largest number of control points that a direction may have."""
         return self.max_control_points if self.control_points == "auto" else self.control_points
 
 

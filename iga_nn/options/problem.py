@@ -35,15 +35,15 @@ NO_UNITS = Units()
 
 @dataclass(frozen=True)
 class ProblemOptions(Checked, ABC):
-    """Options of every PDE of the command line: its exact solution, its meshes, and its quadrature.
+    """Hold the options of every PDE of the command line: its exact solution, its meshes, and its quadrature.
 
     A new PDE is a subclass with options of its own, entered in PROBLEMS.
 
     Attributes:
         refine: levels to solve on; level n halves every knot span of the map n times.
-        degree: degree of the trial space; that of the map by default.
-        quadrature: rule of the operator: "spline", the fewest points that keep the error of "gauss+1", degree + 1 Gauss
-            points a span; "gauss", degree points a span.
+        degree: degree of the trial space; the degree of the map by default.
+        quadrature: quadrature rule of the operator: "gauss+1", degree + 1 Gauss points a span; "gauss", degree points a
+            span; "spline", the fewest points with the same error as "gauss+1".
         unit: unit of lengths, such as mm; free text that is shown behind lengths and places and changes no number.
     """
 
@@ -71,7 +71,7 @@ class ProblemOptions(Checked, ABC):
 
     @property
     def units(self) -> Units:
-        """Return the units beside colour bars."""
+        """Return the units for colour bars."""
         return NO_UNITS
 
     def solve_options(self) -> SolveOptions:
@@ -96,7 +96,7 @@ class PoissonOptions(ProblemOptions):
         boundary: g, the values of u, a formula.
         kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz.
         reaction: c, a formula.
-        neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for that of the exact solution.
+        neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for the flux of the exact solution.
         robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
             solution.
         value: regions of the boundary with given values of u, each as "REGION=FORMULA", or REGION for zero or the exact
@@ -160,12 +160,12 @@ class ElasticityOptions(ProblemOptions):
     vector.
 
     Attributes:
-        exact: exact displacement, a vector, from which force and boundary data follow; errors are reported. One that
-            starts with a minus is written --exact="-x;0;0".
+        exact: exact displacement, a vector, from which force and boundary data follow; errors are reported. A vector
+            that starts with a minus is written --exact="-x;0;0".
         body_force: force per volume, a vector; zero where neither it nor exact is given.
         displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
         traction: faces where a traction is given, each as "FACE=VECTOR", FACE=0 for a face that is free, or FACE for
-            that of the exact solution.
+            the traction of the exact solution.
         young: Young's modulus E.
         poisson_ratio: Poisson's ratio nu.
         fix: regions of the boundary that are held, each as REGION, or "REGION=VECTOR" for a given displacement; an
@@ -203,12 +203,12 @@ class ElasticityOptions(ProblemOptions):
     title: ClassVar[str] = "linear elasticity"
 
     def solve_options(self) -> SolveOptions:
-        """Return the options of the solve on the finest mesh: a slender body takes more iterations than a scalar."""
+        """Return the options of the solve on the finest mesh; a slender body needs more iterations than a scalar."""
         return replace(super().solve_options(), max_iterations=MOST_ITERATIONS)
 
     @property
     def units(self) -> Units:
-        """Return the units beside colour bars."""
+        """Return the units for colour bars."""
         return Units(self.unit, self.stress_unit)
 
     def problem(self) -> Elasticity:

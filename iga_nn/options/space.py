@@ -1,4 +1,4 @@
-"""Checks the trial spaces that options ask for: levels, degrees, and the number of unknowns."""
+"""Checks the trial spaces that options define: levels, degrees, and the number of unknowns."""
 
 from __future__ import annotations
 
@@ -34,8 +34,9 @@ def check_level(level: int) -> None:
 
 
 def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1, processes: int = 1) -> int:
-    """Return the number of unknowns on a mesh of the volume. Raises InputError where they are too many for as many
-    processes.
+    """Return the number of unknowns on a mesh of the volume.
+
+    Raises InputError where there are too many unknowns for this number of processes.
     """
     from solve.discretization.space import trial_space
 

@@ -13,7 +13,7 @@ _QUOTED = re.compile("\"[^\"]*\"|'[^']*'")
 
 
 def faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
-    """Return FACE=TEXT and FACE entries as a table. Raises InputError for a face named twice."""
+    """Return FACE=TEXT and FACE entries as a table. Raises InputError for a face with two entries."""
     found: dict[str, str | None] = {}
     for entry in entries:
         face, equals, text = entry.partition("=")
@@ -24,10 +24,10 @@ def faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
 
 
 def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) -> dict[str, Any] | None:
-    """Return REGION=DATA and REGION entries as a table, None without entries. Raises InputError for a region twice.
+    """Return REGION=DATA and REGION entries as a table, None without entries.
 
-    read: converts the text of the data; an entry without data has None. The = of <= and >=, and quoted text, belong to
-    the region.
+    read: the function that converts the text of the data; an entry without data has None. The = of <= and >=, and
+    quoted text, belong to the region. Raises InputError for a region with two entries.
     """
     found: dict[str, Any] = {}
     for entry in entries:
@@ -42,7 +42,7 @@ def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) ->
 
 
 def pair(text: str) -> tuple[str, str]:
-    """Return the factor and the value outside of ALPHA:OUTSIDE. Raises InputError."""
+    """Return the factor and the value outside from ALPHA:OUTSIDE. Raises InputError for another text."""
     factor, colon, outside = text.partition(":")
     if not (factor.strip() and colon and outside.strip()):
         raise InputError(f"exchange {text!r:.80}: write REGION=ALPHA:OUTSIDE, such as 'nz > 0.9=25:20'")
@@ -56,7 +56,7 @@ def parts(text: str) -> list[str | None] | None:
 
 
 def vector(flag: str, text: str | None) -> list[str] | None:
-    """Return the formulas of a vector; "0" is the zero vector. Raises InputError where they are not three."""
+    """Return the formulas of a vector; "0" is the zero vector. Raises InputError where there are not three formulas."""
     if text is None:
         return None
     entries = ["0"] * 3 if text.strip() == "0" else text.split(";")

@@ -11,7 +11,7 @@ _LOCAL = ("workers", "threads_per_worker", "memory_limit")  # options that anoth
 
 @dataclass(frozen=True, kw_only=True)
 class WorkerOptions(Checked):
-    """Options of the workers that compute the surfaces of a batch.
+    """Hold the options of the workers that compute the surfaces of a batch.
 
     Attributes:
         workers: worker processes on this machine; each computes one surface at a time.

@@ -1,4 +1,4 @@
-"""Advice on a map that is not certified: the places without a proof, and the remedies."""
+"""Advises on a map that is not certified: the places without a proof, and the remedies."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ SHOWN = 5  # places
 
 
 def span_parameters(volume: BSplineVolume, spans: IntArray) -> Array:
-    """Return the midpoints (k, 3), in the cube, of knot spans numbered by (k, 3)."""
+    """Return the midpoints (k, 3), in the cube, of knot spans with the numbers (k, 3)."""
     return np.stack([midpoints(knots)[spans[:, axis]] for axis, knots in enumerate(volume.knots)], axis=1)
 
 
@@ -27,7 +27,7 @@ def span_places(volume: BSplineVolume, spans: IntArray) -> Array:
 
 
 def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
-    """Return an entry of the section `parameterization`: the number of spans without a proof, and the places of a few.
+    """Return an entry of the section `parameterization`: the number of spans without a proof, and some of their places.
 
     The first place is the worst fold found, where there is one.
     """
@@ -42,9 +42,9 @@ def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
 
 
 def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
-    """Return remedies for a map that is not certified, the most promising first; none for a certified one.
+    """Return remedies for a map that is not certified, the most promising first; an empty list for a certified map.
 
-    mapping: those the map was made with, where they are known.
+    mapping: the options of the map, where they are known.
     """
     if is_certified(report):
         return []
@@ -68,7 +68,7 @@ def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
 
 
 def in_words(report: Report) -> list[str]:
-    """Return the places and the remedies, one a line; none for a certified map."""
+    """Return the places and the remedies, one a line; an empty list for a certified map."""
     quality, lines = report["parameterization"], []
     if found := quality.get("unproved"):
         places = ", ".join(map(in_brackets, found["places"]))

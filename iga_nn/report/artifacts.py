@@ -23,9 +23,9 @@ SECTIONS: dict[str, Part] = {"config": "map", **dict.fromkeys(PROBLEMS, "solutio
 class Artifact:
     """Describe one file of an output folder.
 
-    part: the part of a run that writes it. shows: the content of the file or the heading of the figure.
-    draw: module and function of `iga_nn.figures` that draw the figure from `takes`, the names of what must be known;
-    the figure is left out where one of them is not. arrays: names in an archive.
+    part: the part of a run that writes it. shows: the content of the file or the heading of the figure. draw: module
+    and function of `iga_nn.figures` that draw the figure from `takes`, the names of the values that it needs; the
+    figure is left out where one of these values is unknown. arrays: names in an archive.
     """
 
     file: str

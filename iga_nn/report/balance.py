@@ -1,6 +1,6 @@
-"""Shows the loads on a body and the reactions of its supports, from a level of report.json; older ones lack them.
+"""Shows the loads on a body and the reactions of its supports, from a level of report.json; older levels lack them.
 
-Of elasticity these are forces, of a scalar law inflows. Forces have the unit of stresses times that of areas.
+For elasticity these are forces, for a scalar law inflows. The unit of forces is that of stresses times that of areas.
 """
 
 from typing import Any
@@ -17,9 +17,9 @@ def heading(section: dict[str, Any]) -> str:
 
 
 def table(section: dict[str, Any]) -> list[list[str]]:
-    """Return the head of a table, and a row for the load, for each support and for the rest that is not balanced.
+    """Return the head of a table, and a row for the load, for each support and for the imbalance.
 
-    Empty where the finest level has no reactions.
+    The table is empty where the finest level has no reactions.
     """
     level = _finest(section)
     if not level.get("reactions"):
@@ -34,7 +34,7 @@ def table(section: dict[str, Any]) -> list[list[str]]:
 
 
 def lines(section: dict[str, Any]) -> list[str]:
-    """Return a line for the load and one for each support; none where the finest level has no reactions."""
+    """Return a line for the load and one for each support; an empty list where the finest level has no reactions."""
     level = _finest(section)
     if not level.get("reactions"):
         return []
@@ -53,13 +53,13 @@ def _is_force(section: dict[str, Any]) -> bool:
 
 
 def _behind(section: dict[str, Any]) -> str:
-    """Return the unit of forces, where those of stresses and of lengths are known."""
+    """Return the unit of forces, where the units of stresses and of lengths are known."""
     stress, length = section.get("stress_unit"), section.get("unit")
     return f"{stress}·{length}²" if stress and length else ""
 
 
 def _numbers(values: list[float], level: dict[str, Any]) -> list[str]:
-    """Return numbers as text; a number that is tiny beside the largest is 0."""
+    """Return numbers as text; a number that is tiny in comparison with the largest is written as 0."""
     everything = [*level["load"], *(value for force in level["reactions"].values() for value in force)]
     least = TINY * max(map(abs, everything))
     return [f"{value if abs(value) > least else 0.0:.5g}" for value in values]

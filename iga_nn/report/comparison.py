@@ -25,17 +25,17 @@ class Run:
 
     @classmethod
     def of(cls, folder: str | Path) -> "Run":
-        """Read an output folder. Raises InputError where it holds no finished run."""
+        """Return the run of an output folder. Raises InputError where the folder contains no finished run."""
         path = Path(folder)
         report = reports.read(path)
         if report is None or "parameterization" not in report:
             raise InputError(f"{path}: is no output folder of a run: its report.json is missing, damaged or unfinished")
         if not reports.is_finished(report):
-            raise InputError(f"{path}: the run there is not finished; compare it when it is")
+            raise InputError(f"{path}: the run in this folder is not finished; compare it after its end")
         return cls(path, report)
 
     def cells(self) -> dict[str, dict[str, Cell]]:
-        """Return the run's numbers in groups, each by its name."""
+        """Return the run's numbers in groups, each number by its name."""
         section = reports.solved(self.report)
         finest = section["levels"][-1] if section.get("levels") else {}
         return {
@@ -77,9 +77,9 @@ def _of_regions(level: Mapping[str, Any]) -> dict[str, Cell]:
 
 
 def rows(one: Run, other: Run) -> dict[str, list[list[str]]]:
-    """Return a table a group: the name of each number, its two values and the ratio of the second to the first.
+    """Return a table for each group: the name of each number, its two values and the ratio of the second to the first.
 
-    A dash stands for a number that a run lacks, and for a ratio to zero.
+    A dash is written for a number that a run lacks, and for a ratio to zero.
     """
     left, right = one.cells(), other.cells()
     found = {}
@@ -106,7 +106,7 @@ def as_text(one: Run, other: Run) -> str:
 
 
 def page(one: Run, other: Run) -> str:
-    """Return the page as text: the verdicts, the tables, the figures beside each other, and the commands."""
+    """Return the page as text: the verdicts, the tables, the figures side by side, and the commands."""
     runs = (one, other)
     drawn = [dict(html.figures(run.report, run.folder)) for run in runs]
     return html.filled(

@@ -24,7 +24,7 @@ Report = dict[str, Any]
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of the packages that decide the numbers, without those that are not installed."""
+    """Return the versions of the packages that influence the numbers, without packages that are not installed."""
     found = {"python": platform.python_version()}
     for name in ("numpy", "scipy", "torch"):
         with suppress(PackageNotFoundError):
@@ -55,12 +55,12 @@ def as_json(value: Any) -> str:
 
 
 def write(folder: Path, report: Mapping[str, Any]) -> None:
-    """Write report.json; atomic."""
+    """Write report.json atomically."""
     save_text(folder / REPORT, as_json(report) + "\n")
 
 
 def read(folder: Path) -> Report | None:
-    """Return the report in a folder, None where there is none of this schema or it is damaged."""
+    """Return the report in a folder; None where no report of this schema is there, or where it is damaged."""
     try:
         report = json.loads((folder / REPORT).read_text(encoding="utf-8"))
         if report["schema"] == SCHEMA and is_finished(report):
@@ -92,7 +92,7 @@ def is_converged(report: Report) -> bool:
 
 
 def is_meaningful(report: Report) -> bool:
-    """Return whether the numbers of the finest solve mean something; True where nothing was solved."""
+    """Return whether the numbers of the finest solve are meaningful; True where nothing was solved."""
     levels = solved(report).get("levels", [])
     return not levels or levels[-1].get("meaningful", True) is not False
 
@@ -112,8 +112,8 @@ def solved(report: Report) -> Report:
 def one_to_one(report: Report) -> str:
     """Return whether the map is one-to-one: "yes", "no" or "undecided".
 
-    "yes" takes both proofs, that det J has one sign and that the boundary does not meet itself; a fold or a meeting
-    place is a "no".
+    "yes" needs both proofs, that det J has one sign and that the boundary does not meet itself; "no" needs a fold or a
+    place where the boundary meets itself.
     """
     quality = report["parameterization"]
     if quality["bijective"] == "folded" or quality.get("boundary_injective") is False:
@@ -122,7 +122,7 @@ def one_to_one(report: Report) -> str:
 
 
 def control_points_in_words(report: Report) -> str:
-    """Return the number of control points of `auto`, and the reason for no more; empty where the number was given."""
+    """Return the number of control points of `auto`, and the reason why there are not more; "" for a given number."""
     if not (refinement := report["parameterization"].get("refinement")):
         return ""
     first, last, asked = refinement["levels"][0], refinement["levels"][-1], f"tolerance {refinement['tolerance']:.2g}"
@@ -143,16 +143,16 @@ def _size(level: Report) -> str:
 
 
 def surface_distance(report: Report) -> Report:
-    """Return rms, mean and max of the distance between surface and spline, both ways, over the box's diagonal.
+    """Return rms, mean and max of the distance between surface and spline in both directions, over the box's diagonal.
 
-    Empty where it is not known: of a volume without a surface, and in reports of older versions.
+    The result is empty where the distance is unknown: for a volume without a surface, and in reports of older versions.
     """
     measured = report["parameterization"].get("surface_distance", {})
     return measured.get("two_sided", {}).get("of_diagonal", {})
 
 
 def verdict(report: Report, folder: Path) -> Report:
-    """Return the entries that decide whether a result is used, as `--json` prints them."""
+    """Return the entries that decide whether a result can be used, as `--json` prints them."""
     quality = report["parameterization"]
     short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
     short |= {"orientation": quality["orientation"]} if "orientation" in quality else {}

@@ -1,7 +1,7 @@
-"""Tells the extremes of a solve's levels, beside each other, and whether the largest stress grows under refinement.
+"""Shows the extremes of a solve's levels side by side, and whether the largest stress grows under refinement.
 
-Levels and sections are those of report.json, of which older ones have no extremes. A section's `unit` and `stress_unit`
-are free text; they stand behind the numbers and change none.
+Levels and sections are those of report.json; older reports have no extremes. A section's `unit` and `stress_unit` are
+free text, which is shown behind the numbers and changes no number.
 """
 
 import math
@@ -25,22 +25,23 @@ TINY = 1e-6  # of the largest coordinate: smaller ones are shown as 0
 
 
 def lines(section: dict[str, Any]) -> list[str]:
-    """Return a line an extreme: its values on all levels and its place on the finest."""
+    """Return one line for each extreme: its values on all levels and its place on the finest level."""
     return [f"{said} {' → '.join(values)} {at}" for said, *values, at in _rows(section)]
 
 
 def table(section: dict[str, Any]) -> list[list[str]]:
-    """Return the head of a table and a row an extreme: its values on all levels, and its place on the finest.
+    """Return the head of a table and a row for each extreme: its values on all levels, its place on the finest level.
 
-    Empty where no extremes are known.
+    The table is empty where no extremes are known.
     """
     rows = _rows(section)
     return [["", *(f"{level['dofs']:,} unknowns" for level in _known(section)), "where"], *rows] if rows else []
 
 
 def finest(section: dict[str, Any]) -> dict[str, tuple[float, str]]:
-    """Return the extremes of the finest level: the words of each, with the unit -> its value, and this as text with
-    its place.
+    """Return the extremes of the finest level, by their words with the unit.
+
+    Each extreme is its value, and its value as text with its place.
     """
     found = {}
     for name, said, end, unit in _worded(section):
@@ -71,7 +72,7 @@ def growth_notices(section: dict[str, Any]) -> list[str]:
 
 
 def _place(point: Sequence[float], section: dict[str, Any]) -> str:
-    """Return a point for a reader: "(12.5, 0, 3.1) mm"."""
+    """Return a point as text: "(12.5, 0, 3.1) mm"."""
     least = TINY * max(map(abs, point))
     coordinates = ", ".join(f"{x if abs(x) > least else 0.0:.4g}" for x in point)
     return f"({coordinates}){_behind(section.get('unit'))}"
@@ -97,7 +98,7 @@ def _rows(section: dict[str, Any]) -> list[list[str]]:
 
 
 def _worded(section: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return the quantities of the finest level, each with its words, its end and its unit."""
+    """Return the quantities of the finest level, each with its words, the name of its extreme and its unit."""
     levels, found = _known(section), []
     for name in levels[-1]["extremes"] if levels else ():
         found.append((name, *SAYINGS.get(name, (f"{name} at most", "largest", ""))))

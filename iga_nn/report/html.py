@@ -1,6 +1,6 @@
-"""Writes report.html: the content of report.json, the figures and a view, in one file that fetches nothing.
+"""Writes report.html: the content of report.json, the figures and a view, in one file without external files.
 
-The page is laid out by the template page.html, which escapes whatever it is given; this module chooses its content.
+The template page.html lays out the page and escapes its content; this module chooses the content.
 """
 
 import base64
@@ -44,10 +44,10 @@ ORIGINS = {
 
 
 def write(folder: Path, report: Report, scene: dict[str, Any] | None) -> None:
-    """Write report.html from a finished report and the figures in its folder; atomic.
+    """Write report.html atomically from a finished report and the figures in its folder.
 
-    scene: for the interactive view, None where it could not be drawn. Where the page cannot be laid out, a bare one
-    with the text of report.json is written.
+    scene: the interactive view, None where it could not be drawn. Where the page cannot be laid out, a simple page with
+    the text of report.json is written.
     """
     try:
         text = page(report, scene, folder)
@@ -92,7 +92,7 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
 
 
 def filled(template: str, **content: Any) -> str:
-    """Return a template of this package with its content, which is escaped."""
+    """Return a template of this package filled with the content, which is escaped."""
     loader = PackageLoader("iga_nn", "")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters["rounded"] = rounded
@@ -100,7 +100,7 @@ def filled(template: str, **content: Any) -> str:
 
 
 def verdicts(report: Report) -> list[tuple[str, str, str]]:
-    """Return the verdicts that decide whether the result is used: colour, heading and meaning of each."""
+    """Return the verdicts that decide whether the result can be used: colour, heading and meaning of each."""
     quality, answer = report["parameterization"], reports.one_to_one(report)
     claim = reports.claim(report)
     meaning = MEANINGS[quality["bijective"]].format(claim=claim)
@@ -128,7 +128,7 @@ def _point(coordinates: list[float]) -> str:
 
 
 def _facts(report: Report) -> list[tuple[str, str, str]]:
-    """Return the numbers that matter: the name of each, the number and a remark."""
+    """Return the most important numbers: the name of each, the number and a remark."""
     quality = report["parameterization"]
     facts = []
     if "arap" in quality:
@@ -153,14 +153,14 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
 
 
 def _error_fact(level: Report, absolute: str, relative: str) -> tuple[str, str, str]:
-    """Return the relative error with the absolute one as the remark; where the solution is zero, that alone."""
+    """Return the relative error with the absolute error as the remark; for a zero solution the absolute error alone."""
     if level.get(relative) is None:
         return capitalized(TITLES[absolute]), f"{level[absolute]:.3e}", "on the finest mesh"
     return capitalized(TITLES[relative]), f"{level[relative]:.3e}", f"absolute {level[absolute]:.3e}"
 
 
 def _levels(section: Report) -> list[list[str]]:
-    """Return the table of levels: the titles of the numbers that are known, then a row a level."""
+    """Return the table of levels: the titles of the known numbers, then a row a level."""
     levels = section.get("levels", [])
     rates = {f"rate_{norm}": [None, *values] for norm, values in section.get("rates", {}).items()}
     rows = as_rows([level | {name: values[i] for name, values in rates.items()} for i, level in enumerate(levels)])
@@ -170,7 +170,7 @@ def _levels(section: Report) -> list[list[str]]:
 
 
 def notices(report: Report) -> list[str]:
-    """Return the notices of the surface and of the solves, and which figures are missing for which reason."""
+    """Return the notices of the surface and of the solves, and the missing figures with the reasons."""
     missing: dict[str, list[str]] = {}
     for name, reason in report.get("not_drawn", {}).items():
         missing.setdefault(reason, []).append(name)
@@ -179,12 +179,12 @@ def notices(report: Report) -> list[str]:
 
 
 def figures(report: Report, folder: Path) -> list[tuple[str, str]]:
-    """Return heading and picture, in Base64, of the figures that belong to this report and are there."""
+    """Return the headings and the pictures, in Base64, of the figures of this report whose files exist."""
     return [(heading, image) for _, heading, image in _drawn(report, folder)]
 
 
 def _drawn(report: Report, folder: Path) -> list[tuple[str, str, str]]:
-    """Return the same, the name of the file before each."""
+    """Return the file names, the headings and the pictures, in Base64, of this report's figures that exist."""
     there = [figure for figure in figures_of(report) if (folder / figure.file).is_file()]
     return [
         (each.file, capitalized(each.shows), base64.b64encode((folder / each.file).read_bytes()).decode("ascii"))

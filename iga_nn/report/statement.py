@@ -12,16 +12,16 @@ FROM_EXACT = "from the exact solution"
 
 
 def statement_of(report: Report) -> list[Row]:
-    """Return the equation that was solved and its data; of a study its exact solution, of a map alone nothing."""
+    """Return the equation of a report and its data; for a study the exact solution; for a map alone an empty list."""
     section = reports.solved(report)
     rows = _poisson(section) if "poisson" in report else _elasticity(section) if "elasticity" in report else []
     return rows + ([("exact solution", _text(section["exact"]))] if section.get("exact") else [])
 
 
 def regions_of(report: Report) -> list[tuple[str, ...]]:
-    """Return the head of a table and a row for every condition that is given on a region: kind, region, data, area.
+    """Return the head of a table and a row for every condition on a region: kind, region, data, area.
 
-    Empty where there is none.
+    The table is empty where there are no conditions on regions.
     """
     section = reports.solved(report)
     regions = section.get("regions") or report.get("regions") or []
@@ -59,14 +59,14 @@ def _elasticity(section: Report) -> list[Row]:
 
 
 def _derived(section: Report) -> str:
-    """Return the meaning of data that are not given."""
+    """Return the text for data that are not given."""
     return FROM_EXACT if section.get("exact") else "0"
 
 
 def _rest(section: Report, essential: str, key: str, natural: str, faces: Sequence[Row]) -> Row:
-    """Return the data on the rest of the boundary: natural data where regions are named, else essential ones.
+    """Return the data on the rest of the boundary: natural data where regions are named, otherwise essential data.
 
-    key: under which the section has them. faces: those with data of their own.
+    key: the key of the essential data in the section. faces: the faces that have data of their own.
     """
     if section.get("regions"):
         return f"{natural} outside the regions below", _derived(section)
@@ -75,7 +75,7 @@ def _rest(section: Report, essential: str, key: str, natural: str, faces: Sequen
 
 
 def _faces(entries: Sequence[str]) -> list[Row]:
-    """Return the face and the data, "" for none, of entries such as "u1=0;0;-1" and "v0"."""
+    """Return the face and the data of entries such as "u1=0;0;-1" and "v0"; the data are "" where they are absent."""
     return [(face, data) for face, _, data in (entry.partition("=") for entry in entries)]
 
 

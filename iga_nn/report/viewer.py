@@ -1,11 +1,11 @@
 """Makes the interactive scene of report.html: a volume and the fields on it as compact arrays for the page's script.
 
-The six faces are sampled on lattices of points, the inside on one lattice through the cube, from which the page takes
-its sections. Places are 16-bit numbers between two corners of the scene, values 16-bit numbers between the ends of
-their range, all in Base64: some 0.7 MB for the places and for displacements, 0.25 MB for every other field.
+The six faces are sampled on lattices of points, and the inside on one lattice through the cube, from which the page
+takes its sections. Places are 16-bit numbers between two corners of the scene, values 16-bit numbers between the ends
+of their range, all in Base64: some 0.7 MB for the places and for displacements, 0.25 MB for every other field.
 
-A scene has one frame, or several: modes, or steps in time. A frame holds the values of its fields by their names; what
-it does not hold is that of the first one.
+A scene has one frame, or several: modes, or steps in time. A frame holds the values of its fields by their names;
+fields that a frame does not have are taken from the first frame.
 """
 
 import base64
@@ -53,8 +53,9 @@ EVEN = 0.01  # of a field's range: where half of the boundary varies less, the v
 class Frame:
     """Hold one mode, or one step in time: its fields, and its name beside the slider.
 
-    label: such as "mode 1: 12.5 Hz" or "t = 0.1 s". fields: the first is shown first. vectors: (..., 3), or None.
-    displaces: whether the vectors displace the body. knots: of the mesh that is drawn, those of the volume by default.
+    label: a text such as "mode 1: 12.5 Hz" or "t = 0.1 s". fields: the first field is shown at first. vectors: (...,
+    3), or None. displaces: whether the vectors displace the body. knots: the knots of the mesh that is drawn, by
+    default the knots of the volume.
     """
 
     label: str
@@ -93,9 +94,9 @@ def scene_of(
     units: Units = NO_UNITS,
     coarser: int = 1,
 ) -> Scene:
-    """Return the content for the script, in JSON's own types; solution and error only where known and finite.
+    """Return the content for the script, in JSON's own types; solution and error are present where known and finite.
 
-    units: behind the titles of the bars. coarser: 2 leaves out every second point.
+    units: the units in the titles of the bars. coarser: 1 for all points, 2 for every second point.
     """
     if solution is None or not np.all(np.isfinite(solution.coefficients)):
         return _scene(volume, [Frame("", [])], coarser)
@@ -107,7 +108,7 @@ def scene_of(
 
 
 def _with_unit(field: Field, units: Units) -> Field:
-    """Return a field whose title has its unit."""
+    """Return a field with its unit in the title."""
     return replace(field, title=with_unit(field.title, units.stress if field.name == STRESS else units.displacement))
 
 
@@ -153,7 +154,7 @@ def scene_of_frames(
 
 
 def _scene(volume: BSplineVolume, frames: Sequence[Frame], coarser: int) -> Scene:
-    """Return a scene of frames with the same fields; the distortion of the volume joins those of the first."""
+    """Return a scene of frames with the same fields; the distortion of the volume joins the first frame's fields."""
     points = points_of(volume)
     cloud = np.concatenate([where.reshape(-1, 3) for where in points.everywhere])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
@@ -183,15 +184,15 @@ def _scene(volume: BSplineVolume, frames: Sequence[Frame], coarser: int) -> Scen
 
 
 def _bound(frames: Sequence[Frame]) -> float:
-    """Return the largest entry of all vectors, 1 where there is none."""
+    """Return the largest entry of all vectors, 1 where there are no vectors."""
     parts = [values for frame in frames if frame.vectors is not None for values in frame.vectors.everywhere]
     return max((float(np.abs(values).max()) for values in parts), default=0.0) or 1.0
 
 
 def _opening(frame: Frame) -> dict[str, str]:
-    """Return the first view: the first field, on the boundary, unless half of that has nearly one value.
+    """Return the first view: the first field, on the boundary, unless half of the boundary has nearly one value.
 
-    A body is seen as a whole: its shape says more than the colours of its inside.
+    A body is seen as a whole, because its shape is more informative than the colours inside.
     """
     if not frame.fields:
         return {"field": "faces", "part": "surface"}
@@ -202,7 +203,7 @@ def _opening(frame: Frame) -> dict[str, str]:
 
 
 def _described(field: Field, frame: Frame) -> dict[str, Any]:
-    """Return the words of a field for the controls and the bar; the page finds its values from vectors where it can."""
+    """Return the words of a field for the controls and the bar; the page computes its values from vectors if it can."""
     limits = field.limits
     described = {"name": field.name, "title": field.title, "low": limits.low, "high": limits.high}
     described |= {"logarithmic": limits.logarithmic, "remark": limits.remark}
@@ -214,7 +215,7 @@ def _is_derived(field: Field, frame: Frame) -> bool:
 
 
 def _values(frame: Frame, bound: float, coarser: int) -> dict[str, Any]:
-    """Return the values of a frame, as places between the ends of their ranges."""
+    """Return the values of a frame, as shares of their ranges."""
     values = {
         field.name: _both(field, coarser, field.limits.shares)
         for field in frame.fields
@@ -225,14 +226,17 @@ def _values(frame: Frame, bound: float, coarser: int) -> dict[str, Any]:
 
 
 def _both(samples: Samples, coarser: int, shares: Callable[[Array], Array]) -> dict[str, str]:
-    """Return the packed shares of samples, on the faces and in the lattice."""
+    """Return the packed shares of samples, on the faces and in the inner lattice."""
     return {
         name: _packed(shares(part)) for name, part in zip(("faces", "lattice"), _thinned(samples, coarser), strict=True)
     }
 
 
 def _thinned(samples: Samples, coarser: int) -> tuple[Array, Array]:
-    """Return every second point on the six faces (6, m, m, ...) and all in the lattice; fewer, where `coarser` is 2."""
+    """Return every second point on the six faces (6, m, m, ...) and all points in the lattice.
+
+    With `coarser` 2 both have half as many points a direction.
+    """
     step = slice(None, None, coarser)
     faces = np.stack([patch[:: 2 * coarser, :: 2 * coarser] for patch in samples.patches[:6]])
     return faces, samples.lattice[step, step, step]

@@ -1,4 +1,4 @@
-"""Writes the command that repeats a result, from the options it was made with."""
+"""Writes the command that repeats a result, from the options of the result."""
 
 import shlex
 from dataclasses import fields
@@ -28,7 +28,7 @@ def command_line(command: str, source: str | Path, *chosen: Any, **given: Any) -
 def gives_the_same(one: str, other: str) -> bool:
     """Return whether two such lines give the same result.
 
-    They differ at most in the output folder, and in the names of the same file.
+    The lines may differ in the output folder, and in the names of the same file.
     """
     return _without_folder(one) == _without_folder(other)
 
@@ -42,7 +42,7 @@ def _without_folder(line: str) -> list[str]:
 
 
 def _as_path(word: str) -> str:
-    """Return the absolute path where the word names something that is there, else the word itself."""
+    """Return the absolute path of a word that names an existing file or folder, otherwise the word itself."""
     try:
         return str(Path(word).resolve(strict=True))
     except (OSError, RuntimeError, ValueError):  # most words are options and formulas

@@ -1,8 +1,9 @@
 """Estimates the time and the memory of a run, and the memory of a solve, before it starts.
 
-The cost of a run comes from counts and the time of two small pieces of work on all threads: a pass (the network forward
-and backward on 1000 points) and a product with the second derivative of the spline's distortion. Their number in a run
-was measured on conch and duck, and for hard surfaces on bone and homer. The cost of a solve comes from counts alone.
+The cost of a run follows from counts and the time of two small pieces of work on all threads: a pass (the network
+forward and backward on 1000 points) and a product with the second derivative of the spline's distortion. The number of
+these pieces in a run was measured on conch and duck, and for hard surfaces on bone and homer. The cost of a solve
+follows from counts alone.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ EVERYWHERE = 3  # an unknown: the solution, whole on every process
 class Forecast:
     """Hold the cost of one start, the section `estimate` of report.json.
 
-    seconds: for an easy and for a hard surface. memory_mb: peak of the resident memory. after: of the seconds for an
-    easy surface, those after the training, and those after the spline.
+    seconds: the seconds for an easy and for a hard surface. memory_mb: the peak of the resident memory. after: for an
+    easy surface, the seconds after the training and the seconds after the spline stage.
     """
 
     seconds: tuple[float, float]
@@ -89,10 +90,10 @@ def forecast(
     unknowns: int = 0,
     clock: Clock = time.perf_counter,
 ) -> Forecast:
-    """Return the estimate for this machine, as busy as it is now.
+    """Return the estimate for this machine under its present load.
 
-    unknowns: of the largest problem that is solved afterwards. A second start, where the first is not certified, takes
-    as long again.
+    unknowns: the number of unknowns of the largest problem that is solved afterwards. A second start, where the first
+    map is not certified, takes the same time again.
     """
     from parameterize.training.backend import one_thread_an_operation
     from parameterize.training.effort import points_of_a_step
@@ -123,7 +124,10 @@ def forecast(
 
 
 def _training_steps(config: Config) -> tuple[float, float]:
-    """Return the steps for an easy surface, and those that show one to be hard: the first stage's, or none."""
+    """Return the training steps for an easy surface, and for a hard one: those of the first stage, or none.
+
+    The first stage shows whether a surface is hard.
+    """
     steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
     steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.name == "cube"), 0))
     if limit is None or config.starts == 1:
@@ -132,7 +136,7 @@ def _training_steps(config: Config) -> tuple[float, float]:
 
 
 def _growths(most: int, control_points: int) -> list[float]:
-    """Return the factors by which the control points are more after each refinement, up to `most` a direction."""
+    """Return the factors by which the number of control points grows in each refinement, up to `most` a direction."""
     from parameterize.refinement import GROWTH
 
     whole = (most / control_points) ** 3
@@ -161,7 +165,7 @@ def _product_seconds(spline: SplineConfig, clock: Clock) -> float:
 
 
 def _fastest(work: Callable[[], object], clock: Clock) -> float:
-    """Return the seconds of the fastest run without the first, which warms up."""
+    """Return the seconds of the fastest run; the first run only warms up and does not count."""
     seconds = []
     for _ in range(REPEATS + 1):
         start = clock()
@@ -171,9 +175,10 @@ def _fastest(work: Callable[[], object], clock: Clock) -> float:
 
 
 def available_memory_mb(processes: int = 1) -> float | None:
-    """Return the megabytes of memory that each of some processes can still take, None where the system does not say.
+    """Return the megabytes of memory that each process can still use; None where the system does not say.
 
-    That is the free memory of the machine, within the limit on this process's address space (`ulimit -v`).
+    This is the machine's free memory, within the limit on this process's address space (`ulimit -v`), shared by
+    `processes` processes.
     """
     try:
         lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
@@ -190,7 +195,10 @@ def available_memory_mb(processes: int = 1) -> float | None:
 
 
 def warn_of_memory(wanted_mb: float, what: str, remedy: str) -> None:
-    """Warn where `wanted_mb` megabytes are not free. what: the need for memory, in words."""
+    """Warn where `wanted_mb` megabytes of memory are not free.
+
+    what: the purpose of the memory, in words. remedy: the remedy, in words.
+    """
     free = available_memory_mb()
     if free is not None and wanted_mb > free:
         log.warning("%s, %s GB are free: %s", what, rounded(free / 1000.0, 1), remedy)
@@ -198,13 +206,13 @@ def warn_of_memory(wanted_mb: float, what: str, remedy: str) -> None:
 
 @dataclass(frozen=True)
 class SolveMemory:
-    """Hold the memory of a solve beside the program, in megabytes: shared by the processes, and of each process."""
+    """Hold the memory of a solve without the program itself, in megabytes: all processes together, and each process."""
 
     shared_mb: float
     each_mb: float
 
     def on(self, processes: int) -> float:
-        """Return the megabytes of each of some processes."""
+        """Return the megabytes of each process, for a number of processes."""
         return self.shared_mb / processes + self.each_mb
 
 
@@ -223,7 +231,10 @@ def solve_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: 
 
 
 def tell_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> None:
-    """Log the memory of a solve; where it is not free, warn, and name the number of processes that could solve it."""
+    """Log the memory of a solve.
+
+    Where it is not free, warn, and name the number of processes that could solve the problem.
+    """
     processes, here = 1, 1
     if options.comm is not None:
         names = options.comm.allgather(platform.node())

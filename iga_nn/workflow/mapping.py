@@ -50,7 +50,7 @@ _LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 class _Given:
     """Hold the input of a training.
 
-    corners: vertices or points; marks: the points (8, 3) that they are, for figures.
+    corners: vertices or points. marks: (8, 3), the points of the corners, for figures.
     """
 
     surface: Surface
@@ -68,9 +68,10 @@ def map_surface(
     problem: BoundaryValueProblem | None = None,
     unknowns: int = 0,
 ) -> Parameterization:
-    """Parameterize a surface, write everything that is known of the map into the folder, and return it.
+    """Parameterize a surface, write all results on the map into the folder, and return it.
 
-    command: the one that repeats it. problem, unknowns: the problem that is solved on the map, and its size.
+    command: the command that repeats the run. problem, unknowns: the problem that is solved on the map, and its number
+    of unknowns.
     """
     with compilation_told():
         given = _prepare(state, mesh, mapping, problem, unknowns)
@@ -87,7 +88,7 @@ def _prepare(
 ) -> _Given:
     """Check the options, read the surface and the corners, check the problem's data, and announce the cost of the run.
 
-    The folder is cleared once all input is accepted; where a run is resumed, only when its map is there: the
+    The folder is cleared once all input is accepted; in a resumed run, only once its map is there, because the
     checkpoint may be refused.
     """
     from parameterize.run import corner_vertices
@@ -121,7 +122,7 @@ def _prepare(
 
 
 def _check_checkpoint(state: RunFolder, surface: Surface, corners: Any, mapping: MapOptions) -> None:
-    """Raise InputError for a checkpoint of another surface, seed or config: it is seen before anything is computed."""
+    """Raise InputError for a checkpoint of another surface, seed or config, before any computation."""
     from parameterize.checkpoint import CheckpointError
     from parameterize.run import check_checkpoint
 
@@ -135,8 +136,8 @@ def _check_checkpoint(state: RunFolder, surface: Surface, corners: Any, mapping:
 def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray:
     """Return eight points (8, 3) in the surface's units or eight vertex numbers (8,) from a JSON file.
 
-    frame: that of the surface; where it is known, the file may hold {"XYZ": [...]}, points in scaled coordinates.
-    Raises InputError.
+    frame: the frame of the surface; where it is known, the file may contain {"XYZ": [...]}, points in scaled
+    coordinates. Raises InputError.
     """
     try:
         with path.open(encoding="utf-8") as stream:
@@ -166,7 +167,7 @@ def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray
 
 
 def _check_data(problem: BoundaryValueProblem, surface: Surface) -> None:
-    """Check the problem's data on the surface: no points inside are known yet. Raises ExpressionError."""
+    """Check the problem's data on the surface, because no points inside are known yet. Raises ExpressionError."""
     problem = problem.placed(frame_of(surface))
     points = surface.vertices.T
     for evaluate in (problem.boundary_at, problem.source_at, problem.form.tensor, problem.form.mass):
@@ -186,7 +187,7 @@ def _check_data(problem: BoundaryValueProblem, surface: Surface) -> None:
 
 
 def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:
-    """Raise the ExpressionError that `evaluate` raises at all points tried: a face's data need only be valid on it."""
+    """Raise the ExpressionError that `evaluate` raises at all points: a face's data need only be valid on that face."""
     refused = None
     for row in np.linspace(0, len(points) - 1, _TRIED).astype(int):
         try:
@@ -199,7 +200,7 @@ def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, 
 
 
 def _train(given: _Given, mapping: MapOptions, progress: ProgressCallback | None, checkpoint: Path) -> Parameterization:
-    """Train, and return the map. Raises InputError for a checkpoint of another run and corners without paths."""
+    """Train, and return the map. Raises InputError for a checkpoint of another run, and for corners without paths."""
     from parameterize.checkpoint import CheckpointError
     from parameterize.cube.edge_paths import PathError
     from parameterize.run import parameterize
@@ -246,7 +247,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
 
 
 def _draw(state: RunFolder, given: _Given, result: Parameterization) -> None:
-    """Draw the map, with the places where it is not proved or meets itself if there are any."""
+    """Draw the map, and the places without a proof and the places where it meets itself, if there are any."""
     defects: dict[str, Any] = {}
     if len(unproved := result.certificate.unproved):
         defects["places"] = advice.span_places(result.volume, unproved)

@@ -1,4 +1,4 @@
-"""Runs a command on the processes of an MPI job: one prints and writes, and none waits for a process that failed."""
+"""Runs a command on the processes of an MPI job: one prints and writes, and none waits for a failed process."""
 
 import logging
 import sys
@@ -29,7 +29,7 @@ def all_processes() -> Any:
 
 @contextmanager
 def together(comm: Any) -> Iterator[None]:
-    """Let the block fail on all processes or on none; only the first process prints the reason.
+    """Let the block fail on all processes or on no process; only the first process prints the reason.
 
     A process that fails while others wait for it prints the reason and ends the job.
     """

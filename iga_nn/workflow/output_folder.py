@@ -33,11 +33,11 @@ class Outcome:
 
 @dataclass
 class RunFolder:
-    """Fill one output folder: its report so far, and the clock.
+    """Fill one output folder in one run, with the report so far and the clock.
 
-    vector: write plots of curves as PDF, too. finished: the result that a resumed run found; nothing is left to do.
-    guarded: files without a report are the user's own, and not replaced. make: makes the folder, where it is
-    not there.
+    vector: whether plots of curves are also written as PDF. finished: the result that a resumed run found complete.
+    guarded: whether files without a report belong to the user, and are not replaced. make: a function that makes the
+    folder, where it does not exist.
     """
 
     folder: Path
@@ -50,11 +50,11 @@ class RunFolder:
     started: float = field(default_factory=time.perf_counter)
 
     def timed(self, step: str) -> AbstractContextManager[None]:
-        """Return a context that counts its seconds as those of `step`."""
+        """Return a context that adds its seconds to those of `step`."""
         return timed(self.seconds, step)
 
     def draw(self, part: Part, **known: Any) -> None:
-        """Draw the figures of one part of a run for which `known`, by the names of the table, suffices."""
+        """Draw the figures of one part of a run for which the values `known`, by their names in the table, suffice."""
         with self.timed("report"), self.drawing("figures"):
             from ..figures import render
 
@@ -71,7 +71,7 @@ class RunFolder:
 
     @contextmanager
     def drawing(self, what: str) -> Iterator[None]:
-        """Let the block draw: where it fails, in importing matplotlib or VTK for example, the report says so."""
+        """Let the block draw `what`; a failure, for example the import of matplotlib or VTK, goes into the report."""
         try:
             yield
         except Exception as error:  # no figure ends a run
@@ -82,11 +82,10 @@ class RunFolder:
         self.report.setdefault("not_drawn", {})[what] = reason
 
     def begin(self, *parts: Part) -> None:
-        """Make the folder, or remove from it the report and the files of these parts that an older run left.
+        """Make the folder, or remove from it the report and the files of these parts from an older run.
 
-        Call it once the input is accepted. Raises InputError where the folder cannot be made, where such a file is
-        there but no readable report of the run that made it, and where the report of a training would go without its
-        map.
+        Call this once the input is accepted. Raises InputError where the folder cannot be made, where it contains such
+        a file but no readable report of its run, and where the report of a training would be removed without its map.
         """
         if self.make is not None:
             make, self.make = self.make, None
@@ -120,7 +119,7 @@ class RunFolder:
 
 
 def default_folder(source: str | Path) -> Path:
-    """Return where results go without `--out`: the input's stem, in the current folder."""
+    """Return the folder of the results without `--out`: the input's stem, in the current folder."""
     name = Path(source).name
     return Path(name.split(".")[0] or Path(name).stem)  # the name of a hidden file starts with its dot
 
@@ -129,11 +128,11 @@ def default_folder(source: str | Path) -> Path:
 def open_folder(
     source: str | Path, out: str | Path | None, force: bool, resume: bool = False, vector: bool = False
 ) -> Iterator[RunFolder]:
-    """Hold the output folder for one run and yield it; one that is not there is made by `RunFolder.begin`.
+    """Hold the output folder for one run and yield it; `RunFolder.begin` makes a folder that does not exist.
 
-    A refused input leaves nothing behind: a folder that was made and stays empty is removed again at the end.
-    Raises InputError, before anything costly is computed, where the folder cannot be written or another run uses it,
-    and where it holds a result or an interrupted run that neither `force` nor `resume` allows to touch.
+    A refused input leaves nothing behind: a new folder that stays empty is removed at the end. Raises InputError,
+    before any long computation, where the folder cannot be written or another run uses it, and where it contains a
+    result or an interrupted run and neither `force` nor `resume` is set.
     """
     if out == "":
         raise InputError("out is empty: name a folder")
@@ -158,7 +157,7 @@ def open_folder(
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[None]:
-    """Make a folder with those above it, hold it, and remove in the end those that are empty. Raises InputError."""
+    """Make a folder with those above it, hold it, and remove the empty ones at the end. Raises InputError."""
     missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         with writable(folder):
@@ -197,7 +196,7 @@ def writable(folder: Path) -> Iterator[None]:
 def locked(folder: Path) -> Iterator[None]:
     """Lock the folder against other runs, where the system has locks. Raises InputError where another run holds it.
 
-    The lock is on the folder itself: a lock file would stay in it among the results.
+    The lock is on the folder itself, because a lock file would remain among the results.
     """
     try:
         import fcntl
@@ -234,7 +233,7 @@ def has_checkpoint(folder: Path) -> bool:
 
 
 def _way_on(folder: Path) -> str:
-    """Return how to continue after an interruption, in words."""
+    """Return in words how to continue after an interruption."""
     if has_checkpoint(folder):
         return "the same command with --resume continues from the checkpoint"
     if (folder / "volume.npz").exists():

@@ -170,7 +170,7 @@ def finished_run(
 ) -> Outcome | None:
     """Return the finished result of `parameterize_to` in its folder, None where there is none.
 
-    Raises InputError where another command made the result, or where files of it are gone.
+    Raises InputError where another command made the result, or where some of its files are missing.
     """
     report = reports.read(Path(out))
     if report is None or not reports.is_finished(report):
@@ -188,11 +188,11 @@ def solve_to(
     device: str = "cpu",
     comm: Any = None,
 ) -> Outcome | None:
-    """Solve a problem on a saved volume and return the output folder with its report. On the CPU it needs no torch.
+    """Solve a problem on a saved volume and return the output folder with its report.
 
-    device: where Poisson's linear system is solved, "cpu" or "cuda". comm: a communicator of mpi4py whose processes all
-    call this and share the solve; the first one writes, the others get None. Takes the other options of `run`, and
-    raises as it does.
+    device: the device for Poisson's linear system, "cpu" or "cuda"; torch is not needed on the CPU. comm: a
+    communicator of mpi4py whose processes all call this function and share the solve; the first process writes the
+    folder, the others return None. The other options and the errors are those of `run`.
     """
     check_type("volume", volume, str | Path)
     statement, path = statement or PoissonOptions(), Path(volume)
@@ -225,9 +225,9 @@ def solve_to(
 
 
 def with_part(problem: BoundaryValueProblem, volume: Path) -> BoundaryValueProblem:
-    """Return a problem whose regions know the surface that a volume was made of, from the boundary.npz beside it.
+    """Return a problem whose regions know the original surface of a volume, from the boundary.npz beside the volume.
 
-    Raises InputError where regions name faces or groups of that surface, and there is no such file.
+    Raises InputError where regions name faces or groups of that surface, and the file does not exist.
     """
     beside = volume.with_name("boundary.npz")
     if not problem.conditions or not (problem.needs_surface or beside.is_file()):
@@ -250,7 +250,7 @@ def study_to(
 ) -> tuple[Outcome, str]:
     """Make a convergence study on a saved volume; return the output folder with its report, and the table.
 
-    Takes the other options of `run`, and raises as it does.
+    The other options and the errors are those of `run`.
     """
     check_type("volume", volume, str | Path)
     study_options, path = study_options or StudyOptions(), Path(volume)
@@ -287,7 +287,7 @@ def modes_to(
 ) -> tuple[Outcome, str]:
     """Find the lowest vibrations of a saved volume; return the output folder with its report, and their table.
 
-    Takes the other options of `run`, and raises as it does, and ConvergenceError.
+    The other options are those of `run`. Raises the errors of `run`, and ConvergenceError.
     """
     check_type("volume", volume, str | Path)
     modes_options, path = modes_options or ModesOptions(), Path(volume)
@@ -312,7 +312,10 @@ def modes_to(
 
 
 def _finished_by(command: str, finished: Outcome, vector: bool, statement: ProblemOptions | None) -> Outcome:
-    """Return the result that a resumed run finds. Raises InputError where another command made it or files are gone."""
+    """Return the finished result that a resumed run finds.
+
+    Raises InputError where another command made the result, or where some of its files are missing.
+    """
     folder, made_by = finished.folder, finished.report.get("command", "")
     if statement is not None and statement.section not in finished.report:
         path = folder / "volume.npz"

@@ -23,7 +23,7 @@ _SEED = 0
 def check_regions(problem: BoundaryValueProblem, surface: Surface) -> None:
     """Raise ValueError where a region of a problem holds at no point of a surface, or names a group that it lacks.
 
-    problem: with its regions placed. Regions of the cube's faces are not known yet.
+    problem: the problem with its regions placed. Regions of the cube's faces are unknown before the map exists.
     """
     for condition in problem.conditions:
         if not condition.region.needs_cube and not share_of(condition.region, surface):
@@ -39,16 +39,16 @@ def _nowhere(surface: Surface) -> str:
 
 
 def frame_of(surface: Surface) -> UnitFrame:
-    """Return the meaning of X, Y, Z before there is a volume."""
+    """Return the frame of X, Y, Z from the surface, before there is a volume."""
     low, high = surface.bbox
     x, y, z = ((low + high) / 2.0).tolist()
     return UnitFrame((x, y, z), 1.0 / surface.scale)
 
 
 def placed_on(texts: Sequence[str], surface: Surface) -> list[Region]:
-    """Return regions of these texts on a surface.
+    """Return regions from these texts, placed on a surface.
 
-    Raises ExpressionError for a text that is refused, ValueError for a face of the cube, which a surface has not.
+    Raises ExpressionError for a text that is refused, ValueError for a face of the cube, which a surface does not have.
     """
     regions = [Region(text).placed(frame_of(surface), surface.part) for text in texts]
     if cube := next((region for region in regions if region.needs_cube), None):
@@ -57,10 +57,10 @@ def placed_on(texts: Sequence[str], surface: Surface) -> list[Region]:
 
 
 def looked_at(texts: Sequence[str], surface: Surface, picture: Path | None, force: bool) -> list[dict[str, Any]]:
-    """Return the facts of regions of a surface, and draw them where a picture is named.
+    """Return the facts of regions of a surface, and draw the regions where a picture is named.
 
-    force: replace that picture. Raises InputError for a region that is refused or empty, and for a picture that cannot
-    be drawn or written.
+    force: whether an existing picture is replaced. Raises InputError for a region that is refused or empty, and for a
+    picture that cannot be drawn or written.
     """
     if picture is not None:
         check_new(picture, ".png", "--picture")
@@ -84,9 +84,9 @@ def _draw(picture: Path, surface: Surface, regions: Sequence[Region]) -> None:
 
 
 def facts_of(region: Region, surface: Surface) -> dict[str, Any]:
-    """Return a region's text, its area, its share of the surface's, and the number of triangles mostly in it.
+    """Return a region's text, its area, its share of the surface's area, and the number of triangles mostly in it.
 
-    Raises ValueError where no point of the surface lies in it.
+    Raises ValueError where no point of the surface lies in the region.
     """
     if not share_of(region, surface):
         raise ValueError(f"region {str(region)!r:.80}: {_nowhere(surface)}")
@@ -101,7 +101,10 @@ def facts_of(region: Region, surface: Surface) -> dict[str, Any]:
 
 
 def cover(region: Region, surface: Surface) -> Array:
-    """Return the share of each triangle (m,) that lies in a region, by points on it: the more, the larger it is."""
+    """Return the share (m,) of each triangle that lies in a region.
+
+    The share is that of points on the triangle; larger triangles have more points.
+    """
     areas = _lengths(doubled_areas(surface.vertices, surface.faces))
     counts = np.maximum(1, np.round(_SAMPLES * areas / areas.sum())).astype(int)
     chosen = np.repeat(np.arange(len(counts)), counts)
@@ -110,7 +113,7 @@ def cover(region: Region, surface: Surface) -> Array:
 
 
 def share_of(region: Region, surface: Surface) -> float:
-    """Return the share of a surface's area that a region has, of points without a pattern on it.
+    """Return the share of a surface's area that lies in a region, from points without a pattern on the surface.
 
     A region without such points, but with vertices, has the least share that is not zero.
     """
@@ -127,7 +130,7 @@ def share_of(region: Region, surface: Surface) -> float:
 
 
 def _points(surface: Surface, chosen: IntArray, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return a point without a pattern on each of the chosen triangles (k,), (3, k), and the unit normals (3, k)."""
+    """Return a point without a pattern on each of the chosen triangles (k,), and the unit normals: (3, k) each."""
     corners = surface.vertices[surface.faces[chosen]]
     a, b = np.sort(rng.uniform(size=(2, len(chosen))), axis=0)
     points = np.einsum("mk,mkd->dm", np.stack([a, b - a, 1.0 - b], axis=1), corners)
@@ -139,6 +142,6 @@ def _lengths(vectors: Array) -> Array:
 
 
 def _units(vectors: Array) -> Array:
-    """Return vectors (k, 3) of length 1, zero where they are zero."""
+    """Return vectors (k, 3) scaled to length 1; zero vectors stay zero."""
     size = _lengths(vectors)
     return vectors / np.where(size > 0.0, size, 1.0)[:, None]

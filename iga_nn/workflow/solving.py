@@ -80,9 +80,9 @@ def level_of(solution: Solution) -> dict[str, Any]:
 def each_level(
     volume: BSplineVolume, problem: BoundaryValueProblem, levels: Sequence[int], options: SolveOptions
 ) -> Iterator[Solution]:
-    """Solve level after level, a scalar problem from the solution before, and yield the solutions.
+    """Solve level after level and yield the solutions; the solve of a scalar problem starts at the last solution.
 
-    Processes of an MPI job do this together.
+    All processes of an MPI job call this together.
     """
     for level in sorted(levels):
         try:
@@ -99,7 +99,7 @@ def each_level(
 
 @contextmanager
 def reported(state: RunFolder, volume: BSplineVolume) -> Iterator[None]:
-    """Write the reason into the report where the block does not solve the problem, and the page without a solution."""
+    """Write the page without a solution, and the reason into the report, where the block does not solve the problem."""
     try:
         yield
     except (InputError, ConvergenceError) as error:
@@ -115,7 +115,7 @@ def verdict_of(state: RunFolder) -> str:
 
 
 def _write_cells(state: RunFolder, solution: Solution) -> None:
-    """Write solution.vtu, where the solution is finite; a failure ends no run."""
+    """Write solution.vtu, where the solution is finite; a failure does not end the run."""
     if not np.all(np.isfinite(solution.coefficients)):
         return
     with state.timed("report"), state.drawing("solution.vtu"):
@@ -130,9 +130,9 @@ def _write_cells(state: RunFolder, solution: Solution) -> None:
 def _draw(
     state: RunFolder, volume: BSplineVolume, solutions: Sequence[Solution], problem: BoundaryValueProblem, units: Units
 ) -> None:
-    """Draw the solution, its error where the exact one is known, and then the convergence if there are several levels.
+    """Draw the solution, its error where the exact solution is known, and the convergence of several levels.
 
-    Coefficients that are not finite, for the solver broke down, are not drawn.
+    Solutions with coefficients that are not finite, after a failure of the solver, are not drawn.
     """
     if not all(np.all(np.isfinite(solution.coefficients)) for solution in solutions):
         return
@@ -161,7 +161,7 @@ def regions_of(problem: BoundaryValueProblem, report: SolveReport) -> list[dict[
 
 
 def _as_text(condition: Condition) -> str:
-    """Return data as text: of an exchange or a spring the factor and the value outside, where it is not zero."""
+    """Return data as text; for an exchange or a spring the factor, and the value outside where it is not zero."""
     if condition.kind in WITH_FACTOR:
         factor, outside = map(_joined, condition.data)
         return (

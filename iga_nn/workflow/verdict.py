@@ -1,4 +1,4 @@
-"""The verdict on a volume: for `check`, the report and the terminal."""
+"""Finds the verdict on a volume for `check`, the report and the terminal."""
 
 import hashlib
 import logging
@@ -29,7 +29,7 @@ def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
 
 
 def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, command: str) -> None:
-    """Certify a saved volume, and write the sections of report.json on the input and on the proof."""
+    """Certify a saved volume, and write the sections of report.json about the input and the proof."""
     with state.timed("certify"):
         facts = certified_facts(volume)
     state.write(
@@ -44,7 +44,7 @@ def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, comma
 def tell(state: RunFolder, mapping: MapOptions | None = None) -> None:
     """Log the verdict of the report; where the map is not certified, add the remedies to the report.
 
-    mapping: those the map was made with, where they are known.
+    mapping: the options of the map, where they are known.
     """
     quality = state.report["parameterization"]
     log.info("certificate: %s", quality["bijective"])

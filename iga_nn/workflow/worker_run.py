@@ -25,7 +25,10 @@ SHARE = 0.05  # largest share of a run's time for these messages
 
 @dataclass(frozen=True)
 class Ended:
-    """Hold the end of a run. line: the reason where there is no report."""
+    """Hold the end of a run.
+
+    line: the reason where there is no report.
+    """
 
     state: Literal["done", "refused", "failed", "stopped"]
     line: str = ""
@@ -33,10 +36,10 @@ class Ended:
 
 
 def ended(run: Callable[[], Outcome | None], less_memory: str) -> Ended:
-    """Run in a worker process and return the end of the run; nothing is raised.
+    """Run in a worker process and return the end of the run; no exception is raised.
 
-    The traceback of an internal error is printed here, since only this process knows it. less_memory: the remedy for
-    too little memory.
+    The traceback of an internal error is printed in this process, because no other process has it. less_memory: the
+    remedy for too little memory.
     """
     try:
         outcome = run()
@@ -72,7 +75,7 @@ def throttled(tell: Callable[[Progress], None], is_stopped: Callable[[], bool]) 
 
 @contextmanager
 def logged(handler: logging.Handler, level: int = logging.NOTSET) -> Iterator[None]:
-    """Send the log of the block to one handler alone; NOTSET leaves the level as it is."""
+    """Send the log of the block to one handler only; the level NOTSET leaves the present level unchanged."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     before = [(logger.level, logger.propagate) for logger in loggers]
     for logger in loggers:

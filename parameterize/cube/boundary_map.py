@@ -1,4 +1,4 @@
-"""BoundaryMap: the surface laid on the six faces of the cube, one-to-one, cut along its edges (boundary.npz)."""
+"""Defines BoundaryMap: the surface laid one-to-one on the faces of the cube, cut along its edges (boundary.npz)."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -90,15 +90,16 @@ class BoundaryMap(Brief):
 
     @cached_property
     def part(self) -> PartSurface:
-        """Return the surface before it was cut, with its groups; where a file lacks it, the cut surface."""
+        """Return the surface before it was cut, with its groups; where the file lacks that surface, the cut surface."""
         faces = self.faces if self.part_faces is None else self.part_faces
         return PartSurface(self.vertices[: faces.max(initial=-1) + 1], faces, self.groups)
 
     @cached_property
     def cube_faces(self) -> IntArray:
-        """Return the cube face of each triangle, (m,) indices into FACE_NAMES; the first of two on an edge.
+        """Return the cube face of each triangle, (m,) indices into FACE_NAMES.
 
-        Raises ValueError where the corners of a triangle share no face.
+        A triangle on an edge of the cube has the first of its two faces. Raises ValueError where the corners of a
+        triangle share no face.
         """
         shared = np.all(_on_faces(self.parameters)[self.faces], axis=1)  # (m, 6)
         homeless = np.flatnonzero(~np.any(shared, axis=1))
@@ -110,7 +111,7 @@ class BoundaryMap(Brief):
         return np.argmax(shared, axis=1).astype(np.int64)
 
     def flipped(self) -> IntArray:
-        """Return the indices of the triangles that do not face outwards, seen from the cube's centre.
+        """Return the numbers (k,) of the triangles that do not face outwards, seen from the cube's centre.
 
         A triangle without area, within rounding error, counts as flipped.
         """
@@ -118,13 +119,13 @@ class BoundaryMap(Brief):
         return np.flatnonzero(triple <= noise)
 
     def save(self, path: str | Path) -> None:
-        """Write boundary.npz; atomic."""
+        """Write boundary.npz atomically."""
         part = {} if self.part_faces is None else {"part_faces": self.part_faces, **as_arrays(self.groups)}
         save_arrays(path, vertices=self.vertices, parameters=self.parameters, faces=self.faces, **part)
 
     @classmethod
     def load(cls, path: str | Path) -> "BoundaryMap":
-        """Read boundary.npz. Raises FileNotFoundError, or ValueError that names the defect of the file."""
+        """Read boundary.npz. Raises FileNotFoundError, or a ValueError that names the defect of the file."""
         data = load_arrays(path, ("vertices", "parameters", "faces"), PART)
         places = data["vertices"], data["parameters"], data["faces"]
         try:
@@ -139,8 +140,8 @@ class BoundaryMap(Brief):
 def read_part(path: str | Path) -> PartSurface:
     """Read the surface of a run, with its groups, from boundary.npz.
 
-    Older files give the surface cut along the cube's edges, without groups. Raises FileNotFoundError, or ValueError
-    that names the defect of the file.
+    Older files contain only the surface cut along the cube's edges, without groups. Raises FileNotFoundError, or a
+    ValueError that names the defect of the file.
     """
     return BoundaryMap.load(path).part
 
@@ -164,15 +165,16 @@ def _rows_of_three(values: Array, name: str) -> Array:
 
 
 def _on_faces(parameters: Array) -> Mask:
-    """Return which of the six cube faces each parameter lies on, (n, 6) in the order of FACE_NAMES."""
+    """Return the mask (n, 6) of the cube faces on which each parameter lies, in the order of FACE_NAMES."""
     return np.stack([parameters == 0.0, parameters == 1.0], axis=-1).reshape(-1, len(FACE_NAMES))
 
 
 def boundary_map(volume: BSplineVolume, layout: CubeLayout) -> BoundaryMap:
-    """Return the map of a surface (user's units) that is cut where it crosses the cube's edges.
+    """Return the map of a surface (in the user's units) that is cut where it crosses the cube's edges.
 
-    layout: its places are closest points of the volume's boundary. Where the spline smooths a detail away they may flip
-    a few triangles, which are untangled first. The cut vertices follow the others, and are fitted to the volume.
+    layout: a layout whose places are the closest points of the volume's boundary. Where the spline smooths a detail,
+    the closest points may flip a few triangles, which are untangled first. The cut vertices follow the vertices of the
+    mesh, and are fitted to the volume.
     """
     vertices, placed = layout.points, untangle_whole(layout.places, layout.faces)
     for number in range(_NUDGES):
@@ -192,7 +194,7 @@ def boundary_map(volume: BSplineVolume, layout: CubeLayout) -> BoundaryMap:
 
 
 def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int) -> Array:
-    """Shift the vertices (n, 3) around degenerate triangles a little: a mesh edge ran through a corner of the cube."""
+    """Move the vertices (n, 3) around degenerate triangles a little: a mesh edge ran through a corner of the cube."""
     corners = np.unique(cut.faces[turned])
     around = np.unique(np.concatenate([corners[corners < len(placed)], cut.parents[corners].ravel()]))
     around = around[around < len(placed)]
@@ -204,7 +206,7 @@ def _nudged(placed: Array, cut: CutMesh, turned: IntArray, number: int) -> Array
 def _fitted_once(volume: BSplineVolume, cut: CutMesh, best: BoundaryMap, count: int) -> tuple[Array, Array]:
     """Return shares (n,) and parameters (n, 3) after a Gauss-Newton step in these two unknowns of each cut vertex.
 
-    The first `count` vertices are those of the input. Corners of the cube and cuts within a face keep their parameter.
+    The first `count` vertices are those of the input. Corners of the cube and cuts within a face keep their parameters.
     """
     where, new = best.parameters[count:], best.vertices[count:]
     inner = (where > 0.0) & (where < 1.0)  # (k, 3)

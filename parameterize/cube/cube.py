@@ -1,4 +1,4 @@
-"""The unit cube: its corners, edges and faces, how points are laid on its boundary, and steps on its faces.
+"""Describes the unit cube: its corners, edges and faces, projections onto its boundary, and steps on its faces.
 
 A face has the number 2 * axis + side: `axis` is the parameter that is constant on it, and `side` its value there. In
 the order of their numbers the faces are called u0, u1, v0, v1, w0, w1.
@@ -23,7 +23,7 @@ def face_number(axis: Any, side: Any) -> Any:
 
 
 def axis_and_side(faces: Any) -> tuple[Any, Any]:
-    """Return the constant axis and the side, 0 or 1, of face numbers: integers, arrays or tensors of them."""
+    """Return the constant axis and the side, 0 or 1, of face numbers, which are integers, arrays or tensors."""
     return faces // 2, faces % 2
 
 
@@ -33,19 +33,19 @@ def tangent_axes(axis: Any) -> tuple[Any, Any]:
 
 
 def nearest_faces(places: Array) -> IntArray:
-    """Return the number of the cube's face at each place (n, 3), on an edge that of one of its faces: (n,)."""
+    """Return the numbers (n,) of the cube faces nearest to places (n, 3); on an edge, of one of the two faces."""
     centred = places - 0.5
     axis = np.abs(centred).argmax(axis=1)
     return np.asarray(face_number(axis, centred[np.arange(len(axis)), axis] > 0.0))
 
 
 def project_radially(centred: Array) -> Array:
-    """Return points (n, 3) projected onto the cube's boundary along rays from its centre, the origin of both."""
+    """Return points (n, 3) projected onto the cube's boundary along rays from its centre; the centre is the origin."""
     return np.asarray(centred / (2.0 * np.abs(centred).max(axis=1, keepdims=True)))
 
 
 def snap(parameters: Array) -> Array:
-    """Project parameters (n, 3) radially onto the cube, and onto its edges and corners within NEAR_EDGE of them."""
+    """Return parameters (n, 3) projected radially onto the cube, and onto edges and corners within NEAR_EDGE."""
     projected = project_radially(parameters - 0.5)
     at_side = np.abs(projected) >= 0.5 - NEAR_EDGE
     return np.where(at_side, 0.5 + 0.5 * np.sign(projected), 0.5 + projected)
@@ -54,9 +54,9 @@ def snap(parameters: Array) -> Array:
 def damped_fit(first: Array, second: Array, right: Array, damping: float) -> tuple[Array, Array]:
     """Return the coefficients a, b (k,) that minimise |a first + b second - right|, for vectors (k, 3).
 
-    Every Gauss-Newton step on a face towards a closest point solves this linear system.
-    The diagonal of the normal equations grows by `damping` times its sum: the two directions may be parallel. The
-    vectors are first scaled by a power of two, exactly, so that nothing overflows whatever their unit.
+    Every Gauss-Newton step on a face towards a closest point solves this linear system. The diagonal of the normal
+    equations grows by `damping` times its sum, because the two directions may be parallel. The vectors are first scaled
+    by a power of two, exactly, so that nothing overflows in any unit.
     """
     exponent = -int(np.frexp(max(np.abs(first).max(initial=0.0), np.abs(second).max(initial=0.0)))[1])
     first, second, right = (np.ldexp(vectors, exponent) for vectors in (first, second, right))
@@ -68,7 +68,7 @@ def damped_fit(first: Array, second: Array, right: Array, damping: float) -> tup
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def damped_solution(aa: Any, bb: Any, ab: Any, ra: Any, rb: Any, damping: float) -> tuple[Any, Any]:
-    """Return the coefficients of `damped_fit` from the products of two vectors with each other and the right side."""
+    """Return the coefficients of `damped_fit` from the inner products of its two vectors and the right side."""
     lift = damping * (aa + bb) + 1e-150  # the last term keeps the determinant of two zero vectors positive
     aa, bb = aa + lift, bb + lift
     determinant = aa * bb - ab * ab

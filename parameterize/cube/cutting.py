@@ -1,8 +1,8 @@
-"""Cutting a surface that surrounds the cube's centre along the rays through the cube's 12 edges.
+"""Cuts a surface that surrounds the cube's centre along the rays through the cube's 12 edges.
 
-Each edge of the cube spans, with the centre, a half plane where two coordinates (counted from the centre) are equal in
-size and no smaller than the third. Splitting the triangles that such a half plane crosses puts mesh vertices and
-edges on it; seen from the centre the mesh then resolves the 12 edges and 8 corners of the cube.
+Each edge of the cube spans, with the centre, a half plane where two coordinates (relative to the centre) are equal in
+size and no smaller than the third. The triangles that cross such a half plane are split, which puts mesh vertices and
+edges on it; seen from the centre the mesh then contains the 12 edges and 8 corners of the cube.
 """
 
 import math
@@ -29,10 +29,10 @@ _PIECES = np.array(  # pieces of a triangle 0, 1, 2 with new vertices 3 on side 
 
 @dataclass(frozen=True, eq=False)
 class CutMesh:
-    """Triangles after splitting, and where their vertices lie on the original mesh.
+    """Hold the triangles after splitting, and the places of their vertices on the original mesh.
 
-    parents: (n, 2) original or earlier vertices; share: (n,) position = (1 - share) * first + share * second.
-    Vertices of the input are their own parents, share 0. Parents of a new vertex always come before it.
+    parents: (n, 2), original or earlier vertices. share: (n,); the position is (1 - share) * first + share * second.
+    Vertices of the input are their own parents, with share 0. Parents of a new vertex always come before it.
     """
 
     faces: IntArray
@@ -40,7 +40,7 @@ class CutMesh:
     share: Array
 
     def carry(self, values: Array) -> Array:
-        """Return values (n, k) at all vertices, interpolated along split edges from those of the input (n_input, k)."""
+        """Return values (n, k) at all vertices, interpolated along split edges from values (n_input, k)."""
         result = np.empty((len(self.parents), values.shape[1]))
         n = len(values)
         result[:n] = values
@@ -50,14 +50,15 @@ class CutMesh:
         return result
 
     def laid_out(self, layout: CubeLayout) -> CubeLayout:
-        """Return the layout of the input with this mesh's triangles, its points and places at all vertices."""
+        """Return the layout of the input with this mesh's triangles, and with points and places at all vertices."""
         return CubeLayout(self.carry(layout.points), self.faces, self.carry(layout.places), layout.n_own)
 
 
 def cut_along_rays(mapped: Array, faces: IntArray, snap: float = NEAR_VERTEX) -> CutMesh:
-    """Split the mesh (mapped vertices (n, 3), faces (m, 3)) along the six planes of the cube's edges.
+    """Return the mesh, vertices (n, 3) and faces (m, 3), split along the six planes of the cube's edges.
 
-    A crossing closer than `snap` (share of the edge's length) to an end takes that vertex instead of a new one.
+    A crossing closer to an end of an edge than `snap`, a share of the edge's length, uses that end instead of a new
+    vertex.
     """
     position = mapped - 0.5
     n = len(position)
@@ -77,10 +78,10 @@ def cut_along_rays(mapped: Array, faces: IntArray, snap: float = NEAR_VERTEX) ->
 def subdivide_long_edges(
     vertices: Array, faces: IntArray, longest: float, most: float = math.inf
 ) -> tuple[Array, IntArray] | None:
-    """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface the same.
+    """Halve mesh edges until none is longer than `longest`; the given vertices stay first, the surface is the same.
 
-    vertices: (n, 3), or with further columns, which are interpolated as well. Returns None where this takes more than
-    `most` vertices: long slivers may take millions.
+    vertices: (n, 3), or with further columns, which are interpolated as well. Returns None where this needs more than
+    `most` vertices: long slivers may need millions.
     """
     while True:
         edges = edge_table(faces)[0]
@@ -97,8 +98,8 @@ def subdivide_long_edges(
 def subdivide_finely(vertices: Array, faces: IntArray, longest: float, most: int) -> tuple[Array, IntArray]:
     """Halve edges longer than `longest`, a limit that grows until there are at most `most` points.
 
-    vertices: (n, 3), or with further columns, which are interpolated as well. All given vertices stay, even if they are
-    more than `most`.
+    vertices: (n, 3), or with further columns, which are interpolated as well. All given vertices are kept, even if
+    there are more than `most`.
     """
     while True:
         found = subdivide_long_edges(vertices, faces, longest, max(most, len(vertices)))
@@ -110,10 +111,10 @@ def subdivide_finely(vertices: Array, faces: IntArray, longest: float, most: int
 def _crossings(
     height: Array, position: Array, faces: IntArray, axes: tuple[int, int, int], snap: float
 ) -> tuple[IntArray, Array]:
-    """Return the mesh edges (k, 2) that a cube edge's half plane splits, and the shares (k,) of their lengths there.
+    """Return the mesh edges (k, 2) that a cube edge's half plane splits, and the places (k,) as shares of the edges.
 
-    A triangle meets the plane in a segment. It is left whole only where that segment stays beyond one of the cube's
-    corners; so, after all planes, no half plane passes through the inside of a triangle.
+    A triangle meets the plane in a segment. A triangle stays whole only where that segment lies entirely beyond one of
+    the cube's corners; so, after all planes, no half plane passes through the inside of a triangle.
     """
     level = height[faces]
     sides = faces[(level.min(axis=1) < 0.0) & (level.max(axis=1) > 0.0)][:, [[0, 1], [1, 2], [2, 0]]]  # (k, 3, 2)
@@ -132,9 +133,10 @@ def _crossings(
 
 
 def split_edges(faces: IntArray, edges: IntArray, first_new: int) -> IntArray:
-    """Return the faces (m', 3) once vertex `first_new + i` stands on edge i, which is given once, smaller number first.
+    """Return the faces (m', 3) after edges are split: vertex `first_new + i` lies on edge i.
 
-    One split edge of a triangle gives two triangles, two give three, three give four.
+    edges: (k, 2), each edge once, the smaller number first. A triangle with one split edge gives two triangles, with
+    two split edges three, with three split edges four.
     """
     touched = np.zeros(int(faces.max()) + 1, dtype=bool)
     touched[edges.ravel()] = True
@@ -151,7 +153,7 @@ def split_edges(faces: IntArray, edges: IntArray, first_new: int) -> IntArray:
 
 
 def _numbers_on_sides(face: IntArray, edges: IntArray, first_new: int) -> IntArray:
-    """Return the new vertex on the sides 0-1, 1-2, 2-0 of each face (m, 3), -1 where there is none."""
+    """Return the numbers (m, 3) of the new vertices on the sides 0-1, 1-2, 2-0 of faces (m, 3), -1 without one."""
     if not len(edges):
         return np.full(face.shape, -1, dtype=np.int64)
     base = max(int(face.max(initial=0)), int(edges.max())) + 1

@@ -1,8 +1,8 @@
-"""Corners of the cube on the surface, 12 edge paths between them, six patches bounded by these (section 4.4.1).
+"""Finds the cube's corners on the surface, 12 edge paths between them, and the six patches of these (section 4.4.1).
 
-Each patch is a disc whose rim goes to the sides of a square; with every inner vertex a convex combination of its
-neighbours the map onto that square is one-to-one (Tutte 1963; Floater, Math. Comp. 72, 2003). The combinations
-reproduce the network's places wherever those are one-to-one already.
+Each patch is a disc whose rim goes to the sides of a square; where every inner vertex is a convex combination of its
+neighbours, the map onto that square is one-to-one (Tutte 1963; Floater, Math. Comp. 72, 2003). The combinations
+reproduce the network's places wherever these are already one-to-one.
 """
 
 from dataclasses import dataclass
@@ -28,15 +28,15 @@ _TINY = 1e-12  # least length, and least 1 + cosine and 1 - cosine, in half tang
 
 
 class PathError(RuntimeError):
-    """The cube's edges could not be traced on the surface."""
+    """Raised where the cube's edges cannot be traced on the surface."""
 
 
 @dataclass(frozen=True, eq=False)
 class CubeSurface:
-    """The surface, cut along the 12 paths.
+    """Hold the surface, cut along the 12 paths.
 
-    layout: the refined mesh; paths: 12 vertex sequences between the corners, in the order of EDGES; face_labels (m,):
-    the cube face (u0, u1, v0, v1, w0, w1) of each triangle.
+    layout: the refined mesh. paths: 12 sequences of vertices between the corners, in the order of EDGES. face_labels:
+    (m,), the cube face (u0, u1, v0, v1, w0, w1) of each triangle.
     """
 
     layout: CubeLayout
@@ -45,7 +45,7 @@ class CubeSurface:
 
 
 def choose_corners(mapped: Array) -> IntArray:
-    """Return eight different vertices, the farthest towards each of the cube's corners P: argmax <v - A, P - A>."""
+    """Return eight different vertices (8,), the farthest towards each corner P of the cube: argmax <v - A, P - A>."""
     reach = (mapped - 0.5) @ (CORNERS - 0.5).T  # (n, 8)
     candidates = np.unique(np.argsort(-reach, axis=0)[:8])
     rows, columns = linear_sum_assignment(-reach[candidates])
@@ -53,10 +53,10 @@ def choose_corners(mapped: Array) -> IntArray:
 
 
 def cut_surface(layout: CubeLayout, corners: IntArray) -> CubeSurface:
-    """Cut a surface whose places are close to the cube's boundary along paths between its corners, vertices (8,).
+    """Return a surface with places close to the cube's boundary, cut along paths between its corners, vertices (8,).
 
     Raises PathError where the paths do not bound six discs, which happens only far from a cube, or where the corners
-    come in the order of a mirrored cube.
+    have the order of a mirrored cube.
     """
     cut = cut_along_rays(layout.places, layout.faces).laid_out(layout)
     paths = _trace_paths(cut.places, cut.faces, corners)
@@ -68,7 +68,10 @@ def cut_surface(layout: CubeLayout, corners: IntArray) -> CubeSurface:
 
 
 def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
-    """Return disjoint paths along mesh edges, one for each cube edge; a blocked one comes first in the next order."""
+    """Return disjoint paths along mesh edges, one for each cube edge.
+
+    Where a path is blocked, all paths are traced again, and this path comes first.
+    """
     order = list(range(len(EDGES)))
     for _ in range(_ORDERS):
         paths, blocked = _trace_in_order(position, faces, corners, order)
@@ -83,7 +86,7 @@ def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[In
 def _trace_in_order(
     position: Array, faces: IntArray, corners: IntArray, order: list[int]
 ) -> tuple[dict[int, IntArray], int | None]:
-    """Return the cheapest paths by edge number, and the first blocked one; ways off the cube edge cost more."""
+    """Return the cheapest paths by edge number, and the first blocked edge; vertices off the cube edge cost more."""
     edges = edge_table(faces)[0]
     length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
     radial = 0.5 + project_radially(position - 0.5)
@@ -116,7 +119,7 @@ def _distance_to_segment(points: Array, start: Array, end: Array) -> Array:
 
 
 def _patches(faces: IntArray, paths: list[IntArray], corners: IntArray) -> IntArray:
-    """Return the cube face (m,) of each triangle: the paths bound six patches, each known by its four corners."""
+    """Return the cube face (m,) of each triangle: the paths bound six patches, each identified by its four corners."""
     on_path = {tuple(sorted(pair)) for path in paths for pair in pairwise(path.tolist())}
     pairs, owners = edge_triangles(faces)
     open_sides = np.array([tuple(p) not in on_path for p in pairs.tolist()])
@@ -148,10 +151,10 @@ def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array,
 
 
 def lay_out(layout: CubeLayout, corners: IntArray) -> CubeLayout:
-    """Return a layout without a flipped triangle: the surface is cut along paths, its patches spread on the cube.
+    """Return a layout without a flipped triangle: the surface is cut along paths, and its patches spread on the cube.
 
-    layout: its places are close to the cube's boundary, and may be tangled. corners: (8,) vertices. Raises PathError
-    as `cut_surface` does.
+    layout: a layout with places close to the cube's boundary, which may be tangled. corners: (8,), vertices. Raises
+    PathError as `cut_surface` does.
     """
     surface = cut_surface(layout, corners)
     points, places = surface.layout.points, surface.layout.places
@@ -175,7 +178,7 @@ def lay_out(layout: CubeLayout, corners: IntArray) -> CubeLayout:
 
 
 def _spread(places: Array, points: Array, patch: IntArray, fixed: Mask, face: int) -> None:
-    """Put the inner vertices of a patch (m, 3) on their cube face, in place."""
+    """Move the inner vertices of a patch, triangles (m, 3), to their cube face, in place."""
     axis, end = axis_and_side(face)
     plane = tangent_axes(axis)[:: 1 if end else -1]  # counter-clockwise seen from outside
     used, triangles = np.unique(patch, return_inverse=True)
@@ -190,10 +193,10 @@ def _spread(places: Array, points: Array, patch: IntArray, fixed: Mask, face: in
 
 
 def _combinations(flat: Array, points: Array, triangles: IntArray) -> csr_array:
-    """Return the mean value coordinates of each vertex, (n, n): the weights of its neighbours, which sum to 1.
+    """Return the mean value coordinates (n, n): each row has the weights of a vertex's neighbours, which sum to 1.
 
-    They are computed from the places (n, 2) where the triangles around the vertex do not overlap there, and otherwise
-    from the triangles of the surface itself.
+    The coordinates are computed from the places (n, 2) where the triangles around the vertex do not overlap there, and
+    otherwise from the triangles of the surface itself.
     """
     turned = np.zeros(len(flat), dtype=bool)
     ab, ac = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
@@ -212,7 +215,7 @@ def _combinations(flat: Array, points: Array, triangles: IntArray) -> csr_array:
 
 
 def _half_tangents(points: Array, i: IntArray, j: IntArray, k: IntArray) -> tuple[Array, Array]:
-    """Return tan(angle / 2) at corner i, divided by the length of i-j and by that of i-k."""
+    """Return tan(angle / 2) at corner i, divided by the length of i-j and by the length of i-k."""
     to_j, to_k = points[j] - points[i], points[k] - points[i]
     length_j, length_k = (np.maximum(np.linalg.norm(d, axis=1), _TINY) for d in (to_j, to_k))
     cosine = (to_j * to_k).sum(axis=1) / (length_j * length_k)

@@ -1,4 +1,4 @@
-"""Flipped triangles of a surface laid out on the cube: how they are found, prevented and turned back."""
+"""Finds, prevents and turns back flipped triangles of a surface laid out on the cube."""
 
 import numba
 import numpy as np
@@ -40,7 +40,7 @@ def flipped(places: Array, faces: IntArray) -> Mask:
 
 
 def new_flips(before: Array, after: Array, faces: IntArray) -> Mask:
-    """Return the mask (n,) of points that must stay so that no further triangle flips when the others go to `after`."""
+    """Return the mask (n,) of points that must stay, so that no other triangle flips when the rest moves to `after`."""
     stay, allowed = np.zeros(len(before), dtype=bool), flipped(before, faces)
     for _ in range(_HOLDING_ROUNDS):
         bad = flipped(np.where(stay[:, None], before, after), faces) & ~allowed
@@ -53,9 +53,9 @@ def new_flips(before: Array, after: Array, faces: IntArray) -> Mask:
 def unflip(parameters: Array, faces: IntArray) -> Array:
     """Turn flipped triangles outwards by the least moves of their corners, sweep by sweep; some may stay flipped.
 
-    It suits a few flips in a layout whose points should stay: `untangle` flattens whole neighbourhoods. Seen
-    from the centre, the volume under a triangle is linear in each corner, so one Newton step a triangle is taken, and
-    the mean of these at every corner.
+    This suits a few flips in a layout whose points should stay: `untangle` flattens whole neighbourhoods. Seen from the
+    centre, the volume under a triangle is linear in each corner, so each triangle gives one Newton step, and every
+    corner takes the mean of the steps of its triangles.
     """
     direction = _directions(parameters)
     volumes = np.abs(np.linalg.det(direction[faces]))
@@ -81,7 +81,7 @@ def unflip(parameters: Array, faces: IntArray) -> Array:
 def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
     """Return the parameters (n, 3) after relaxation of the vertices around flipped triangles, until none is left.
 
-    A relaxed vertex goes half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
+    A relaxed vertex moves half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
     are flipped at the time move; where triangles stay flipped, one more ring of neighbours joins after every _PATIENCE
     sweeps. After all `sweeps` some flips may be left.
     """
@@ -103,9 +103,9 @@ def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array
 
 
 def untangle_whole(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
-    """Return the untangled parameters (n, 3), or the given ones where flips would be left.
+    """Return the untangled parameters (n, 3), or the given parameters where flips would be left.
 
-    Ring after ring of neighbours joins, so a flip that cannot be undone would disturb a whole limb of the surface.
+    Neighbours join ring after ring, so a flip that cannot be removed would disturb a whole limb of the surface.
     """
     untangled = untangle(parameters, faces, sweeps)
     return parameters if flipped(untangled, faces).any() else untangled

@@ -1,4 +1,4 @@
-"""CubeLayout: the one object for a closed surface together with the places of its points on the cube."""
+"""Defines CubeLayout: a closed surface together with the places of its points on the cube."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,15 @@ from ..arrays import Array, IntArray
 
 @dataclass(frozen=True, eq=False)
 class CubeLayout:
-    """A closed surface and its layout on the boundary of the cube, vertex by vertex.
+    """Hold a closed surface and its layout on the boundary of the cube, vertex by vertex.
 
-    points: (n, 3), on the surface; the mesh's own vertices come first, those of cut edges follow.
-    faces: (m, 3), the triangles between them, outward.
+    points: (n, 3), on the surface; the mesh's own vertices come first, the vertices of cut edges follow.
+
+    faces: (m, 3), the triangles between the points, outward.
+
     places: (n, 3), the points' places on the boundary of the cube, or near it as long as the layout has to be
-    untangled. The layout on the sphere (sphere.py, turning.py) has unit vectors from the origin here.
+    untangled. In the layout on the sphere (sphere.py, turning.py) the places are unit vectors from the origin.
+
     n_own: the number of the mesh's own vertices.
     """
 

@@ -1,11 +1,11 @@
-"""A one-to-one layout of a closed surface without handles on the unit sphere, with little distortion.
+"""Lays a closed surface without handles on the unit sphere, one-to-one and with little distortion.
 
-The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: it has two
-sides, each in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc goes to a hemisphere (Tutte 1963),
-one-to-one but badly squeezed: a long arm shrinks exponentially with its length. There the mesh edges along the arm get
-the larger weights of a cone's edges, whose layout is even up to the tip. From there Newton's method lowers the
-symmetric Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has no
-area left: no step turns a triangle over.
+The surface is cut in two discs along the line where the lowest vibration of the net of its edges vanishes: each of the
+two sides is in one piece (Fiedler, Czechoslovak Math. J. 25, 1975). Each disc is mapped to a hemisphere (Tutte 1963),
+one-to-one but much compressed: a long arm shrinks exponentially with its length. Therefore the mesh edges along an arm
+have the larger weights of a cone's edges, whose layout is even up to the tip. Then Newton's method lowers the symmetric
+Dirichlet energy (Smith, Schaefer, ACM Trans. Graphics 34, 2015), which is infinite where a triangle has no area left,
+so that no step turns a triangle over.
 """
 
 import math
@@ -43,10 +43,11 @@ _ARMIJO = 1e-4  # share of the decrease that the slope promises which a step mus
 
 
 def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback = ignore) -> CubeLayout:
-    """Lay a closed surface without handles, vertices (n, 3) and outward triangles (m, 3), on the unit sphere.
+    """Return the layout on the unit sphere of a closed surface without handles.
 
-    Every mesh edge that the line between the two discs crosses gets a vertex, after those of the mesh. `progress` is
-    called after each Newton step, with the stage "layout" and the energy as the loss.
+    vertices: (n, 3). faces: (m, 3), outward triangles. Every mesh edge that the line between the two discs crosses has
+    a new vertex, after the vertices of the mesh. `progress` is called after each Newton step, with the stage "layout"
+    and the energy as the loss.
     """
     points, faces, upper = _halves(vertices, faces)
     triangles = _Triangles(points, faces)
@@ -61,7 +62,8 @@ def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback =
 def _halves(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Mask]:
     """Split edges where the lowest vibration vanishes; return points, triangles and the mask of the upper triangles.
 
-    The exact places of the new vertices do not matter: they keep _LEAST_SHARE of an edge from its ends.
+    The exact places of the new vertices do not matter: they keep the distance _LEAST_SHARE, a share of the edge, from
+    its ends.
     """
     edges, _ = edge_table(faces)
     links = _links(edges, 1.0 / _lengths(vertices, edges), len(vertices))
@@ -77,12 +79,12 @@ def _halves(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Mask]:
 
 
 def _for_long_arms() -> Iterator[_Weigh]:
-    """Yield weights of mesh edges, see `_hemispheres`, that shrink a long arm less; the best ones depend on the mesh.
+    """Yield weights of mesh edges (see `_hemispheres`) that shrink a long arm less; the mesh decides which are best.
 
-    Rings of points around an arm come out evenly spaced where the edges along it weigh as on a cone: the square of the
-    distance to its tip, in lengths of the edge. Edges that lead aside would mix points from different sides of the arm;
-    the higher the power, the less they count. The last weights mix least: each point follows only neighbours nearer to
-    the rim.
+    Rings of points around an arm are evenly spaced where the edges along it have the weights of a cone's edges: the
+    square of the distance to the tip, in lengths of the edge. Edges across the arm would mix points from different
+    sides of it; the higher the power, the less weight they have. The last weights mix least: each point follows only
+    neighbours nearer to the rim.
     """
     yield lambda straight, *_: 1.0 + _AWAY * straight
     for power in _POWERS:
@@ -92,12 +94,12 @@ def _for_long_arms() -> Iterator[_Weigh]:
 
 
 def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -> Array:
-    """Return directions (n, 3) of points (n, 3) whose triangles above and below go to the two hemispheres.
+    """Return directions (n, 3) of points (n, 3); the upper and the lower triangles go to the two hemispheres.
 
     The common rim goes to the equator by arc length; every other point is a weighted mean of its neighbours in the
-    disc. `weigh` returns the weights of mesh edges from three arrays (e,): the squared cosine of the edge's angle to
-    the way to the rim; the distance to the point farthest from the rim, in lengths of the edge; and whether the pulling
-    neighbour is nearer to the rim than the pulled point.
+    disc. `weigh` returns the weights of mesh edges from three arrays (e,): the squared cosine of the angle between the
+    edge and the path to the rim; the distance to the point farthest from the rim, in lengths of the edge; and whether
+    the pulling neighbour is nearer to the rim than the pulled point.
     """
     rim = np.asarray(igl.boundary_loop(faces[upper]), dtype=np.int64)
     length = np.linalg.norm(vertices[np.roll(rim, -1)] - vertices[rim], axis=1)
@@ -123,16 +125,16 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -
 
 
 def _lengths(vertices: Array, edges: IntArray) -> Array:
-    """Return the lengths (e,) of edges (e, 2), at least the share _THIN of their mean."""
+    """Return the lengths (e,) of edges (e, 2), which are at least the share _THIN of their mean."""
     length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
     return np.asarray(np.maximum(length, _THIN * length.mean()))
 
 
 def _links(edges: IntArray, weights: Array, count: int) -> csr_array:
-    """Return the weights of edges (e, 2) between `count` points as a matrix.
+    """Return the weights of edges (e, 2) between `count` points as a sparse matrix (count, count).
 
-    weights: (e,) for a symmetric one; else (2 e,), the pulls of second ends on first ends, then those of first ends on
-    second ends.
+    weights: (e,) for a symmetric matrix; or else (2 e,), the pulls of second ends on first ends, then the pulls of
+    first ends on second ends.
     """
     i, j = np.concatenate([edges, edges[:, ::-1]]).T
     return csr_array(coo_array((np.resize(weights, len(i)), (i, j)), shape=(count, count)))
@@ -143,21 +145,22 @@ def _laplacian(links: csr_array) -> csr_array:
 
 
 def _solved(matrix: csc_array, right: Array) -> Array:
-    """Solve with a matrix that needs no pivots: it is symmetric positive definite, or its diagonal is dominant."""
+    """Return the solution for a matrix that needs no pivots: positive definite, or diagonally dominant."""
     factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return np.asarray(factors.solve(right))
 
 
 def _volumes(corners: Array) -> Array:
-    """Return the determinants of triangles' corners (m, 3, 3), from differences: triangles may be tiny."""
+    """Return the determinants (m,) of the corners (m, 3, 3) of triangles, from differences: triangles may be tiny."""
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.asarray((corners[:, 0] * across).sum(axis=1))
 
 
 class _Triangles:
-    """The symmetric Dirichlet energy of triangles (m, 3) of the surface, scaled to the area of the unit sphere.
+    """Compute the symmetric Dirichlet energy of triangles (m, 3) of the surface, scaled to the area of the unit sphere.
 
-    With the Dirichlet energy D and the signed area a on the sphere, A on the surface: the sum of D (1 + (A / a)^2).
+    The energy is the sum of D (1 + (A / a)^2), with the Dirichlet energy D, the signed area a on the sphere and the
+    area A on the surface.
     """
 
     def __init__(self, vertices: Array, faces: IntArray) -> None:
@@ -170,7 +173,7 @@ class _Triangles:
         self._stiffness = sides @ np.swapaxes(sides, 1, 2) / (4.0 * self._area[:, None, None])
 
     def energies(self, directions: Array) -> Array:
-        """Return the energy of each triangle (m,).
+        """Return the energy (m,) of each triangle.
 
         It is infinite where a triangle is turned over, seen from the sphere's centre, or too small for double
         precision.
@@ -188,7 +191,7 @@ class _Triangles:
         return float(self.energies(directions).sum())
 
     def derivatives(self, directions: Array, tangents: Array) -> tuple[Array, Array]:
-        """Return gradient (m, 6) and second derivative (m, 6, 6), made positive, in steps along tangents (n, 3, 2)."""
+        """Return the gradient (m, 6) and a positive second derivative (m, 6, 6) in steps along tangents (n, 3, 2)."""
         corners, count = directions[self.faces], len(self.faces)
         area = 0.5 * _volumes(corners)[:, None, None]
         sides = corners - corners[:, :1]
@@ -214,7 +217,7 @@ class _Triangles:
 
 
 def _area_bends(corners: Array) -> Array:
-    """Return the second derivative of half the determinant of triangles' corners (m, 3, 3): (m, 3, 3, 3, 3)."""
+    """Return the second derivatives (m, 3, 3, 3, 3) of half the determinant of the corners (m, 3, 3) of triangles."""
     bends = np.zeros((len(corners), 3, 3, 3, 3))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -226,9 +229,10 @@ def _area_bends(corners: Array) -> Array:
 
 
 def _relaxed(directions: Array, triangles: _Triangles, progress: ProgressCallback = ignore) -> Array:
-    """Lower the energy by Newton steps, each shortened until no triangle turns over and the energy falls.
+    """Return directions of lower energy by Newton steps, which are shortened until no triangle turns over.
 
-    Directions with triangles too small for double precision are returned unchanged.
+    A step is also shortened until the energy falls. Directions with triangles too small for double precision are
+    returned unchanged.
     """
     energy = triangles.energy(directions)
     unknowns = (2 * triangles.faces[:, :, None] + np.arange(2)).reshape(-1, 6)
@@ -261,7 +265,7 @@ def _relaxed(directions: Array, triangles: _Triangles, progress: ProgressCallbac
 
 
 def _tangents(directions: Array) -> Array:
-    """Return two unit vectors across each direction (n, 3): (n, 3, 2)."""
+    """Return two unit vectors (n, 3, 2) that are orthogonal to each direction (n, 3)."""
     other = np.where(np.abs(directions[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     first = np.cross(directions, other)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

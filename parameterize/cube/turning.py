@@ -1,7 +1,7 @@
-"""How the cube is turned within a layout on the sphere, so that its edges keep out of hollows.
+"""Turns the cube within a layout on the sphere, so that its edges do not lie in hollows.
 
-det J > 0 needs the faces of the solid to meet at less than 180 degrees along the cube's edges, seen from inside. An
-edge in a hollow cannot lie on the surface; one along a ridge suits it best.
+det J > 0 needs the faces of the solid to meet at less than 180 degrees along the cube's edges, measured inside. So an
+edge in a hollow cannot lie on the surface; an edge along a ridge suits best.
 """
 
 import numba
@@ -25,11 +25,11 @@ _HOLLOW = 1.0  # extra weight of a piece in a hollow
 
 
 def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 0) -> Array:
-    """Return the rotation (3, 3) of a layout on the sphere that keeps the cube's edges best out of hollows.
+    """Return the rotation (3, 3) of a layout on the sphere with the least hollowness along the cube's edges.
 
-    number: 0 for the best rotation, 1 for the next best, and so on. The best of some random rotations are turned
-    further by the simplex method of Nelder and Mead; results that nearly agree count as one. Where too few are left,
-    the next best random rotations that differ from all of them follow.
+    number: 0 for the best rotation, 1 for the next best, and so on. The best of some random rotations are improved by
+    the simplex method of Nelder and Mead; results that nearly agree count as one. Where fewer than `number` + 1 results
+    are left, the list continues with the best random rotations that differ from all results.
     """
     middles, along, bends = _bends(layout)
     simplex = _FIRST_TURN * np.vstack([np.zeros(3), np.eye(3)])
@@ -63,7 +63,7 @@ def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 
 
 
 def hollowness(layout: CubeLayout) -> float:
-    """Return the hollowness of a layout along the cube's edges, which `best_turn` minimises: negative on ridges."""
+    """Return the hollowness of a layout along the cube's edges, which `best_turn` minimises; ridges are negative."""
     return _hollowness(*_bends(layout))
 
 
@@ -72,12 +72,12 @@ def _is_other(rotation: Rotation, turns: list[Rotation]) -> bool:
 
 
 def _angle_between(first: Rotation, second: Rotation) -> float:
-    """Return the angle between two turns of the cube, the least over its 24 symmetries."""
+    """Return the angle between two turns of the cube, in radians, the least over the 24 symmetries of the cube."""
     return float((first * second.inv()).reduce(left=Rotation.create_group("O")).magnitude())
 
 
 def _bends(layout: CubeLayout) -> tuple[Array, Array, Array]:
-    """Return the mesh edges' middles and directions on the sphere, (e, 3) each, and the surface's bends there (e,).
+    """Return the midpoints and directions on the sphere of the mesh edges, (e, 3) each, and the surface's bends (e,).
 
     A bend is the angle between the two triangles, positive in a hollow, times the edge's length on the sphere.
     """
@@ -96,9 +96,9 @@ def _bends(layout: CubeLayout) -> tuple[Array, Array, Array]:
 
 
 def _hollowness(middles: Array, along: Array, bends: Array) -> float:
-    """Return the sum of the bends (e,) near the cube's edges, weighed by nearness and direction.
+    """Return the sum of the bends (e,) near the cube's edges, weighted by nearness and direction.
 
-    The bends are summed over pieces of each cube edge; a positive sum, a hollow, counts more.
+    The bends are summed over pieces of each cube edge; a positive sum, a hollow, has a larger weight.
     """
     pieces = _bends_of_pieces(middles, along, bends, _EDGE_WIDTH, _PIECES)
     return float(pieces.sum() + _HOLLOW * np.maximum(pieces, 0.0).sum())
@@ -106,7 +106,10 @@ def _hollowness(middles: Array, along: Array, bends: Array) -> float:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _bends_of_pieces(middles: Array, along: Array, bends: Array, width: float, count: int) -> Array:
-    """Return the weighed sums (3, 2, 2, count): by the cube edge's axis, its sides along the others, and the piece."""
+    """Return weighted sums of bends (3, 2, 2, count): by the cube edge's axis, its two sides, and the piece.
+
+    The two sides, 0 or 1, are those of the two other axes.
+    """
     sums = np.zeros((3, 2, 2, count))
     for n in range(len(bends)):
         axis = 0  # of the nearest edge of the cube

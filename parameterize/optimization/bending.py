@@ -1,6 +1,6 @@
-"""Fairness: the matrices of 1-D integrals, the operator of the integral of F's squared Hessians, and that as a term.
+"""Computes the fairness: the matrices of 1-D integrals, the integral of F's squared Hessians, and its energy term.
 
-See operators.py for how control points are held, and how pieces of work are added.
+operators.py explains the layout of control points and the sum of pieces of work.
 """
 
 import math
@@ -20,9 +20,9 @@ Grams = list[tuple[Array, ...]]  # mass, stiffness and bending matrices (n, n), 
 
 
 def grams(knots: Knots, degrees: tuple[int, ...]) -> Grams:
-    """Return the matrices of integrals of products of basis functions, of their first and of their second derivatives.
+    """Return the matrices of integrals of products: of basis functions, of their first and of their second derivatives.
 
-    Gauss quadrature, exact.
+    The integrals are computed by Gauss quadrature and are exact.
     """
 
     def of(row: Array, degree: int, derivative: int) -> Array:
@@ -34,10 +34,10 @@ def grams(knots: Knots, degrees: tuple[int, ...]) -> Grams:
 
 
 def bending_operator(matrices: Grams, weight: float, dtype: DTypeLike = np.float64) -> PiecewiseOperator:
-    """Return x -> weight * H x with x^T H x = int |Hessian F|^2 (exact); a piece of work is one component of F.
+    """Return the operator x -> weight * H x, where x^T H x = int |Hessian F|^2 is exact.
 
-    H = h x m x m + m x h x m + m x m x h + 2 (k x k x m + k x m x k + m x k x k), with mass matrices m, stiffness
-    matrices k and bending matrices h of the three directions.
+    A piece of work is one component of F. H = h x m x m + m x h x m + m x m x h + 2 (k x k x m + k x m x k + m x k x
+    k), with mass matrices m, stiffness matrices k and bending matrices h of the three directions.
     """
     bands = tuple(
         band(*((factor * matrix).astype(dtype) for matrix in (mass, math.sqrt(2.0) * slope, curve)))
@@ -51,9 +51,10 @@ def bending_operator(matrices: Grams, weight: float, dtype: DTypeLike = np.float
 
 
 class Fairness:
-    """The term weight * int |Hessian F|^2, quadratic in the control points.
+    """Compute the term weight * int |Hessian F|^2, which is quadratic in the control points.
 
-    bend: its second derivative, in double precision. mass: the three matrices (n, n) of integrals of basis functions.
+    bend: the second derivative of the term, in double precision. mass: the three matrices (n, n) of the integrals of
+    products of basis functions.
     """
 
     def __init__(self, knots: Knots, degree: int, weight: float) -> None:
@@ -62,28 +63,28 @@ class Fairness:
         self.bend, self._rough = (bending_operator(matrices, 2.0 * weight, dtype) for dtype in (np.float64, np.float32))
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return 1: the operators are weighted already."""
+        """Return 1, because the operators already contain the weight."""
         return 1.0
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the term at control points (3, n_u, n_v, n_w), and its gradient."""
+        """Return the term at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
         bent = self.bend(control)
         return 0.5 * float(np.vdot(bent, control)), bent
 
     def curvature(self, control: Array) -> PiecewiseOperator:
-        """Return the second derivative, the same everywhere, as an operator in single precision."""
+        """Return the second derivative, which does not depend on `control`, as an operator in single precision."""
         return self._rough
 
     def with_stiffness(self) -> tuple[Array, ...]:
-        """Return for the three directions twice the stiffness matrix and twice the weighted bending matrix: (n, n)."""
+        """Return for each direction twice the stiffness matrix plus twice the weighted bending matrix, each (n, n)."""
         return tuple(2.0 * k + 2.0 * self._weight * h for k, h in zip(self._slope, self._curve, strict=True))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _bent(bands: tuple[Band, Band, Band], field: Array) -> Array:
-    """Apply H to one component (n_u, n_v, n_w); a direction's bands are those of m, sqrt(2) k and h.
+    """Return H applied to one component (n_u, n_v, n_w); the bands of a direction are those of m, sqrt(2) k and h.
 
-    Every step applies matrices along the first axis, which then goes last.
+    Each step applies matrices along the first axis, which then becomes the last axis.
     """
     first_u, mass_u, slope_u, curve_u = bands[0]
     first_v, mass_v, slope_v, curve_v = bands[1]
@@ -111,5 +112,5 @@ def _bent(bands: tuple[Band, Band, Band], field: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _turned(field: Array, size: int) -> Array:
-    """Put the first axis of a field last; the result (size, ...) has its former second axis, of that size, first."""
+    """Return the field with its first axis last, in the shape (size, ...): its former second axis has length `size`."""
     return np.ascontiguousarray(field.T).reshape(size, field.size // size)

@@ -1,9 +1,10 @@
-"""Penalty on parts of F's boundary that run into one another, or nearly so.
+"""Penalises parts of F's boundary that run into one another, or nearly so.
 
-Det J > 0 everywhere does not keep two sheets of the boundary apart: the walls of a narrow valley may reach through one
-another. A sample of the boundary lies in another sheet where the boundary winds around the point just outside of it.
-The nearest sample that faces the opposite way is what it has run into, and the two are pushed apart along the normal
-there, as in contact mechanics (node to surface, Wriggers, Computational Contact Mechanics, 2006, chapter 6).
+Det J > 0 everywhere does not keep two sheets of the boundary apart: the walls of a narrow valley may pass through one
+another. A sample of the boundary lies in another sheet where the boundary winds around the point just outside of the
+sample. The other sheet is that of the nearest sample with the opposite normal, and the penalty pushes the two samples
+apart along the normal there, as in contact mechanics (node to surface, Wriggers, Computational Contact Mechanics, 2006,
+chapter 6).
 """
 
 from dataclasses import dataclass, replace
@@ -31,10 +32,11 @@ _ACCURACY = 2.0  # of the fast winding number
 
 @dataclass(frozen=True, eq=False)
 class ContactPenalty:
-    """Mean over the boundary's samples of (gap - (F(p) - F(q)) . n)_+^2; only the k samples p in contact count.
+    """Compute the mean over the boundary's samples of (gap - (F(p) - F(q)) . n)_+^2, with k samples p in contact.
 
-    first, second: rows that yield F(p) and F(q). normals (k, 3): the boundary's at q, outwards. share: of one sample.
-    spans (2 k, 3): where p and q lie. near (m,): the samples that a few more Newton steps may bring into contact.
+    first, second: the rows that yield F(p) and F(q). normals: (k, 3), the outward normals of the boundary at q. share:
+    the weight of one sample in the mean. spans: (2 k, 3), the spans of p and q. near: (m,), the samples that may come
+    into contact during a few more Newton steps.
     """
 
     first: ControlRows
@@ -46,11 +48,11 @@ class ContactPenalty:
     near: IntArray
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return a multiple of the weight of the surface's data."""
+        """Return the weight of the penalty, a multiple of the weight of the surface's data."""
         return _WEIGHT * weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
+        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
         shortfall = np.maximum(self.gap - self.distances(control), 0.0)
         return self.share * float((shortfall**2).sum()), self._pull(-2.0 * self.share * shortfall, control)
 
@@ -66,7 +68,7 @@ class ContactPenalty:
         return PiecewiseOperator([product], lambda parts, _: parts[0])
 
     def distances(self, control: Floats) -> Floats:
-        """Return (F(p) - F(q)) . n, negative where p lies behind the sheet of q: (k,)."""
+        """Return the distances (F(p) - F(q)) . n, (k,); a distance is negative where p lies behind the sheet of q."""
         return ((self.first(control) - self.second(control)) * self.normals).sum(axis=1)
 
     def _pull(self, factor: Floats, like: Floats) -> Floats:
@@ -75,10 +77,10 @@ class ContactPenalty:
 
 
 def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None = None) -> ContactPenalty:
-    """Return the penalty for the boundary of a map; it is empty where no two sheets are near.
+    """Return the penalty for the boundary of a map; the penalty is empty where no two sheets are near each other.
 
-    gap: how far apart sheets must be, in units of its control points. near: look at these samples
-    alone, those of a penalty a few steps before; looking at all of them takes longer than a Newton step.
+    gap: the least distance between two sheets, in units of the map's control points. near: the only samples to be
+    examined, from a penalty a few steps before; the examination of all samples takes longer than a Newton step.
     """
     boundary = SampledBoundary.on(spline.volume, *[np.linspace(0.0, 1.0, _SAMPLES)] * 3)
     normals = vertex_normals(boundary.points, boundary.triangles)
@@ -105,14 +107,17 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
 
 
 def _around(points: Array, touching: IntArray) -> IntArray:
-    """Return which points lie within _REACH of one that touches: (m,)."""
+    """Return the numbers (m,) of the points within the distance _REACH of a touching point."""
     if not touching.size:
         return touching
     return np.flatnonzero(np.isfinite(cKDTree(points[touching]).query(points, distance_upper_bound=_REACH)[0]))
 
 
 def _facing_samples(points: Array, normals: Array, touching: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the samples of `touching` (k,) near which another faces the opposite way, and the nearest such one."""
+    """Return the samples of `touching` that have an opposite sample near them, and the nearest opposite one: (k,) each.
+
+    Two samples are opposite where their normals point in opposite directions.
+    """
     tree, nearest = cKDTree(points), np.full(len(touching), -1)
     for start in range(0, len(touching), _CHUNK):
         chunk = slice(start, start + _CHUNK)

@@ -1,11 +1,11 @@
-"""Penalty on the Bernstein coefficients of det J over chosen spans: what the certificate tests is what is penalised.
+"""Penalises the Bernstein coefficients of det J over chosen spans, the same numbers that the certificate tests.
 
-Penalties on sampled determinants leave folds between the samples, above all along the 12 edges of the cube: there the
-surface is smooth, so the three tangents of an exact fit lie in one plane and det J vanishes. What gives way is the fit:
-within the first spans next to an edge F keeps a small crease, as large as the floor on the coefficients asks for.
+A penalty on sampled determinants leaves folds between the samples, above all along the 12 edges of the cube: there the
+surface is smooth, so the three tangents of an exact fit lie in one plane and det J vanishes. Here the fit gives way: in
+the first spans next to an edge F keeps a small crease, as large as the floor on the coefficients demands.
 
-Few coefficients fall short of the floor. A coefficient is linear in each of the three derivatives, so its own
-derivative is read from the product of the other two: one row of 3 (p + 1)^3 numbers in the span's Bezier points.
+Few coefficients lie below the floor. A coefficient is linear in each of the three derivatives of F, so its own
+derivative is computed from the product of the other two: one row of 3 (p + 1)^3 numbers in the span's Bezier points.
 """
 
 from collections.abc import Callable
@@ -29,10 +29,10 @@ _MOST_KEPT = 300e6  # bytes of rows that are kept from product to product; those
 
 @dataclass(frozen=True, eq=False)
 class _Spans:
-    """k spans: their first control points (k, 3), parametric volumes (k,), floors (k,), and shares (k,).
+    """Hold k spans: their first control points (k, 3), parametric volumes (k,), floors (k,), and shares (k,).
 
-    shares: what a square costs there. weights (k, 3, p + 1, p + 1): from control points to Bezier points, a direction;
-    back: their transposes.
+    shares: the factors of the squared shortfalls in the energy. weights: (k, 3, p + 1, p + 1), the matrices from
+    control points to Bezier points in each direction. back: the transposes of these matrices.
     """
 
     first: IntArray
@@ -43,16 +43,17 @@ class _Spans:
     back: Array
 
     def some(self, chosen: Mask) -> "_Spans":
-        """Return the chosen ones of these spans (k,)."""
+        """Return the spans that the mask `chosen` (k,) selects."""
         return _Spans(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Coefficients below the floor, span by span, of the spans that have some.
+    """Hold the r coefficients below the floor, span by span, of the k spans that have such coefficients.
 
-    shortfall (r,): by how much they are below; rows (r, 3, p + 1, ...): their derivatives in the span's Bezier points.
-    shares (r,): what the square of each costs. starts (k + 1,): the first row of each span.
+    shortfall: (r,), the floor minus the coefficient. rows: (r, 3, p + 1, p + 1, p + 1), the derivatives of the
+    coefficients in the span's Bezier points. shares: (r,), the factors of the squared shortfalls. starts: (k + 1,), the
+    first row of each span.
     """
 
     spans: _Spans
@@ -63,11 +64,11 @@ class _Rows:
 
 
 class DeterminantPenalty:
-    """Mean over all spans of weight * (floor - coefficient)_+^2; coefficients of det J in Bernstein form.
+    """Compute the mean over all spans of weight * (floor - coefficient)_+^2, for the Bernstein coefficients of det J.
 
-    weights (n_u, n_v, n_w): of the spans, 0 to begin with; a span of positive weight is active.
-    knots: the same degree p in the three directions; floor in units of det J. Where it is lowered by a share, the
-    weight grows by the inverse of its square.
+    weights: (n_u, n_v, n_w), the weights of the spans, 0 at first; a span of positive weight is active. knots: the
+    knots of three directions with the same degree p. floor: in units of det J. Where the floor is lowered by a share,
+    the weight grows by the inverse of the squared share.
     """
 
     def __init__(self, knots: Knots, degree: int, floor: float = MIN_COEFFICIENT) -> None:
@@ -84,26 +85,26 @@ class DeterminantPenalty:
         self.weigh(np.zeros_like(self._lowered))
 
     def activate(self, spans: IntArray) -> None:
-        """Give spans (k, 3) at least the weight 1."""
+        """Raise the weights of spans (k, 3) to at least 1."""
         weights = self.weights.copy()
         weights[tuple(spans.T)] = np.maximum(weights[tuple(spans.T)], 1.0)
         self.weigh(weights)
 
     def stiffen(self, spans: IntArray, factor: float, most: float) -> None:
-        """Multiply the weights of spans (k, 3) and of their neighbours by a factor, up to `most`, from 1 on.
+        """Multiply the weights of spans (k, 3) and of their neighbours by a factor, from 1 on and at most to `most`.
 
-        With the neighbours: a fold would only move into the next span.
+        The neighbours are included because otherwise a fold would move into the next span.
         """
         grown = np.minimum(factor * np.maximum(self.weights, 1.0), most)
         self.weigh(np.where(with_neighbours(spans, self.weights.shape), np.maximum(grown, self.weights), self.weights))
 
     def lower_floors(self, shares: Array) -> None:
-        """Ask for these shares (n_u, n_v, n_w) of the floor alone."""
+        """Lower the floors of all spans to shares (n_u, n_v, n_w) of the usual floor."""
         self._lowered = shares
         self.weigh(self.weights)
 
     def weigh(self, weights: Array) -> None:
-        """Take the weights of all spans (n_u, n_v, n_w)."""
+        """Set the weights of all spans, (n_u, n_v, n_w)."""
         self.weights = weights
         active = np.argwhere(weights > 0.0)
         first = np.stack([e[0][s] for e, s in zip(self._extractions, active.T, strict=True)], axis=1)
@@ -116,11 +117,11 @@ class DeterminantPenalty:
         self._pieces = [_Spans(first[b], volumes[b], floors[b], shares[b], bezier[b], back[b]) for b in blocks]
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return the weight of all penalties on folds."""
+        """Return the weight of the penalties on folds in a round."""
         return weights.penalty
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
+        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
 
         def part(spans: _Spans) -> tuple[float, IntArray, Array]:
             found = self._short_rows(control, spans)
@@ -136,8 +137,9 @@ class DeterminantPenalty:
     def curvature(self, control: Array) -> PiecewiseOperator:
         """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision.
 
-        Its rows are kept while they take less than `_MOST_KEPT`: those of a map that folds nearly everywhere would take
-        gigabytes. Where they are made anew at each product, the result is the same.
+        The rows of the operator are kept in memory while they take less than `_MOST_KEPT`, because the rows of a map
+        that folds nearly everywhere would take gigabytes. Otherwise they are computed again for each product, with the
+        same result.
         """
         taken = 0.0
 
@@ -152,7 +154,7 @@ class DeterminantPenalty:
         return PiecewiseOperator(in_parallel(piece, self._pieces), _collected)
 
     def _short_rows(self, control: Array, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
-        """Return the coefficients that fall short on some spans."""
+        """Return the rows of the coefficients that lie below the floor on some spans."""
         points = _bezier_points(control, spans.first, spans.weights)
         points = points.reshape(len(points), 3, *spans.weights.shape[2:], spans.weights.shape[2])
         bezier = np.ascontiguousarray(np.moveaxis(points, 0, -1))  # (3, p + 1, p + 1, p + 1, k)
@@ -174,7 +176,7 @@ class DeterminantPenalty:
 
 
 def _product(found: _Rows, x: Floats) -> tuple[IntArray, Floats]:
-    """Return where the windows of some spans begin, and what their rows, in single precision, make of x there."""
+    """Return the first control points of some spans' windows, and the single-precision rows times x there."""
     spans = found.spans
     weights, back = spans.weights.astype(np.float32), spans.back.astype(np.float32)
     pushed = _squared(x, spans.first, weights, back, found.rows, found.starts, 2.0 * found.shares)
@@ -182,7 +184,7 @@ def _product(found: _Rows, x: Floats) -> tuple[IntArray, Floats]:
 
 
 def _collected(parts: list[tuple[IntArray, Floats]], like: Floats) -> Floats:
-    """Add windows (k, 3, p + 1, p + 1, p + 1) of control points, each from its first one (k, 3) on, in their order."""
+    """Add windows (k, 3, p + 1, p + 1, p + 1) of control points in order; each starts at its first point (k, 3)."""
     total = np.zeros_like(like)
     for first, windows in parts:
         _add_windows(windows, first, total)
@@ -191,7 +193,7 @@ def _collected(parts: list[tuple[IntArray, Floats]], like: Floats) -> Floats:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _along_axes(field: Array, u: Array, v: Array, w: Array) -> None:
-    """Apply matrices (n, n) along the axes of a field (n^3,), in place: each makes the first axis the last one."""
+    """Apply matrices (n, n) along the axes of a field (n^3,), in place: each product makes the first axis the last."""
     n = len(u)
     for matrix in (u, v, w):
         applied = np.zeros((n, n * n), field.dtype)
@@ -206,7 +208,7 @@ def _along_axes(field: Array, u: Array, v: Array, w: Array) -> None:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
-    """Bezier points (k, 3, n^3) of spans with their first control points (k, 3) and weights (k, 3, n, n)."""
+    """Return the Bezier points (k, 3, n^3) of spans with first control points (k, 3) and weights (k, 3, n, n)."""
     spans, n = len(first), weights.shape[2]
     points = np.empty((spans, 3, n**3), control.dtype)
     for s in range(spans):
@@ -224,7 +226,8 @@ def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
 def _add_derivatives(place: IntArray, cross: Array, scale: Array, shares: Array, direction: int, rows: Array) -> None:
     """Add to rows (r, 3, n, n, n) the derivatives of coefficients (r, 4) in the Bezier points, by one derivative of F.
 
-    cross (3, ..., k): the product of the two other derivatives; scale: from differences to that derivative's net.
+    cross: (3, ..., k), the product of the two other derivatives of F. scale: the factor from differences of Bezier
+    points to the control net of that derivative.
     """
     step = np.zeros(3, np.int64)
     step[direction] = 1
@@ -243,7 +246,7 @@ def _add_derivatives(place: IntArray, cross: Array, scale: Array, shares: Array,
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})  # type: ignore[untyped-decorator]
 def _changes(rows: Array, starts: IntArray, points: Array) -> Array:
-    """Multiply the rows of each span with its Bezier points (k, 3, n, n, n)."""
+    """Return the products of the rows of each span with its Bezier points (k, 3, n, n, n)."""
     flat, place = rows.reshape(len(rows), -1), points.reshape(len(points), -1)
     changes = np.empty(len(rows), rows.dtype)
     for s in range(len(points)):
@@ -257,7 +260,7 @@ def _changes(rows: Array, starts: IntArray, points: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _combine(rows: Array, starts: IntArray, factors: Array, back: Array) -> Array:
-    """Sum the rows of each span with their factors (r,), as windows of control points: (k, 3, n, n, n)."""
+    """Return the sum of each span's rows times their factors (r,), as windows (k, 3, n, n, n) of control points."""
     spans, n = len(starts) - 1, back.shape[2]
     flat, windows = rows.reshape(len(rows), 3, n**3), np.zeros((spans, 3, n**3), rows.dtype)
     for s in range(spans):
@@ -274,14 +277,14 @@ def _combine(rows: Array, starts: IntArray, factors: Array, back: Array) -> Arra
 def _squared(
     control: Array, first: IntArray, weights: Array, back: Array, rows: Array, starts: IntArray, shares: Array
 ) -> Array:
-    """Multiply control points by the rows of each span, their shares (r,) and the rows' transpose: as `_combine`."""
+    """Return control points times each span's rows, their shares (r,) and the transposed rows, as in `_combine`."""
     changes = _changes(rows, starts, _bezier_points(control, first, weights))
     return _combine(rows, starts, shares * changes, back)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
-    """Add windows (k, 3, n, n, n) to control points (3, n_u, n_v, n_w), each from its first one on."""
+    """Add windows (k, 3, n, n, n) to control points (3, n_u, n_v, n_w); each starts at its first control point."""
     n = windows.shape[2]
     for s in range(len(first)):
         for c in range(3):

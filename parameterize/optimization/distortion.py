@@ -1,4 +1,4 @@
-"""Distortion of a spline map, with a penalty on det J at the quadrature points."""
+"""Computes the distortion of a spline map, with a penalty on det J at the quadrature points."""
 
 from collections.abc import Callable
 
@@ -22,13 +22,15 @@ _LEAST_DET = 0.03  # in the metric of the damping: below, it would hold F still
 
 
 class Distortion:
-    """int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over the cube with a = |J - R|^2, R the closest rotation.
+    """Compute int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over the cube, with a = |J - R|^2, R the closest rotation.
 
-    a is the ARAP energy of F; the second part keeps its maximum down; the third, like the paper's bijectivity term,
-    holds against folds. Gauss quadrature. Where alpha is lowered by a share, w grows by the inverse of its square.
+    The first term, a, is the ARAP energy of F; the second keeps the maximum of a small; the third prevents folds, as
+    the paper's bijectivity term does. The integral is computed by Gauss quadrature. Where alpha is lowered by a share,
+    w grows by the inverse of the squared share.
 
-    limit: l; penalty: w; folded: the quadrature points with det J <= 0 where the energy was last asked for; damping: of
-    Newton's step, times the squared change of J relative to J: det J bends most where it is small.
+    limit: l. penalty: w. folded: the number of quadrature points with det J <= 0 at the last evaluation of the energy.
+    damping: the damping of Newton's step, a factor of the squared change of J relative to J, because det J has the
+    largest curvature where it is small.
     """
 
     def __init__(self, knots: Knots, degree: int, gauss: tuple[int, int] = _GAUSS) -> None:
@@ -38,7 +40,7 @@ class Distortion:
         self._short_weights = self._grid.weights  # of the squared shortfalls
 
     def start_round(self, control: Array, penalty: float) -> None:
-        """Take the penalty's weight, and put the limit in proportion to 1 + the mean distortion at `control`."""
+        """Set the weight of the penalty, and set the limit l in proportion to 1 + the mean distortion at `control`."""
         self.penalty = penalty
 
         def part(planes: slice) -> float:
@@ -48,12 +50,13 @@ class Distortion:
         self.limit = ARAP_LIMIT * (1.0 + sum(in_parallel(part, self._grid.planes())))
 
     def lower_floors(self, control: Array, least: float) -> Array:
-        """Ask for less where det J is small all around at `control`; return the shares (n_u, n_v, n_w) of the spans.
+        """Lower alpha where det J is small all around at `control`; return the shares (n_u, n_v, n_w) of the spans.
 
-        least: of these shares.
+        least: the smallest of these shares.
 
-        In a stalk that is far thinner than the rest all of det J is small. A penalty that asks for the usual one would
-        blow the stalk up, against the surface's data. So half the mean around is enough, a ninth of the cube wide.
+        In a part that is far thinner than the rest, such as a stalk, det J is small everywhere. A penalty with the
+        usual alpha would inflate such a part, against the surface's data. There alpha is half the mean of det J in a
+        neighbourhood, which is a ninth of the cube wide.
         """
 
         def part(planes: slice) -> Array:
@@ -70,11 +73,11 @@ class Distortion:
         return np.asarray(shares)
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return 1: other weights are in units of the distortion's; the penalty has its own from `start_round`."""
+        """Return 1, because other weights are relative to the distortion; `start_round` sets the penalty's weight."""
         return 1.0
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the energy and its gradient (3, n_u, n_v, n_w); count what is folded."""
+        """Return the energy and its gradient (3, n_u, n_v, n_w), and count the folded quadrature points in `folded`."""
 
         def part(planes: slice) -> tuple[float, int, tuple[int, Floats]]:
             jacobian, weights = self._grid.jacobian(control, planes), self._weights(planes)
@@ -99,7 +102,8 @@ class Distortion:
 
         With S = R^T J, R turns by R [omega] when J changes by d, where (tr(S) I - S) omega = -sum_k R_k x d_k over the
         rows k, so the Hessian of a is 2 (d - R [omega]). It is positive where all sums of two singular values, the
-        eigenvalues of tr(S) I - S, are at least 2; elsewhere these are lifted. The penalty's part is Gauss-Newton.
+        eigenvalues of tr(S) I - S, are at least 2; smaller eigenvalues are raised to 2. The penalty's part is the
+        Gauss-Newton matrix.
         """
         rough = control.astype(np.float32)
 
@@ -126,7 +130,7 @@ class Distortion:
 
 
 def _turning(rotation: Floats, jacobian: Floats) -> Floats:
-    """Return (tr(S) I - S)^-1 with S = R^T J, its eigenvalues lifted so that the least is 2: (3, 3, m)."""
+    """Return (tr(S) I - S)^-1 with S = R^T J, (3, 3, m); eigenvalues of tr(S) I - S below 2 are raised to 2."""
     sums = -_stretches(rotation, jacobian)
     trace = sums[0, 0] + sums[1, 1] + sums[2, 2]
     for i in range(3):
@@ -140,7 +144,7 @@ def _turning(rotation: Floats, jacobian: Floats) -> Floats:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _stretches(rotation: Floats, jacobian: Floats) -> Floats:
-    """Return the symmetric matrices R^T J: (3, 3, m)."""
+    """Return the symmetric matrices R^T J, (3, 3, m)."""
     out = np.zeros_like(jacobian)
     for a in range(3):
         for b in range(3):
@@ -150,9 +154,10 @@ def _stretches(rotation: Floats, jacobian: Floats) -> Floats:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _matrices(rotation: Floats, softness: Floats, pull: Floats, push: Floats, scale: Floats, held: Floats) -> Floats:
-    """Return the symmetric matrices of the second derivative in the nine entries of J: (45, m), see SYMMETRIC.
+    """Return the symmetric matrices (45, m) of the second derivative in the nine entries of J, as in SYMMETRIC.
 
-    scale (I - B softness B^T) + pull pull^T + push push^T + held I; B^T d is the sum of R_k x d_k over the rows k.
+    They are scale (I - B softness B^T) + pull pull^T + push push^T + held I; B^T d is the sum of R_k x d_k over the
+    rows k.
     """
     m = scale.size
     turn, soft = np.zeros((9, 3, m), scale.dtype), np.zeros((9, 3, m), scale.dtype)

@@ -1,10 +1,10 @@
-"""Points on the 12 edges of the cube that draw F towards the surface.
+"""Draws F towards the surface at anchors, which are points on the 12 edges of the cube.
 
-No vertex of the mesh need have its parameter there, and F, which keeps a small crease along those edges, could stick
-out unseen, most of all at the eight corners, and blow up the elements there. They are for a map that is nearly there:
-on a rough one the nearest points are those of another part of the surface, and it would be held there. Corners that the
-user gives are held until the map is certified; in the last rounds they may move a little: held to the end, the boundary
-crosses itself beside them.
+The edges of the cube may have no parameter of a vertex of the mesh. F keeps a small crease along these edges, and
+without anchors it could leave the surface there, most of all at the eight corners, and inflate the elements. Anchors
+suit a map that is nearly on the surface: on a rough map the nearest points belong to another part of the surface, and
+the anchors would hold F at that part. Corners that the user gives are held until the map is certified; in the last
+rounds they may move a little, because the boundary crosses itself beside corners that are held to the end.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ _GIVEN_CORNER = 0.5  # weight, in all directions, of a corner that the user give
 
 
 def edge_points(knots: Knots) -> Array:
-    """Return the corners of the cube, and the ends and middles of the spans along its edges: (k, 3)."""
+    """Return the corners of the cube, and the ends and the midpoints of the spans along its edges: (k, 3)."""
     points = []
     for i, j in EDGES:
         direction = CORNERS[j] - CORNERS[i]
@@ -36,7 +36,7 @@ def edge_points(knots: Knots) -> Array:
 
 
 class EdgeAnchors:
-    """The anchors as a SurfaceFit whose parameters stay; they pull on nothing until they are aimed."""
+    """Hold the anchors as a SurfaceFit with fixed parameters; anchors have no effect until `aim` is called."""
 
     def __init__(self, surface: SurfaceFit) -> None:
         self._surface = surface
@@ -46,11 +46,11 @@ class EdgeAnchors:
         self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return a share of the weight of the surface's data."""
+        """Return the weight of the anchors in a round, a share of the weight of the surface's data."""
         return _WEIGHT * weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the mean squared distance at control points (3, n_u, n_v, n_w), and its gradient."""
+        """Return the mean squared distance at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
         return self.fit.energy_and_gradient(control)
 
     def curvature(self, control: Array) -> PiecewiseOperator:
@@ -58,15 +58,15 @@ class EdgeAnchors:
         return self.fit.curvature(control)
 
     def near(self, control: Array) -> bool:
-        """Return whether F is so close to the surface along all edges that the nearest points are the right ones."""
+        """Return whether F is close enough to the surface along all edges for the nearest points to be right."""
         here, points, _ = self._nearest(control)
         longest = _NEAR / (min(control.shape[1:]) - self.fit.places.degree)
         return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= _NEAR_SHARE
 
     def aim(self, control: Array, *, hold: bool) -> None:
-        """Take the points of the surface nearest to F as it is, each with the normal of its triangle.
+        """Set as goals the points of the surface that are nearest to F at present, with the normals of their triangles.
 
-        hold: leave given corners at their places.
+        hold: whether given corners stay goals at their own places.
         """
         _, points, normals = self._nearest(control)
         quadrics = normals[:, :, None] * normals[:, None, :] + TANGENTIAL * np.eye(3)
@@ -75,23 +75,23 @@ class EdgeAnchors:
         self.fit.aim(points, quadrics)
 
     def release(self) -> None:
-        """Pull on nothing but given corners until they are aimed again."""
+        """Remove all goals but the given corners, until `aim` is called again."""
         points, quadrics = self.fit.points.copy(), np.zeros((len(self.fit.points), 3, 3))
         self._hold(points, quadrics)
         self.fit.aim(points, quadrics)
 
     def _hold(self, points: Array, quadrics: Array) -> None:
-        """Put given corners in place of those."""
+        """Replace the points and the quadrics of the cube's corners by the corners that the user gives."""
         if (given := self._surface.given_corners) is not None:
             corner = np.isin(self.fit.places.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
             points[corner], quadrics[corner] = given, _GIVEN_CORNER * np.eye(3)
 
     def restore(self, points: Array, yielding: Array) -> None:
-        """Take the state of a checkpoint: the next distances then round as they would have without the interruption."""
+        """Set the state of a checkpoint, so that later distances round as they would without an interruption."""
         self.fit.aim(points, np.zeros((len(points), 3, 3)))
         self.fit.give_way(yielding)
 
     def _nearest(self, control: Array) -> tuple[Array, Array, Array]:
-        """Return F at the anchors, the points of the surface nearest to it and the normals there: (k, 3) each."""
+        """Return F at the anchors, the nearest points of the surface and the normals at these points: (k, 3) each."""
         here = self.fit.residuals(control) + self.fit.points
         return here, *nearest_on_mesh(here, self._surface.points, self._surface.places.triangles)

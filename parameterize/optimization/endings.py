@@ -1,4 +1,4 @@
-"""Why a phase of the rounds is over, and how the rounds went: names and numbers that the log and report.json carry."""
+"""Defines the endings of a phase and the course of the rounds, with the names that the log and report.json show."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Reason(StrEnum):
-    """Why a phase is over, with a sentence that explains it."""
+    """Name a reason for which a phase ends, with a sentence that explains it."""
 
     sentence: str
 
@@ -25,27 +25,27 @@ class Reason(StrEnum):
     OUT_OF_ROUNDS = "out of rounds", "the stage has had all its rounds."
 
     def __new__(cls, name: str, sentence: str) -> "Reason":
-        """Return a member that is equal to its name."""
+        """Return a member whose value is its name."""
         reason = str.__new__(cls, name)
         reason._value_, reason.sentence = name, sentence
         return reason
 
     @property
     def ends_the_rounds(self) -> bool:
-        """Whether no other phase follows."""
+        """Return whether no other phase follows."""
         return self not in (Reason.GROWN, Reason.SHAPED, Reason.CERTIFIED, Reason.APART)
 
 
 @dataclass(frozen=True)
 class Course:
-    """How the rounds of a spline stage went: their number and wall seconds by phase, and why they ended."""
+    """Describe the rounds of a spline stage: their number and wall seconds by phase, and the reason of their end."""
 
     rounds: Counter[str]
     seconds: dict[str, float]
     ending: Reason
 
     def after(self, earlier: "Course") -> "Course":
-        """Return the course of both, with the rounds of an earlier one counted first."""
+        """Return the course of two parts of the rounds, `earlier` and this one, with the ending of this one."""
         names = earlier.seconds | self.seconds
         seconds = {name: earlier.seconds.get(name, 0.0) + self.seconds.get(name, 0.0) for name in names}
         return Course(earlier.rounds + self.rounds, seconds, self.ending)

@@ -1,8 +1,8 @@
-"""The energy of a spline map in its control points: distortion, smoothness, boundary, penalties on det J.
+"""Computes the energy of a spline map in its control points: distortion, smoothness, boundary, penalties on det J.
 
 Its second derivative, for Newton's method, is exact for the distortion wherever that is convex (the rotations turn with
-J: holding them still, as local-global methods do, makes sliding along the surface slow), and Gauss-Newton for the
-penalties. The boundary term is quadratic with its parameters held.
+J; local-global methods hold the rotations fixed, which makes slides along the surface slow), and is the Gauss-Newton
+matrix for the penalties. The boundary term is quadratic for fixed parameters.
 """
 
 from collections.abc import Iterable
@@ -33,9 +33,10 @@ _SMOOTH_TOLERANCE, _SMOOTH_ITERATIONS = 1e-8, 5000  # of `smoothed`, whose resul
 
 
 class SplineEnergy:
-    """The terms of the energy, those of the solid and those of the boundary apart.
+    """Sum the terms of the energy, with the terms of the solid and the terms of the boundary in separate tuples.
 
-    `inner` changes with the control points alone, `outer` also where the surface's parameters slide.
+    The terms of `inner` depend on the control points alone; the terms of `outer` also depend on the surface's
+    parameters.
     """
 
     def __init__(self, knots: Knots, surface: SurfaceFit, weights: Weights) -> None:
@@ -54,7 +55,7 @@ class SplineEnergy:
 
     @property
     def outer(self) -> tuple[Term, ...]:
-        """The terms of the boundary that act at present."""
+        """Return the terms of the boundary that are in effect at present."""
         terms: tuple[Term | None, ...] = (self.surface, self.anchors, self._contact, self._facing)
         return tuple(term for term in terms if term is not None)
 
@@ -66,9 +67,9 @@ class SplineEnergy:
         return FastDiagonalization(rough, self.fairness.mass, dtype=np.float32)
 
     def start_round(self, control: Array, penalty: float, share: float | None = None) -> None:
-        """Take a penalty weight, and the limit of the distortion and the floors of det J that suit the control points.
+        """Set the weight of the penalty, the limit of the distortion and the floors of det J for the control points.
 
-        share: while F grows into the solid, that of the weight of the surface's data.
+        share: the share of the weight of the surface's data while F grows into the solid; None where F does not grow.
         """
         self._round = RoundWeights(penalty, self._weights.surface * (1.0 if share is None else share))
         self.distortion.start_round(control, penalty)
@@ -82,19 +83,22 @@ class SplineEnergy:
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
     def watch_facing(self, control: Array) -> None:
-        """Penalise, from now on, the places of F's boundary that hardly face the way the mesh does at `control`.
+        """Penalise, from now on, the places where the normal of F's boundary hardly agrees with the mesh at `control`.
 
-        While F grows it is too far away for that to mean something.
+        While F grows there is no such penalty, because F is too far from the mesh for the normals to be compared.
         """
         self._facing = None if self._grows else facing_penalty(self.surface, control)
 
     def watch_contact(self, control: Array) -> IntArray:
-        """Push apart, from now on, the sheets of F's boundary that hardly are at `control`; return their spans."""
+        """Penalise, from now on, contact between sheets of F's boundary at `control`; return the spans in contact.
+
+        The spans have the shape (k, 3).
+        """
         self._contact = contact_penalty(SplineMap(self.degree, self._knots, control))
         return self._contact.spans
 
     def slide(self, control: Array) -> None:
-        """Let the surface's parameters slide towards their closest points, and watch how F faces there."""
+        """Let the surface's parameters slide towards their closest points, and penalise wrong normals of F there."""
         places, points, longest = self.surface.places, self.surface.points, 0.5 / max(control.shape[1:])
         if self._grows:
             places.slide(control, points, longest, keep_layout=True, reach=_REACH)
@@ -107,26 +111,29 @@ class SplineEnergy:
             self._contact = contact_penalty(SplineMap(self.degree, self._knots, control), near=self._contact.near)
 
     def give_way(self, spans: IntArray, factor: float) -> None:
-        """Multiply the weights of boundary data in and next to spans (k, 3) of the map by `factor`."""
+        """Multiply by `factor` the weights of the boundary data in and next to the spans (k, 3) of the map."""
         for fit in (self.surface, self.anchors.fit):
             fit.give_way(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.yielding)
 
     @property
     def yields(self) -> bool:
-        """Whether some boundary data has less than its whole weight."""
+        """Return whether some of the boundary data have less than their whole weight."""
         return any(bool((fit.yielding < 1.0).any()) for fit in (self.surface, self.anchors.fit))
 
     def take_back(self, factor: float) -> None:
-        """Divide by `factor` what such factors have become, up to 1."""
+        """Divide the factors that `give_way` has applied by `factor`; a factor becomes 1 at most."""
         for fit in (self.surface, self.anchors.fit):
             fit.give_way(np.minimum(fit.yielding / factor, 1.0))
 
     def volume_part(self, control: Array) -> tuple[float, Array, int]:
-        """Return the terms of the solid: energy, gradient, folded quadrature points."""
+        """Return the energy of the solid's terms, its gradient (3, n_u, n_v, n_w), and the number of folded points.
+
+        The points are those of the distortion's quadrature.
+        """
         return *self._sum(self.inner, control), self.distortion.folded
 
     def surface_part(self, control: Array) -> tuple[float, Array]:
-        """Return the terms of the boundary at the present parameters: energy and gradient."""
+        """Return the energy of the boundary's terms at the present parameters, and its gradient (3, n_u, n_v, n_w)."""
         return self._sum(self.outer, control)
 
     def _sum(self, terms: Iterable[Term], control: Array) -> tuple[float, Array]:
@@ -138,9 +145,9 @@ class SplineEnergy:
         return energy, gradient
 
     def smoothed(self, control: Array, spans: IntArray) -> Array:
-        """Bend F as little as possible in and next to spans (k, 3): return the control points, the others held.
+        """Return control points that bend F least in and next to the spans (k, 3); all other control points stay.
 
-        Which side is folded over which plays no part in this, as it does where det J is penalised.
+        Unlike the penalty on det J, this does not depend on which side of a fold has the wrong orientation.
         """
         free = acting_on(with_neighbours(spans, self.determinants.weights.shape), self.degree)
         moved = conjugate_gradients(
@@ -153,7 +160,7 @@ class SplineEnergy:
         return control + moved
 
     def newton_direction(self, control: Array, right: Array, damping: float = 0.0) -> Array:
-        """Solve roughly (Hessian + damping) x = right at `control`, the parameters of the surface held."""
+        """Return an approximate solution of (Hessian + damping) x = right at `control`, with fixed parameters."""
         self.distortion.damping = damping
         terms = [(term.weight(self._round), term.curvature(control)) for term in (*self.inner, *self.outer)]
         direction = conjugate_gradients(

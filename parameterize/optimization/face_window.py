@@ -1,4 +1,4 @@
-"""The basis functions that are not zero at points of the cube's boundary, and F with its tangents there."""
+"""Evaluates the basis functions that are not zero at points of the cube's boundary, and F with its tangents there."""
 
 from dataclasses import dataclass
 
@@ -14,10 +14,11 @@ Polynomials = tuple[IntArray, Array, IntArray, Array]
 
 
 def polynomials_of(knots: Knots, degree: int) -> Polynomials:
-    """Return the functions that are not zero on a span as polynomials, which are cheap to evaluate.
+    """Return the basis functions that are not zero on a span as polynomials, which are cheap to evaluate.
 
-    That is, for the spans of all directions one after the other, where those of each direction begin (4,), where a
-    span begins (s,), its first function (s,), and the Taylor coefficients there, power by power (s, p + 1, p + 1).
+    The arrays hold the spans of all directions one after the other: the first span of each direction (4,), the first
+    parameter of each span (s,), its first basis function (s,), and the Taylor coefficients there (s, p + 1, p + 1),
+    power by power.
     """
     begins = [breakpoints(row)[:-1] for row in knots]
     found = [basis_derivatives(row, degree, begin, degree) for row, begin in zip(knots, begins, strict=True)]
@@ -29,7 +30,10 @@ def polynomials_of(knots: Knots, degree: int) -> Polynomials:
 
 @dataclass(frozen=True, eq=False)
 class FaceWindow:
-    """indices (N, k) of control points; in_a, in_b (N, 2, p + 1): values and derivatives in the face's directions."""
+    """Hold the numbers (N, k) of control points, and the values and derivatives in_a, in_b (N, 2, p + 1) of functions.
+
+    in_a and in_b belong to the two directions of the point's cube face.
+    """
 
     indices: IntArray
     in_a: Array
@@ -37,25 +41,25 @@ class FaceWindow:
 
     @classmethod
     def at(cls, polynomials: Polynomials, parameters: Array, cube_faces: IntArray) -> "FaceWindow":
-        """Return the functions at points (N, 3) on cube faces (N,)."""
+        """Return the window of the basis functions at points (N, 3) on cube faces (N,)."""
         found = in_parallel(
             lambda rows: _face_windows(polynomials, parameters[rows], cube_faces[rows]), pieces(len(cube_faces))
         )
         return cls(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
     def weights(self, a: int, b: int) -> Array:
-        """Return the control points' weights in the derivative of order a and b: (N, k)."""
+        """Return the weights (N, k) of the control points in the derivative of orders a and b."""
         return (self.in_a[:, a, :, None] * self.in_b[:, b, None, :]).reshape(self.indices.shape)
 
     def derivatives(self, control: Array) -> tuple[Array, Array, Array]:
-        """Return F and its tangents t_a and t_b at the points: (N, 3) each."""
+        """Return F and its tangents t_a and t_b at the points, (N, 3) each."""
         flat, windows = control.reshape(3, -1), (self.indices, self.in_a, self.in_b)
         found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), pieces(len(self.indices)))
         value, along_a, along_b = np.concatenate(found).swapaxes(0, 1)
         return value, along_a, along_b
 
     def with_points(self, chosen: Mask, other: "FaceWindow") -> "FaceWindow":
-        """Return this window with the chosen points (N,) replaced by those of another one."""
+        """Return this window with the rows of the chosen points (N,) replaced by the rows of another window."""
         replaced = FaceWindow(self.indices.copy(), self.in_a.copy(), self.in_b.copy())
         replaced.indices[chosen], replaced.in_a[chosen], replaced.in_b[chosen] = other.indices, other.in_a, other.in_b
         return replaced
@@ -63,7 +67,7 @@ class FaceWindow:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _face_windows(polynomials: Polynomials, parameters: Array, cube_faces: IntArray) -> tuple[IntArray, Array, Array]:
-    """Return what a FaceWindow holds, for points (N, 3) on cube faces (N,)."""
+    """Return the three arrays of a FaceWindow for points (N, 3) on cube faces (N,)."""
     count, width = len(parameters), polynomials[3].shape[1]
     indices = np.empty((count, width * width), np.int64)
     in_a, in_b = np.empty((count, 2, width)), np.empty((count, 2, width))
@@ -82,7 +86,7 @@ def fill_window(
     in_a: Array,
     in_b: Array,
 ) -> None:
-    """Write row n of what a FaceWindow holds."""
+    """Write row n of the three arrays of a FaceWindow."""
     starts, _, first, _ = polynomials
     axis, width = cube_faces[n] // 2, in_a.shape[2]
     a, b = (axis + 1) % 3, (axis + 2) % 3
@@ -98,7 +102,7 @@ def fill_window(
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _fill_values(polynomials: Polynomials, direction: int, x: float, n: int, out: Array) -> int:
-    """Write row n of values and derivatives (N, 2, p + 1); return the index of the first function that is not zero."""
+    """Write row n of values and derivatives (N, 2, p + 1); return the number of the first function that is not zero."""
     starts, begins, first, coefficients = polynomials
     low, high = starts[direction], starts[direction + 1]
     while high - low > 1:
@@ -119,7 +123,7 @@ def _fill_values(polynomials: Polynomials, direction: int, x: float, n: int, out
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _tangents(indices: IntArray, in_a: Array, in_b: Array, control: Array) -> Array:
-    """Return F, t_a and t_b of control points (3, n) at the points of a FaceWindow: (N, 3, 3)."""
+    """Return F, t_a and t_b, (N, 3, 3), of control points (3, n) at the points of a FaceWindow."""
     out = np.empty((len(indices), 3, 3))
     for n in range(len(indices)):
         fill_tangents(indices, in_a, in_b, control, n, out)

@@ -1,4 +1,4 @@
-"""First spline from the trained network: least squares on pairs (G(x), x), slightly smoothed (section 4.3.2)."""
+"""Fits the first spline to the trained network: least squares on pairs (G(x), x), slightly smoothed (section 4.3.2)."""
 
 import numpy as np
 
@@ -16,8 +16,8 @@ def fit_pairs(
 ) -> SplineMap:
     """Return the map that minimises sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
 
-    parameters (m, 3) in the unit cube, points (m, 3), weights (m,) that sum to 1: the discrete form of the paper's
-    least squares on G(F(x)) = x. Where no sample lies, the smoothing term alone decides.
+    parameters: (m, 3) in the unit cube. points: (m, 3). weights: (m,), with sum 1. This is the discrete form of the
+    paper's least squares on G(F(x)) = x. In spans without samples the smoothing term alone determines the map.
     """
     sizes, span = [len(k) - degree - 1 for k in knots], (degree + 1) ** 3
     tables = [basis_derivatives(k, degree, parameters[:, d]) for d, k in enumerate(knots)]

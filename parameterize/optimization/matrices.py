@@ -1,6 +1,6 @@
-"""Cofactors, determinants, norms and least eigenvalues of 3 x 3 matrices.
+"""Computes cofactors, determinants, norms and least eigenvalues of 3 x 3 matrices.
 
-Matrices come as (3, 3, m): row, column, sample. Held this way every operation runs along contiguous memory.
+Matrices have the shape (3, 3, m): row, column, sample. In this layout every operation runs along contiguous memory.
 """
 
 import math
@@ -26,7 +26,7 @@ def cofactors_and_determinants(matrices: Floats) -> tuple[Floats, Floats]:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def dots(a: Floats, b: Floats) -> Floats:
-    """Return the inner products of vectors (k, m): (m,)."""
+    """Return the inner products (m,) of vectors (k, m)."""
     out = np.zeros(a.shape[1], a.dtype)
     for c in range(a.shape[0]):
         for i in range(a.shape[1]):
@@ -35,14 +35,14 @@ def dots(a: Floats, b: Floats) -> Floats:
 
 
 def squared_norms(matrices: Floats) -> Floats:
-    """Return the sums of the squared entries of (3, 3, m): (m,)."""
+    """Return the sums (m,) of the squared entries of matrices (3, 3, m)."""
     flat = matrices.reshape(9, -1)
     return np.asarray(dots(flat, flat))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def least_eigenvalues(matrices: Floats) -> Floats:
-    """Return the least eigenvalue of symmetric matrices (3, 3, m), by the trigonometric formula: (m,)."""
+    """Return the least eigenvalues (m,) of symmetric matrices (3, 3, m), by the trigonometric formula."""
     out = np.empty(matrices.shape[2], matrices.dtype)
     for i in range(out.size):
         s = matrices[:, :, i]

@@ -1,7 +1,7 @@
-"""One round of truncated Newton steps on the energy of energy.py, and the rule by which it ends.
+"""Makes one round of truncated Newton steps on the energy of energy.py, and decides when the round ends.
 
-Between steps the boundary parameters slide (surface_distance.py). Steps and sliding by turns converge linearly;
-acceleration.py looks ahead, and what it finds is kept where it is lower.
+The boundary's parameters slide between steps (surface_distance.py). Alternate steps and slides converge linearly;
+acceleration.py guesses the limit, and the guess is used where its energy is lower.
 """
 
 import logging
@@ -26,7 +26,7 @@ _SMALL_GAINS = 2  # in a row end a round: a step may gain little by chance
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Control points with energy and gradient, the boundary's part apart: it alone changes when parameters slide."""
+    """Hold control points with the energy and its gradient; the boundary's part, which slides change, is separate."""
 
     control: Array
     inner: tuple[float, Array]
@@ -40,7 +40,7 @@ class Point:
 
     @property
     def gradient(self) -> Array:
-        """Return its gradient."""
+        """Return the gradient of the energy, (3, n_u, n_v, n_w)."""
         return self.inner[1] + self.outer[1]
 
 
@@ -50,10 +50,11 @@ def _evaluate(control: Array, energy: SplineEnergy) -> Point:
 
 
 def _line_search(point: Point, direction: Array, energy: SplineEnergy) -> tuple[Point, float] | None:
-    """Shorten the step until the energy falls enough (Armijo); return where it leads, and its length, at most 1.
+    """Shorten the step until the energy falls enough (Armijo); return the point after it, and its length, at most 1.
 
-    The next length is where the parabola through the values and the slope at 0 has its minimum, between a tenth and a
-    half of the last (Nocedal and Wright, section 3.5). None where the direction does not lead down.
+    The next length is the minimum of the parabola through the two values and the slope at 0, between a tenth and a half
+    of the last length (Nocedal and Wright, section 3.5). None is returned where the energy does not fall in the
+    direction.
     """
     slope = float((direction * point.gradient).sum())
     length = 1.0
@@ -68,9 +69,9 @@ def _line_search(point: Point, direction: Array, energy: SplineEnergy) -> tuple[
 
 
 def _look_ahead(found: Point, acceleration: Acceleration, energy: SplineEnergy) -> Point | None:
-    """Return the point that the acceleration guesses, parameters slid there; None where it lies no lower than `found`.
+    """Return the point that the acceleration guesses, with slid parameters; None where its energy is not below `found`.
 
-    The parameters are then where they were.
+    With None, the parameters of the surface are unchanged.
     """
     if (control := acceleration.guess()) is None:
         return None
@@ -86,7 +87,7 @@ def _look_ahead(found: Point, acceleration: Acceleration, energy: SplineEnergy) 
 
 
 def _next_damping(damping: float, length: float) -> float:
-    """Raise the damping after a step that had to be shortened to less than half, lower it after a full one."""
+    """Return a larger damping after a step that was shortened to less than half, a smaller one after a full step."""
     if length < 0.5:
         return max(_DAMPING, _DAMPING_GROWTH * damping)
     lowered = damping / _DAMPING_GROWTH if length == 1.0 else damping
@@ -95,9 +96,10 @@ def _next_damping(damping: float, length: float) -> float:
 
 @dataclass
 class StoppingRule:
-    """When a round of steps ends: after `steps`, or where they lower the energy by less than the share `gain`.
+    """End a round after `steps`, or where the steps lower the energy by less than the share `gain`.
 
-    Steps with sliding count together: single ones may gain little, and sliding may raise the energy of what is folded.
+    Several steps with their slides are judged together: a single step may gain little, and a slide may raise the energy
+    of folded spans.
     """
 
     steps: int
@@ -108,7 +110,10 @@ class StoppingRule:
     small: int = 0  # gains in a row that were too small
 
     def ends(self, before: float, searched: float, slid: float) -> bool:
-        """Return whether a step is the last: its energy before it, after the line search, and after sliding."""
+        """Return whether a step is the last one.
+
+        before, searched, slid: the energy before the step, after the line search, and after the slide.
+        """
         self.taken += 1
         self.lowest = min(self.lowest, before)
         self.waited = 0 if slid < (1.0 - self.gain) * self.lowest else self.waited + 1
@@ -120,7 +125,7 @@ class StoppingRule:
 def descend(energy: SplineEnergy, control: Array, rule: StoppingRule, after_step: Callable[[Point], None]) -> Array:
     """Return the control points (3, n_u, n_v, n_w) after one round of steps; the surface's parameters slide with them.
 
-    after_step: called with where each step has led to.
+    after_step: a function that is called with the point after each step.
     """
     energy.watch_facing(control)
     point = _evaluate(control, energy)

@@ -1,8 +1,8 @@
-"""Penalty on places of F's boundary that do not face the way the mesh does.
+"""Penalises places of F's boundary whose normal does not agree with the normal of the mesh.
 
-A boundary that runs back over itself may have det J > 0 everywhere: the part in between faces inwards, and the closest
-points of the mesh cannot be one-to-one on it. What is asked for is (t_a x t_b) . n >= floor at the surface points, t_a
-and t_b the tangents of F along the cube's face and n the mesh's normal (one-sided, unlike L_norm, section 4.4.1).
+A boundary that runs back over itself may have det J > 0 everywhere: its middle part faces inwards, and the closest
+points of the mesh cannot be one-to-one on it. The penalty demands (t_a x t_b) . n >= floor at the surface points, with
+t_a and t_b the tangents of F along the cube's face and n the mesh's normal (one-sided, unlike L_norm, section 4.4.1).
 """
 
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ _MARGIN = 3.0  # times that: points below may fall under it in the next step and
 
 @dataclass(frozen=True, eq=False)
 class FacingPenalty:
-    """Sum of weight (floor - (t_a x t_b) . n)_+^2 over k points.
+    """Compute the sum of weight * (floor - (t_a x t_b) . n)_+^2 over k points.
 
-    tangents: rows that yield t_a and t_b at the points; normals (3, k), pointing out of the cube where
-    (a, b, outwards) is right-handed and into it elsewhere; weights (k,).
+    tangents: the rows that yield t_a and t_b at the points. normals: (3, k); a normal points out of the cube where (a,
+    b, outwards) is right-handed, and into it elsewhere. weights: (k,).
     """
 
     tangents: tuple[ControlRows, ControlRows]
@@ -34,11 +34,11 @@ class FacingPenalty:
     floor: float
 
     def weight(self, weights: RoundWeights) -> float:
-        """Return the weight of all penalties on folds."""
+        """Return the weight of the penalties on folds in a round."""
         return weights.penalty
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient."""
+        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
         by_a, by_b, size = self._slopes(control)
         shortfall = np.maximum(self.floor - size, 0.0)
         gradient = self._pull(-2.0 * self.weights * shortfall, by_a, by_b, control)
@@ -59,7 +59,7 @@ class FacingPenalty:
         return PiecewiseOperator([product], lambda parts, _: parts[0])
 
     def _slopes(self, control: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return (t_a x t_b) . n, last, after its derivatives in t_a and t_b: (3, k) each."""
+        """Return the derivatives of (t_a x t_b) . n in t_a and in t_b, (3, k) each, and then its values, (k,)."""
         a, b = (rows(control).T for rows in self.tangents)
         by_a, by_b = np.cross(b, self.normals, axis=0), np.cross(self.normals, a, axis=0)
         return by_a, by_b, dots(a, by_a)
@@ -72,7 +72,7 @@ class FacingPenalty:
 def facing_penalty(fit: SurfaceFit, control: Array, floor: float = _FLOOR) -> FacingPenalty:
     """Return the penalty at the points of the surface where (t_a x t_b) . n is near the floor at these control points.
 
-    It also holds points that could fall below the floor in the next step.
+    The penalty includes points that could fall below the floor in the next step.
     """
     window = fit.places.window
     _, tangent_a, tangent_b = window.derivatives(control)

@@ -1,7 +1,7 @@
-"""Linear operators on control points: sums made of pieces of work, and sparse rows.
+"""Defines linear operators on control points: sums of pieces of work, and sparse rows.
 
-Control points are held as (3, n_u, n_v, n_w), component first. Pieces of work run on all threads; their results are
-added in their order, so that the number of threads changes no bit.
+Control points have the shape (3, n_u, n_v, n_w), component first. The pieces of work run on all threads; their results
+are added in the order of the pieces, so that every number of threads gives the same bits.
 """
 
 from collections.abc import Callable
@@ -20,23 +20,23 @@ _ROWS = 4096  # in a piece of work
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseOperator:
-    """x -> add(what every piece makes of x, x); `add` takes these in the order of the pieces."""
+    """Map x to the sum of what the pieces of work compute from x; `add` receives these parts in order, and x."""
 
     pieces: list[Callable[[Floats], Any]]
     add: Callable[[list[Any], Floats], Floats]
 
     def __call__(self, x: Floats) -> Floats:
-        """Apply the operator to control points: (3, n_u, n_v, n_w) -> the same shape."""
+        """Return the operator applied to control points (3, n_u, n_v, n_w), in the same shape."""
         return self.add(in_parallel(lambda piece: piece(x), self.pieces), x)
 
 
 def pieces(count: int) -> list[slice]:
-    """Return which of `count` rows belong to each piece of work; there is at least one."""
+    """Return the rows of each piece of work, out of `count` rows; there is at least one piece."""
     return [slice(begin, begin + _ROWS) for begin in range(0, max(count, 1), _ROWS)]
 
 
 def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOperator:
-    """Return the sum of operators times their weights: one call runs all their pieces."""
+    """Return the sum of operators times their weights, as an operator that runs the pieces of all in one call."""
 
     def add(found: list[Any], x: Floats) -> Floats:
         total, begin = np.zeros_like(x), 0
@@ -51,7 +51,7 @@ def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOpera
 
 @dataclass(frozen=True, eq=False)
 class ControlRows:
-    """Rows that apply to control points, and their transpose: N of k entries each, their columns and values (N, k)."""
+    """Hold N rows of k entries that act on control points, as columns and values (N, k), with their transpose."""
 
     columns: IntArray
     values: Floats
@@ -61,13 +61,13 @@ class ControlRows:
         return ControlRows(self.columns, self.values.astype(np.float32))
 
     def __call__(self, control: Floats) -> Floats:
-        """Return the values (N, 3) at control points (3, n_u, n_v, n_w)."""
+        """Return the products (N, 3) of the rows and control points (3, n_u, n_v, n_w)."""
         field = control.reshape(3, -1)
         found = in_parallel(lambda rows: _times(self.columns[rows], self.values[rows], field), pieces(len(self.values)))
         return np.concatenate(found)
 
     def adjoint(self, dual: Floats, like: Floats) -> Floats:
-        """Apply the transpose to (N, 3); the result has the shape of the control points `like`."""
+        """Return the product of the transposed rows and `dual` (N, 3), in the shape of the control points `like`."""
         flat, count = np.ascontiguousarray(dual), like.size // 3
 
         def part(rows: slice) -> Floats:
@@ -76,7 +76,7 @@ class ControlRows:
         return _summed(in_parallel(part, pieces(len(self.values))), like)
 
     def squared(self, metric: Floats) -> PiecewiseOperator:
-        """Return the rows, then matrices (N, 3, 3) on what they yield, then the transpose of the rows."""
+        """Return the operator R^T M R of the rows R and matrices M (N, 3, 3)."""
 
         def product(rows: slice, field: Floats) -> Floats:
             return np.asarray(_squared(self.columns[rows], self.values[rows], metric[rows], field.reshape(3, -1)))
@@ -85,13 +85,13 @@ class ControlRows:
 
 
 def _summed(parts: list[Floats], like: Floats) -> Floats:
-    """Add parts (3, n), in their order, to control points of the shape of `like`."""
+    """Return the sum of parts (3, n), added in their order, in the shape of the control points `like`."""
     return sum(parts[1:], start=parts[0]).reshape(like.shape)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _times(columns: IntArray, values: Floats, field: Floats) -> Floats:
-    """Multiply rows (m, k) by a field (3, n): (m, 3)."""
+    """Return the product (m, 3) of rows (m, k) and a field (3, n)."""
     out = np.zeros((len(columns), 3), field.dtype)
     for row in range(len(columns)):
         for entry in range(columns.shape[1]):
@@ -103,7 +103,7 @@ def _times(columns: IntArray, values: Floats, field: Floats) -> Floats:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _spread(columns: IntArray, values: Floats, dual: Floats, count: int) -> Floats:
-    """Multiply the transpose of rows (m, k) by (m, 3): (3, count)."""
+    """Return the product (3, count) of transposed rows (m, k) and `dual` (m, 3)."""
     out = np.zeros((3, count), dual.dtype)
     for row in range(len(columns)):
         for entry in range(columns.shape[1]):
@@ -115,7 +115,7 @@ def _spread(columns: IntArray, values: Floats, dual: Floats, count: int) -> Floa
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _squared(columns: IntArray, values: Floats, metric: Floats, field: Floats) -> Floats:
-    """Multiply the transpose of rows (m, k) by metrics (m, 3, 3) times the rows times a field (3, n): (3, n)."""
+    """Return the product (3, n) of the transposed rows (m, k), metrics (m, 3, 3), the rows, and a field (3, n)."""
     out, zero = np.zeros_like(field), field.dtype.type(0.0)
     for row in range(len(columns)):
         x, y, z = zero, zero, zero

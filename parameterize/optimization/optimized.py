@@ -1,4 +1,4 @@
-"""A map as the rounds find it, and what is proved of it."""
+"""Holds a map that the rounds have found, with the results of its certificate."""
 
 from dataclasses import dataclass
 
@@ -9,10 +9,10 @@ from ..spline.spline_map import SplineMap
 
 @dataclass(frozen=True, eq=False)
 class Optimized:
-    """A map at volume 1, and what is proved of it.
+    """Hold a map at volume 1 and the results of its certificate.
 
-    injective: True where the boundary is proved not to meet itself, False where it was found to, None where that is not
-    decided; it is asked of certified maps alone.
+    injective: True where the boundary is proved not to meet itself, False where the boundary was found to meet itself,
+    None where neither is decided; only the boundary of a certified map is examined.
     """
 
     spline: SplineMap
@@ -29,15 +29,15 @@ class Optimized:
 
     @property
     def meets_itself(self) -> bool:
-        """Whether the boundary of a certified map was found to meet itself."""
+        """Return whether the boundary of a certified map was found to meet itself."""
         return self.injective is False
 
     @property
     def faults(self) -> tuple[int, bool]:
-        """What keeps the map from being one-to-one; fewer unproved spans count first."""
+        """Return the number of unproved spans, which counts first, and whether the boundary meets itself."""
         return len(self.certificate.unproved), self.meets_itself
 
     @property
     def rank(self) -> tuple[int, bool, bool]:
-        """The faults, and whether the boundary is undecided: of two maps the one with the lower rank is better."""
+        """Return the faults, and whether the boundary is undecided: of two maps that with the lower rank is better."""
         return *self.faults, self.injective is None

@@ -1,7 +1,8 @@
-"""The phases of a spline stage: each weighs what acts in its rounds, amends what they find, and says when it is over.
+"""Defines the phases of a spline stage: a phase sets weights for its rounds, amends their maps, and decides its end.
 
-F is shaped or grows, then unfolded until it is certified; its boundary is pushed apart where it meets itself; a last
-phase takes back what the surface's data have lost. Rounds are counted over the whole stage, from 0.
+F takes its shape or grows, and is then unfolded until it is certified; its boundary is pushed apart where it meets
+itself; the last phase restores the weight that the surface's data have lost. Rounds are counted over the whole stage,
+from 0.
 """
 
 import logging
@@ -34,11 +35,12 @@ _MENDINGS = 6  # attempts to restore certified control points around spans that 
 
 @dataclass(frozen=True)
 class Phase(ABC):
-    """Rounds with one aim.
+    """Define rounds with one aim.
 
-    penalties: on det J, one for each round of the stage, then the last again. firm: rounds of the stage after which the
-    surface's data give way at unproved spans. shares: where F grows, of the weight of the surface's data, one a round.
-    steps: of Newton's method in a round, at most; None: as many as the options say.
+    penalties: the weights of the penalties on det J, one for each round of the stage; later rounds have the last
+    weight. firm: the number of rounds of the stage after which the surface's data give way at unproved spans. shares:
+    where F grows, the shares of the weight of the surface's data, one a round. steps: the largest number of Newton
+    steps in a round; None for the number in the options.
     """
 
     name: ClassVar[str]
@@ -52,29 +54,32 @@ class Phase(ABC):
         return self.penalties[min(number, len(self.penalties) - 1)]
 
     def begin(self, state: State) -> None:
-        """Weigh data and anchors for the next round: anchors hold a map that starts close to the surface at first."""
+        """Set the weights of the data and of the anchors for the next round.
+
+        In the first rounds the anchors hold a map that started close to the surface.
+        """
         if state.near and state.number < PATIENT_ROUNDS:
             state.energy.anchors.aim(state.spline.control, hold=True)
         else:
             state.energy.anchors.release()
 
     def amended(self, state: State, found: Optimized) -> Optimized:
-        """Return the map that a round has found, or one made of it that is better."""
+        """Return the map that a round has found, or a better map made from it."""
         return found
 
     @abstractmethod
     def done(self, state: State) -> Reason | None:
-        """Return why the phase is over; None where it goes on."""
+        """Return the reason for which the phase ends; None where it continues."""
 
 
 @dataclass(frozen=True)
 class Shape(Phase):
-    """F takes its shape."""
+    """Let F take its shape."""
 
     name = "shape"
 
     def done(self, state: State) -> Reason | None:
-        """End after the patient rounds, or with a certified map."""
+        """Return a reason to end after the patient rounds, or with a certified map; None before."""
         if state.certified:
             return Reason.CERTIFIED
         return Reason.SHAPED if state.number >= PATIENT_ROUNDS else None
@@ -82,10 +87,10 @@ class Shape(Phase):
 
 @dataclass(frozen=True)
 class Unfold(Phase):
-    """Spans that stay unproved weigh more, the surface gives way near them, and few of them are smoothed.
+    """Raise the penalty on unproved spans, let the surface's data give way near these, and smooth a few spans.
 
-    far: distance from the surface, root mean square, with which a folded map is given up once it is firm; far_first:
-    likewise after `first` rounds of the stage, the first round in which F no longer grows.
+    far: a root mean square distance from the surface; a folded map that is farther away is given up in firm rounds.
+    far_first: the same distance after `first` rounds of the stage, the first round in which F no longer grows.
     """
 
     name = "unfold"
@@ -94,7 +99,7 @@ class Unfold(Phase):
     first: int = 0
 
     def amended(self, state: State, found: Optimized) -> Optimized:
-        """Smooth the map near spans that the last rounds have not unfolded; return it where fewer are unproved then."""
+        """Smooth the map near spans that stay unproved; return the smoothed map where it has fewer unproved spans."""
         unproved, patience = found.certificate.unproved, max(self.firm, state.halved + _SMOOTHING_ROUNDS)
         if state.number < patience or not 0 < len(unproved) <= _MOST_SMOOTHED:
             return found
@@ -104,7 +109,7 @@ class Unfold(Phase):
         return smoothed if smoothed.faults < found.faults else found
 
     def done(self, state: State) -> Reason | None:
-        """End with a certified map, or where further rounds would not unfold F at the surface."""
+        """Return a reason to end with a certified map, or where more rounds would not unfold F; None before."""
         if state.certified:
             return Reason.CERTIFIED
         if state.number > state.halved + _STALLING:
@@ -119,9 +124,9 @@ class Unfold(Phase):
 
 @dataclass(frozen=True)
 class Separate(Phase):
-    """The boundary of a certified map that meets itself is pushed apart, and the surface's data give way there.
+    """Push apart the boundary of a certified map that meets itself; the surface's data give way there.
 
-    far: distance from the surface, root mean square, with which that is given up.
+    far: a root mean square distance from the surface, beyond which the phase gives up.
     """
 
     name = "separate"
@@ -129,12 +134,12 @@ class Separate(Phase):
     far: float = 0.01
 
     def begin(self, state: State) -> None:
-        """Let the surface give way where sheets touch."""
+        """Let the surface's data give way where sheets of the boundary touch."""
         state.energy.give_way(state.energy.watch_contact(state.spline.control), _CONTACT_WAY)
         super().begin(state)
 
     def done(self, state: State) -> Reason | None:
-        """End when the boundary no longer meets itself, or cannot be parted near the surface."""
+        """Return a reason to end when the boundary no longer meets itself, or cannot be parted near the surface."""
         if not state.best.meets_itself:
             return Reason.APART
         if state.rounds[self.name] == self.rounds:
@@ -144,7 +149,7 @@ class Separate(Phase):
 
 @dataclass(frozen=True)
 class Polish(Phase):
-    """The surface's data get back the weight that they have lost, step by step, as far as F stays certified."""
+    """Restore the weight that the surface's data have lost, step by step, as far as F stays certified."""
 
     name = "polish"
     firm: int = sys.maxsize
@@ -160,7 +165,7 @@ class Polish(Phase):
         energy.anchors.aim(state.spline.control, hold=False)
 
     def amended(self, state: State, found: Optimized) -> Optimized:
-        """Move what folds again back to where it was certified; return the map found where that brings nothing."""
+        """Move the spans that fold again back to their certified shape; return the given map where that fails."""
         energy, folded, mended = state.energy, found.certificate.unproved, found
         held = np.zeros(energy.determinants.weights.shape, dtype=bool)
         for _ in range(_MENDINGS):
@@ -185,7 +190,7 @@ class Polish(Phase):
         return mended
 
     def done(self, state: State) -> Reason | None:
-        """End when nothing is left to take back, where F folds more and more, or after the last of these rounds."""
+        """Return a reason to end: all weight is restored, F folds more and more, or the rounds are used up."""
         if not (count := state.rounds[self.name]):
             return None
         if state.settled and not state.energy.yields:
@@ -197,10 +202,11 @@ class Polish(Phase):
 
 @dataclass(frozen=True)
 class Schedule:
-    """The phases of a spline stage in their order, and what they share.
+    """Hold the phases of a spline stage in their order, and the limits that they share.
 
-    rounds: of the stage, at most. usual_steps: of Newton's method in the rounds of most runs, which tells the time
-    left. gain: share of the energy; where steps lower it by less, a round ends.
+    rounds: the largest number of rounds in the stage. usual_steps: the number of Newton steps in the rounds of most
+    runs, from which the time left is estimated. gain: a share of the energy; a round ends where its steps lower the
+    energy by less.
     """
 
     phases: tuple[Phase, ...]
@@ -210,5 +216,5 @@ class Schedule:
 
     @property
     def grown(self) -> int:
-        """The number of rounds in which F grows."""
+        """Return the number of rounds in which F grows."""
         return sum(len(phase.shares) for phase in self.phases)

@@ -1,7 +1,7 @@
-"""Control-point optimisation: distortion, smoothness, boundary and injectivity of F together (section 4.3.2, step 3).
+"""Optimises the control points: distortion, smoothness, boundary and injectivity of F together (section 4.3.2, step 3).
 
 The energy of energy.py is lowered in rounds (newton.py), phase after phase (phases.py). After each round the map is
-certified; what folds is weighed anew.
+certified, and unproved spans receive new weights.
 """
 
 import logging
@@ -43,14 +43,15 @@ def optimize(
     begun: int = 0,
     watched: IntArray | None = None,
 ) -> tuple[Optimized, Course]:
-    """Minimise the energy from a map at volume 1, phase after phase, in rounds: descend, certify, weigh anew.
+    """Minimise the energy from a map at volume 1, in rounds, phase after phase; return a map and the rounds' course.
 
-    Return a map, and how the rounds went. It is the last certified map whose boundary is proved not to meet itself,
-    else the last one where that is not decided, else the last certified one, else the one with the fewest unproved
-    spans.
+    A round sets weights, descends and certifies the map. The returned map is the last certified map whose boundary is
+    proved not to meet itself; or else the last certified map whose boundary is undecided; or else the last certified
+    map; or else the map with the fewest unproved spans.
 
-    begun: of how many rounds `start` is the result, on other knots; watched (k, 3): spans that nearly fold there.
-    A checkpoint is kept after every round. The surface's parameters are left as they belong to the result.
+    begun: the number of rounds on other knots that have led to `start`. watched: (k, 3), the spans that nearly fold in
+    `start`. A checkpoint is kept after every round. After the call, the surface's parameters belong to the returned
+    map.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with one_blas_thread():
@@ -75,7 +76,7 @@ def optimize(
 
 
 def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport") -> None:
-    """Weigh, descend, certify; then watch the spans not proved and let the surface give way near them."""
+    """Set weights, descend and certify; then penalise unproved spans and let the surface's data give way near them."""
     energy, number = state.energy, state.number
     grows, steps = bool(phase.shares), phase.steps or report.most
     phase.begin(state)
@@ -106,7 +107,7 @@ def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport"
 
 @dataclass
 class _StepReport:
-    """Tells history and progress of each step of a round."""
+    """Report each step of a round to the history and to the progress callback."""
 
     number: int  # of the round
     most: int  # steps a round
@@ -117,7 +118,7 @@ class _StepReport:
     begun: float = field(default_factory=time.perf_counter)
 
     def __call__(self, point: Point) -> None:
-        """Report where a step has led to."""
+        """Report the point after a step."""
         done, loss = self.number * self.most + self.step, point.total
         self.history.add("spline", done, loss, point.folded, {"surface": point.outer[0]})
         before, self.begun = self.begun, time.perf_counter()
@@ -127,7 +128,7 @@ class _StepReport:
         self.step += 1
 
     def _expected_steps(self) -> int:
-        """Return how many steps are left after this one where the run is a usual one; hard shapes take more."""
+        """Return the number of steps that are left after this one in a usual run; hard shapes need more."""
         usual = [min(count, self.most) for count in self.schedule.usual_steps]
         present = usual[self.number] if self.number < len(usual) else LEAST_STEPS
         return max(present - self.step - 1, 1) + sum(usual[self.number + 1 :])

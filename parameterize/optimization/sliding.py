@@ -1,8 +1,8 @@
-"""Where points lie on the boundary of the cube, and how they slide there.
+"""Places points on the boundary of the cube, and lets them slide there.
 
-Between optimisation steps every parameter moves to the closest point of F's boundary, over the cube's edges where it
-must: the paper keeps them fixed (section 4.3.2), which freezes the network's correspondence; letting them slide lowers
-boundary error and distortion together.
+Between optimisation steps every parameter moves to the closest point of F's boundary, across the cube's edges where
+necessary. The paper keeps the parameters fixed (section 4.3.2), which keeps the network's correspondence; slides lower
+the boundary error and the distortion together.
 """
 
 from copy import copy
@@ -26,9 +26,9 @@ _NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
 class SlidingParameters:
-    """Parameters (N, 3) on cube faces (N,), and the rows that yield F there.
+    """Hold parameters (N, 3) on cube faces (N,), and the rows that yield F there.
 
-    triangles (m, 3) between the points: `relax` and `slide` keep the layout on the cube one-to-one.
+    triangles: (m, 3), between the points; with them `relax` and `slide` keep the layout on the cube one-to-one.
     """
 
     def __init__(self, knots: Knots, degree: int, parameters: Array, triangles: IntArray = _NO_TRIANGLES) -> None:
@@ -37,7 +37,7 @@ class SlidingParameters:
         self.place(parameters, nearest_faces(parameters))
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
-        """Take these parameters (N, 3) on these cube faces (N,)."""
+        """Set the parameters (N, 3) and their cube faces (N,)."""
         self.parameters, self.cube_faces = parameters, cube_faces
         for known in ("window", "rows"):
             self.__dict__.pop(known, None)
@@ -49,28 +49,28 @@ class SlidingParameters:
         return other
 
     def values(self, control: Array) -> Array:
-        """Return F at the parameters: (N, 3)."""
+        """Return F at the parameters, (N, 3)."""
         return self.window.derivatives(control)[0]
 
     def spans(self) -> IntArray:
-        """Return in which span each parameter lies: (N, 3)."""
+        """Return the span of each parameter, (N, 3)."""
         breaks = [breakpoints(k) for k in self.knots]
         found = [np.searchsorted(b[1:-1], x, "right") for b, x in zip(breaks, self.parameters.T, strict=True)]
         return np.stack(found, axis=1)
 
     def near_spans(self, spans: IntArray) -> Mask:
-        """Return which points have their parameter in one of the spans (k, 3) or next to it: (N,)."""
+        """Return the mask (N,) of the points with parameters in one of the spans (k, 3) or next to it."""
         shape = tuple(len(breakpoints(k)) - 1 for k in self.knots)
         return with_neighbours(spans, shape)[tuple(self.spans().T)]
 
     def slide(
         self, control: Array, points: Array, max_step: float, *, keep_layout: bool = False, reach: float = np.inf
     ) -> None:
-        """Take one Gauss-Newton step of every parameter towards where F's boundary is closest to its point (N, 3).
+        """Move every parameter by one Gauss-Newton step to the place where F's boundary is closest to its point (N, 3).
 
-        A step over an edge of the cube continues on the next face; `max_step` limits a step in the parameters. Points
-        that would end up farther away, and those farther away than `reach`, stay where they are; with `keep_layout`
-        steps that would flip a triangle are shortened.
+        A step across an edge of the cube continues on the next face; `max_step` is the longest step in the parameters.
+        Points whose distance would grow, and points farther away than `reach`, keep their parameters. With
+        `keep_layout`, steps that would flip a triangle are shortened.
         """
         window, field = self.window, control.reshape(3, -1)
         polynomials, before = self._polynomials, (self.parameters, self.cube_faces)
@@ -99,10 +99,10 @@ class SlidingParameters:
         self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
 
     def at_closest_points(self, control: Array, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
-        """Return the parameters where F's boundary is closest to their points (N, 3), as far as no triangle flips.
+        """Return the parameters where F's boundary is closest to the points (N, 3), as far as no triangle flips.
 
-        They slide `slides` times; triangles that this flips are relaxed in at most so many sweeps; then they slide as
-        often again.
+        The parameters slide `slides` times; flipped triangles are relaxed in at most `sweeps` sweeps; then the
+        parameters slide `slides` times again.
         """
         other, longest = copy(self), 0.5 / max(control.shape[1:])
         for _ in range(slides):
@@ -114,11 +114,11 @@ class SlidingParameters:
         return other
 
     def relax(self, sweeps: int) -> None:
-        """Untangle flipped triangles in a few sweeps, so that what sliding tangles does not pile up."""
+        """Untangle flipped triangles in a few sweeps, so that flips of several slides do not accumulate."""
         self._move(untangle(self.parameters, self.triangles, sweeps))
 
     def unflip(self) -> None:
-        """Turn flipped triangles outwards by moving their own points alone, and those by little."""
+        """Turn flipped triangles outwards by small moves of their own points; all other points stay."""
         self._move(unflip(self.parameters, self.triangles))
 
     def _move(self, places: Array) -> None:
@@ -126,7 +126,7 @@ class SlidingParameters:
         self._keep(places, nearest_faces(places), moved)
 
     def _keep(self, parameters: Array, cube_faces: IntArray, chosen: Mask) -> None:
-        """Take these parameters for the chosen points; the basis functions of the others need not be found again."""
+        """Set these parameters for the chosen points; the basis functions of the others are not computed again."""
         known = self.window
         self.place(
             np.where(chosen[:, None], parameters, self.parameters), np.where(chosen, cube_faces, self.cube_faces)
@@ -137,7 +137,7 @@ class SlidingParameters:
 
     @cached_property
     def window(self) -> FaceWindow:
-        """The basis functions that are not zero at the points."""
+        """Return the basis functions that are not zero at the points."""
         return FaceWindow.at(self._polynomials, self.parameters, self.cube_faces)
 
     @cached_property
@@ -146,7 +146,7 @@ class SlidingParameters:
 
     @cached_property
     def rows(self) -> ControlRows:
-        """The rows that yield F at the points."""
+        """Return the rows that yield F at the points."""
         return ControlRows(self.window.indices, self.window.weights(0, 0))
 
 
@@ -163,9 +163,10 @@ def _slid(
     max_step: float,
     reach: float,
 ) -> tuple[Array, Array, IntArray, IntArray, Array, Array]:
-    """Take the step of `SlidingParameters.slide` at points (N, 3), whose FaceWindow is given.
+    """Compute the step of `SlidingParameters.slide` at points (N, 3) with a given FaceWindow.
 
-    Returns where the steps lead within the faces' planes (N, 3), the parameters, their cube faces and their FaceWindow.
+    Returns the ends of the steps in the planes of the faces (N, 3), the new parameters, their cube faces and their
+    FaceWindow.
     """
     goal, parameters, cube_faces = parameters.copy(), parameters.copy(), cube_faces.copy()
     old, before = (indices, in_a, in_b), parameters.copy()
@@ -201,7 +202,10 @@ def _slid(
 
 
 def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:
-    """Continue steps that left their face on the neighbouring one: what overshot goes inwards there."""
+    """Return parameters and cube faces after steps that left a face continue on the neighbouring face.
+
+    The part of a step beyond the edge points inwards on the neighbouring face.
+    """
     parameters, cube_faces = parameters.copy(), cube_faces.copy()
     _fold_all(parameters, cube_faces)
     return parameters, cube_faces
@@ -215,7 +219,7 @@ def _fold_all(parameters: Array, cube_faces: IntArray) -> None:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _fold(parameters: Array, cube_faces: IntArray, n: int) -> None:
-    """Continue the step of one point, in place."""
+    """Continue the step of point n on the neighbouring face, in place."""
     constant, side = cube_faces[n] // 2, cube_faces[n] % 2
     axis, overshoot = constant, 0.0
     for d in range(3):

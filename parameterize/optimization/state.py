@@ -1,4 +1,4 @@
-"""Where the rounds of a spline stage stand, and the checkpoint of that."""
+"""Holds the state of a spline stage between two rounds, and its checkpoint."""
 
 import math
 import sys
@@ -21,7 +21,7 @@ _NUMBERS = ("number", "certified", "unproved", "unproved_before", "fewest", "hal
 
 @dataclass
 class State:
-    """Where the rounds stand between two of them; squares are mean squared distances from the surface."""
+    """Hold the state of a stage between two rounds; squares are mean squared distances from the surface."""
 
     energy: SplineEnergy
     spline: SplineMap
@@ -41,16 +41,16 @@ class State:
 
     @property
     def many(self) -> bool:
-        """Whether more spans are unproved than can be watched."""
+        """Return whether there are more unproved spans than can be watched."""
         return self.unproved > MOST_WATCHED
 
     @property
     def settled(self) -> bool:
-        """Whether the last round has ended with the best map, not with one that folds again."""
+        """Return whether the last round has ended with the best map, and not with a map that folds again."""
         return np.array_equal(self.spline.control, self.best.spline.control)
 
     def keep(self, found: Optimized) -> None:
-        """Take a map, with the surface's parameters as they are, for the best one."""
+        """Set a map, with the present parameters of the surface, as the best map."""
         places = self.energy.surface.places
         self.best, self.best_places = found, (places.parameters, places.cube_faces)
         self.best_square = self.energy.surface.mean_square(found.spline.control)
@@ -75,7 +75,7 @@ class State:
         checkpoints.save(_CHECKPOINT, arrays, numbers | phases | {"history": history.rows})
 
     def restore(self, checkpoints: Checkpoints, history: History) -> None:
-        """Go on from the checkpoint that `save` has kept, where there is one."""
+        """Continue from the checkpoint that `save` has written, where there is one."""
         if (saved := checkpoints.load(_CHECKPOINT)) is None:
             return
         arrays, state = saved

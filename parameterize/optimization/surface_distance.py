@@ -1,8 +1,8 @@
-"""How well the boundary of F lies on the surface: residuals at surface points whose parameters slide.
+"""Measures how close the boundary of F is to the surface: residuals at surface points whose parameters slide.
 
-Each surface point v has a parameter p on the cube's boundary. The energy is a weighted sum of r^T (Q + t I) r with
-r = F(p) - v and Q the mean of n n^T over the triangles around v: on smooth parts that measures along the normal only,
-on sharp edges across both sides, at corners in all directions.
+Each surface point v has a parameter p on the cube's boundary. The energy is a weighted sum of r^T (Q + t I) r, with r =
+F(p) - v and Q the mean of n n^T over the triangles around v: on smooth parts this measures the distance along the
+normal only, on sharp edges across both sides, and at corners in all directions.
 """
 
 import numpy as np
@@ -17,10 +17,11 @@ TANGENTIAL = 2e-4  # share of the distance within the tangent plane: holds what 
 
 
 class SurfaceFit:
-    """The residuals F(p) - v and their energy.
+    """Compute the residuals F(p) - v and their energy.
 
-    places: the parameters p. points (N, 3) at volume 1: the surface points v. quadrics (N, 3, 3), weights (N,) that
-    sum to 1. given_corners (8, 3): where the user wants the corners of the cube; edge_attraction.py holds F there.
+    places: the parameters p. points: (N, 3), the surface points v at volume 1. quadrics: (N, 3, 3). weights: (N,), with
+    sum 1. given_corners: (8, 3), the places that the user gives for the corners of the cube; edge_attraction.py holds F
+    there.
     """
 
     def __init__(
@@ -47,19 +48,19 @@ class SurfaceFit:
         return other
 
     def aim(self, points: Array, quadrics: Array) -> None:
-        """Take other points (N, 3) and quadrics (N, 3, 3)."""
+        """Set other points (N, 3) and quadrics (N, 3, 3) as goals."""
         self.points, self._quadrics = points, quadrics
         self.give_way(self.yielding)
 
     def give_way(self, yielding: Array) -> None:
-        """Multiply the points' weights by `yielding` (N,), in place of earlier such factors."""
+        """Multiply the points' weights by `yielding` (N,), which replaces the factors of an earlier call."""
         self.yielding = yielding
         self.weights = yielding * self._weights
         quadrics = np.where(self._held[:, None, None], np.eye(3), self._quadrics)
         self._metric = self.weights[:, None, None] * quadrics
 
     def hold(self, held: Mask) -> None:
-        """Count the distance of these points (N,) in all directions, that of the others as the quadrics say."""
+        """Measure the distance of held points (N,) in all directions, of the other points as their quadrics demand."""
         self._held = held
         self.give_way(self.yielding)
 
@@ -74,11 +75,11 @@ class SurfaceFit:
         return float(np.vdot(residual, pulled)), 2.0 * self.places.rows.adjoint(pulled, control)
 
     def curvature(self, control: Array) -> PiecewiseOperator:
-        """Return the second derivative of the energy, parameters held, as an operator in single precision."""
+        """Return the second derivative of the energy for fixed parameters, as an operator in single precision."""
         return self.places.rows.in_single().squared(2.0 * self._metric.astype(np.float32))
 
     def residuals(self, control: Array) -> Array:
-        """Return F(p) - v: (N, 3)."""
+        """Return the residuals F(p) - v, (N, 3)."""
         return self.places.values(control) - self.points
 
     def mean_square(self, control: Array) -> float:

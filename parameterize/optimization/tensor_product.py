@@ -1,6 +1,6 @@
-"""Tensor-product splines: Jacobians on a grid by banded matrices, and fast inverses.
+"""Evaluates tensor-product splines: Jacobians on a grid by banded matrices, and fast inverses.
 
-See operators.py for how control points are held, and how pieces of work are added.
+operators.py explains the layout of control points and the sum of pieces of work.
 """
 
 import math
@@ -23,7 +23,7 @@ SYMMETRIC = np.array([[max(a, b) * (max(a, b) + 1) // 2 + min(a, b) for b in ran
 
 
 def along(matrix: Floats, field: Floats, axis: int) -> Floats:
-    """Apply a matrix (m, n) along one axis of a field, in as few and as large products as the layout allows."""
+    """Return the product of a matrix (m, n) and a field along one axis, in as few products as the layout allows."""
     before, after = field.shape[:axis], field.shape[axis + 1 :]
     if not after:
         return (field.reshape(-1, field.shape[axis]) @ matrix.T).reshape(*before, len(matrix))
@@ -34,18 +34,18 @@ Band = tuple[Any, ...]  # of matrices: first columns (m,), entries from there on
 
 
 class GaussGrid:
-    """A grid of quadrature points, where Jacobians are taken and their duals pulled back plane by plane.
+    """Hold a grid of quadrature points, at which Jacobians are computed, and transposed, plane by plane.
 
-    Points lie in planes of constant u; in a plane they are in the order of w, then v. weights (planes, points).
+    The points lie in planes of constant u; in a plane they are in the order of w, then v. weights: (planes, points).
     """
 
     def __init__(
         self, knots: tuple[Array, ...], degrees: tuple[int, ...], n_gauss: int, *, inner: int | None = None
     ) -> None:
-        """Take `n_gauss` points a span and direction.
+        """Make a grid of `n_gauss` points a span and direction.
 
-        inner: points on all spans but the first and last. One is enough there for smooth splines, which have one basis
-        function a span (the half-point rule of Hughes, Reali, Sangalli, CMAME 199, 2010).
+        inner: the number of points on all spans but the first and the last. One point is enough there for smooth
+        splines, which have one basis function a span (the half-point rule of Hughes, Reali, Sangalli, CMAME 199, 2010).
         """
         points, (u, v, w) = zip(
             *(_graded_points(k, n_gauss, n_gauss if inner is None else inner) for k in knots), strict=True
@@ -67,7 +67,7 @@ class GaussGrid:
         return [slice(begin, begin + _PLANES) for begin in range(0, len(self.weights), _PLANES)]
 
     def sum_on_spans(self, values: Array) -> Array:
-        """Add the values at the points of each span: (planes, points) -> (n_u, n_v, n_w)."""
+        """Return the sums (n_u, n_v, n_w) over the points of each span, of values (planes, points)."""
         u, v, w = self._spans
         found = np.swapaxes(values.reshape(len(u), len(w), len(v)), 1, 2)
         for axis, spans in enumerate((u, v, w)):
@@ -75,21 +75,21 @@ class GaussGrid:
         return found
 
     def at_points(self, values: Array) -> Array:
-        """Give each point the value of its span: (n_u, n_v, n_w) -> (planes, points)."""
+        """Return the value of its span for each point, (planes, points), of values (n_u, n_v, n_w)."""
         u, v, w = self._spans
         return np.ascontiguousarray(np.swapaxes(values[np.ix_(u, v, w)], 1, 2)).reshape(self.weights.shape)
 
     def jacobian(self, control: Floats, planes: slice) -> Floats:
-        """Return J (component, direction, point) on some planes: (3, n_u, n_v, n_w) -> (3, 3, m)."""
+        """Return J (3, 3, m) at the points of some planes: component, direction, point; control: (3, n_u, n_v, n_w)."""
         return np.asarray(_jacobian(self._forward(planes, control.dtype), control))
 
     def adjoint(self, dual: Floats, planes: slice) -> tuple[int, Floats]:
-        """Apply the transpose of `jacobian`: the first layer of control points, and what all layers get from it."""
+        """Return the transpose of `jacobian`, as the first layer of control points and the values of all layers."""
         layer, backward = self._backward(planes, dual.dtype)
         return layer, _jacobian_adjoint(backward, dual)
 
     def squared(self, matrices: Floats, planes: slice) -> Callable[[Floats], tuple[int, Floats]]:
-        """Return `jacobian`, then symmetric matrices (45, m) on its nine entries, see SYMMETRIC, then `adjoint`."""
+        """Return a function: `jacobian`, symmetric matrices (45, m) on its nine entries (SYMMETRIC), then `adjoint`."""
         forward, (layer, backward) = self._forward(planes, matrices.dtype), self._backward(planes, matrices.dtype)
         return lambda control: (layer, _squared_jacobian(forward, backward, matrices, control))
 
@@ -98,12 +98,12 @@ class GaussGrid:
         return (first[planes], values[planes], slopes[planes]), *across
 
     def _backward(self, planes: slice, dtype: Any) -> tuple[int, tuple[Band, ...]]:
-        """Return the first layer of control points of these planes, and the bands that lead there from it on."""
+        """Return the first layer of control points of these planes, and the transposed bands from that layer on."""
         (first, values, slopes), *_ = self._forward(planes, dtype)
         return int(first[0]), ((first - first[0], values, slopes), *self._bands[dtype][1][1:])
 
     def collect(self, parts: list[tuple[int, Floats]], like: Floats) -> Floats:
-        """Add what the pieces of work give to the layers of control points, in their order."""
+        """Return control points in the shape of `like`: the sum of the layers of all pieces of work, added in order."""
         total = np.zeros_like(like)
         for first, layers in parts:
             total[:, first : first + layers.shape[1]] += layers
@@ -111,7 +111,7 @@ class GaussGrid:
 
 
 def band(*matrices: Array) -> Band:
-    """Store matrices (m, n) with few entries a row from the first of these on."""
+    """Return matrices (m, n) as a band: the first column of each row, and the matrices' entries from it on."""
     used = np.any([matrix != 0.0 for matrix in matrices], axis=0)
     low, high = used.argmax(axis=1), used.shape[1] - used[:, ::-1].argmax(axis=1)
     width = int((high - low).max())
@@ -122,7 +122,7 @@ def band(*matrices: Array) -> Band:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def apply_band(first: IntArray, entries: Array, field: Array, out: Array) -> None:
-    """Add a banded matrix times a field (n, r) to out (m, r)."""
+    """Add the product of a banded matrix and a field (n, r) to out (m, r)."""
     for m in range(len(first)):
         for k in range(entries.shape[1]):
             entry, row = entries[m, k], first[m] + k
@@ -132,7 +132,7 @@ def apply_band(first: IntArray, entries: Array, field: Array, out: Array) -> Non
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
-    """Return derivatives (3, 3, points) of control points (3, n_u, n_v, n_w) at all points of the bands, in planes."""
+    """Return the derivatives (3, 3, points) of control points (3, n_u, n_v, n_w) at all points, by planes."""
     (first_u, values_u, slopes_u), (first_v, values_v, slopes_v), (first_w, values_w, slopes_w) = bands
     _, n_u, n_v, n_w = control.shape
     planes, m_v, m_w = len(first_u), len(first_v), len(first_w)
@@ -156,7 +156,10 @@ def _jacobian(bands: tuple[Band, Band, Band], control: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
-    """Apply the transpose; the bands of v and w are transposed already. All layers (3, layers, n_v, n_w)."""
+    """Return the transpose of `_jacobian` applied to `dual`, as all layers (3, layers, n_v, n_w).
+
+    The bands of v and w are already transposed.
+    """
     (first_u, values_u, slopes_u), (first_v, values_v, slopes_v), (first_w, values_w, slopes_w) = bands
     planes, n_v, n_w, width = len(first_u), len(first_v), len(first_w), values_u.shape[1]
     m_w = first_w[-1] + values_w.shape[1]
@@ -182,7 +185,7 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _times_matrices(matrices: Array, vectors: Array) -> Array:
-    """Multiply symmetric matrices, entries (45,) above m points, by vectors (9, m)."""
+    """Return the products of symmetric matrices, with entries (45, m), and vectors (9, m)."""
     out = np.zeros_like(vectors)
     for begin in range(0, vectors.shape[1], _POINTS):
         end = begin + _POINTS
@@ -199,14 +202,14 @@ def _times_matrices(matrices: Array, vectors: Array) -> Array:
 def _squared_jacobian(
     forward: tuple[Band, Band, Band], backward: tuple[Band, Band, Band], matrices: Array, control: Array
 ) -> Array:
-    """Apply `_jacobian`, symmetric matrices (45, points) and `_jacobian_adjoint`: all layers (3, layers, n_v, n_w)."""
+    """Return all layers (3, layers, n_v, n_w): `_jacobian`, symmetric matrices (45, points), `_jacobian_adjoint`."""
     change = _jacobian(forward, control)
     dual = _times_matrices(matrices, change.reshape(9, change.shape[2]))
     return _jacobian_adjoint(backward, dual.reshape(change.shape))
 
 
 def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
-    """Return Gauss points and weights (m,): `outer` on the first and last span, `inner` on the others."""
+    """Return Gauss points and weights (m,): `outer` points on the first and last span, `inner` points on the others."""
     fine, coarse = gauss_points(knots, outer), gauss_points(knots, inner)
     split = min(_END_SPANS, len(fine[0]) // 2)
     middle = slice(split, len(fine[0]) - split)
@@ -218,10 +221,10 @@ def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
 
 
 class FastDiagonalization:
-    """Inverse of A_0 x M x M + M x A_1 x M + M x M x A_2 + shift * M x M x M (Lynch, Rice, Thomas 1964).
+    """Apply the inverse of A_0 x M x M + M x A_1 x M + M x M x A_2 + shift * M x M x M (Lynch, Rice, Thomas 1964).
 
-    matrices: three symmetric A_d (n, n); mass: three M_d; dtype: of what the inverse is applied to. Three generalised
-    eigenproblems, then products only.
+    matrices: three symmetric matrices A_d (n, n). mass: three matrices M_d. dtype: the precision of the vectors. The
+    constructor solves three generalised eigenproblems; an application consists of products only.
     """
 
     def __init__(
@@ -232,7 +235,7 @@ class FastDiagonalization:
         self._inverse: Floats = (1.0 / (u[:, None, None] + v[:, None] + w + shift)).astype(dtype)
 
     def __call__(self, residual: Floats) -> Floats:
-        """Apply the inverse: (3, n_u, n_v, n_w) -> the same shape."""
+        """Return the inverse applied to a residual (3, n_u, n_v, n_w), in the same shape."""
         for axis, vectors in enumerate(self._vectors, start=1):
             residual = along(vectors.T, residual, axis)
         residual = residual * self._inverse

@@ -1,4 +1,4 @@
-"""The terms of a map's energy: their protocol, and their weights."""
+"""Defines the protocol of the terms of a map's energy, and their weights."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,10 +9,11 @@ from .operators import PiecewiseOperator
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights that belong to a map, in a domain of volume 1: a start or a refinement may set others.
+    """Hold the weights of a map in a domain of volume 1; a start or a refinement may set other values.
 
-    fairness: of the integral of the squared Hessians. surface: of the mean squared distance from the surface along its
-    normals. least_floor: share to which the floors of det J are lowered, at most, where det J is small all around.
+    fairness: the weight of the integral of the squared Hessians. surface: the weight of the mean squared distance from
+    the surface along its normals. least_floor: the smallest share to which the floors of det J are lowered where det J
+    is small all around.
     """
 
     fairness: float = 1e-3
@@ -22,14 +23,14 @@ class Weights:
 
 @dataclass(frozen=True)
 class RoundWeights:
-    """Weights of one round: `penalty` of the penalties on folds, `surface` of the surface's data."""
+    """Hold the weights of one round: `penalty` for the penalties on folds, `surface` for the surface's data."""
 
     penalty: float
     surface: float
 
 
 class Term(Protocol):
-    """A summand of the energy in control points (3, n_u, n_v, n_w), in double precision."""
+    """Define a term of the energy as a function of control points (3, n_u, n_v, n_w), in double precision."""
 
     def weight(self, weights: RoundWeights) -> float:
         """Return the weight of the term in a round."""

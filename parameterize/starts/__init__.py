@@ -1,1 +1,1 @@
-"""The ways to a first map, one a file."""
+"""Holds the starts, that is the ways to a first map, one a file."""

@@ -1,4 +1,4 @@
-"""Another start without the network: F is fitted to the surface's layout on the cube, extended into the solid."""
+"""Starts from the surface's layout on the cube, without the network: F is fitted to the layout's extension inside."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ CELL = 0.0255  # of the lattice, in a domain of volume 1: some 60 000 points, mo
 
 @dataclass(frozen=True)
 class Extension(Start):
-    """The layout is extended harmonically."""
+    """Make a map by a harmonic extension of the surface's layout on the cube."""
 
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt:
         """Lay the surface on the cube and fit F to that layout, extended into the solid."""
@@ -33,5 +33,5 @@ EXTENSION = Extension("extension", "extension", "extending the surface's layout 
 
 
 def schedule(spline: SplineConfig) -> Schedule:
-    """Return the rounds that follow: F starts near its end, so folds cost much at once."""
+    """Return the phases of the rounds: the first map is close to the last, so folds have a large penalty at once."""
     return Schedule((Shape(), Unfold(), Separate(), Polish()), spline.rounds + MORE_ROUNDS, USUAL_STEPS)

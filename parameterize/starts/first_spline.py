@@ -1,4 +1,4 @@
-"""The first F of starts that know where points of the solid lie in the cube: a fit to these and the boundary."""
+"""Makes the first F of starts that know the places of inner points in the cube: a fit to these and to the boundary."""
 
 import numpy as np
 
@@ -13,7 +13,11 @@ _FAIRNESS = 1e-7  # of the fit: holds what no sample determines, and hardly move
 
 
 def first_spline(inside: Array, places: Array, fit: SurfaceFit) -> SplineMap:
-    """Fit by least squares to pairs (k, 3) of places and points inside, and the boundary's (section 4.3.2, step 2)."""
+    """Return the spline fitted by least squares to places (k, 3) and points (k, 3), and to the boundary.
+
+    inside: the points in the solid. places: their places in the cube. fit: the points of the surface with their
+    parameters. This is step 2 of section 4.3.2.
+    """
     weights = [
         np.full(len(inside), (1.0 - _BOUNDARY_SHARE) / max(len(inside), 1)),
         np.full(len(fit.points), _BOUNDARY_SHARE / len(fit.points)),

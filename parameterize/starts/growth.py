@@ -1,9 +1,9 @@
-"""A start that does not need the network: the cube grows into the solid (for shapes that are hard to train).
+"""Starts from a cube that grows into the solid, without the network (for shapes that are hard to train).
 
 The surface is laid on the cube one-to-one before anything else, so that the boundary never has to be untangled. The
-first map is a cube in the solid's middle. Round after round the surface's data draw it more strongly, while the
-penalties on det J act from the start: what is never folded need not be unfolded (compare Schueller, Kavan, Panozzo,
-Sorkine-Hornung, SGP 2013).
+first map is a cube in the middle of the solid. In each round the surface's data draw the map more strongly, while the
+penalties on det J act from the start, so that folds are avoided and need not be removed (compare Schueller, Kavan,
+Panozzo, Sorkine-Hornung, SGP 2013).
 """
 
 from dataclasses import dataclass, replace
@@ -36,23 +36,24 @@ _COARSE = 1 / 3  # of the spans a direction in these rounds: F is smooth while i
 
 @dataclass(frozen=True)
 class Grow(Phase):
-    """F grows from a cube: the surface's data draw it with a larger share of their weight in each round."""
+    """Let F grow from a cube: in each round the surface's data have a larger share of their weight."""
 
     name = "grow"
 
     def done(self, state: State) -> Reason | None:
-        """End when all shares have been taken."""
+        """Return Reason.GROWN once all shares have been used, and None before."""
         return Reason.GROWN if state.number >= len(self.shares) else None
 
 
 @dataclass(frozen=True)
 class Growth(Start):
-    """A cube grows.
+    """Make a map by a cube that grows into the solid.
 
-    turn: of the cube: 0 is the best found, 1 the next, and so on. far: distance from the surface, root mean square,
-    with which F is given up once all data draw it, and beyond which a stiffer growth is tried beside this one. firm:
-    rounds after which the surface's data give way at unproved spans. stiffness: factor of the fairness. least_floor:
-    share to which the floors of det J are lowered, at most, in parts that are far thinner than the rest.
+    turn: the turn of the cube; 0 is the best turn found, 1 the next best, and so on. far: a root mean square distance
+    from the surface; a map farther away is given up once all data draw it, and a stiffer growth is tried beside this
+    one. firm: the number of rounds after which the surface's data give way at unproved spans. stiffness: the factor of
+    the fairness weight. least_floor: the smallest share to which the floors of det J are lowered in parts that are far
+    thinner than the rest.
     """
 
     turn: int = 0
@@ -62,7 +63,7 @@ class Growth(Start):
     least_floor: float = 1.0
 
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt:
-        """Lay the surface on the cube and let F grow towards it."""
+        """Lay the surface on the cube, let F grow towards it, and return the attempt."""
         with timed(task.seconds, "fit"), one_blas_thread():
             layout = surface_on_cube(task, self.turn)
             fit = task.fit(layout, _COARSE)
@@ -71,11 +72,11 @@ class Growth(Start):
 
     @property
     def weights(self) -> Weights:
-        """The weights that this growth keeps to the end."""
+        """Return the weights of the energy that this growth keeps until its last round."""
         return Weights(self.stiffness * Weights.fairness, least_floor=self.least_floor)
 
     def schedule(self, config: Config) -> Schedule:
-        """Return the rounds: those in which F grows come first, with the full penalty on det J."""
+        """Return the phases of the rounds: F grows in the first phase, under the full penalty on det J."""
         grown, steps = len(SHARES), scaled_steps(STEPS, config.steps_factor)
         phases = (
             Grow(firm=self.firm, shares=SHARES, steps=steps),
@@ -96,7 +97,7 @@ LAST = replace(STIFF, name="last growth", doing="growing a stiffer map, farther 
 
 
 def first_cube(layout: CubeLayout, knots: Knots, degree: int) -> SplineMap:
-    """Return the map onto the unit cube, turned so that it faces the surface as laid out."""
+    """Return the map onto the unit cube, turned so that its faces look towards their parts of the surface."""
     weights = vertex_weights(layout.points, layout.faces, layout.n_own)
     rotation, _ = Rotation.align_vectors(layout.points - 0.5, layout.places - 0.5, weights)
     points = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1) - 0.5

@@ -1,4 +1,4 @@
-"""The first start: the network is trained, F is fitted to its map, and optimised."""
+"""Starts from the trained network: F is fitted to the network's map and then optimised."""
 
 import logging
 from dataclasses import dataclass, replace
@@ -27,10 +27,13 @@ _USUAL_STEPS = (13, 21, 27, 7, 6, 6)  # of the rounds of most runs: tells the ti
 
 @dataclass(frozen=True)
 class Network(Start):
-    """The trained network maps the solid into the cube."""
+    """Make a map from a trained network, which maps the solid into the cube."""
 
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
-        """Train the network, fit F to it and optimise F; None where the shape is hard and other starts may follow."""
+        """Train the network, fit F to it and return the optimised F as an attempt.
+
+        None is returned where the training finds the shape too hard, and other starts may follow.
+        """
         others = task.most_starts > 1
         if others and task.config.train.easy_loss == 0.0:  # every shape counts as hard
             return None
@@ -63,14 +66,15 @@ NETWORK = Network("network", "network", "training the network")
 
 
 def schedule(spline: SplineConfig) -> Schedule:
-    """Return the rounds that follow: F starts folded where the network's map does, and the penalties grow slowly."""
+    """Return the phases of the rounds: F starts folded where the network's map is, and the penalties grow slowly."""
     return Schedule((Shape(RAMP), Unfold(RAMP), Separate(RAMP), Polish(RAMP)), spline.rounds, _USUAL_STEPS)
 
 
 def _layout(mapped: Array, corners: IntArray | None, task: Task) -> CubeLayout:
-    """Return nearest points on the cube, untangled; where that leaves flips, patches between traced edges.
+    """Return the layout of the nearest points on the cube, untangled; or else the patches between traced edges.
 
-    The first stays closer to the network's map, the second always succeeds where the edges can be traced.
+    The layout of nearest points is closer to the network's map. The layout by patches is used where flipped triangles
+    remain in the other; it always succeeds where the edges can be traced.
     """
     layout = CubeLayout(*task.mesh, mapped, task.own)
     untangled = untangle(nearest_places(mapped), layout.faces)

@@ -1,4 +1,4 @@
-"""The surface on the cube without a flipped triangle, from which growth and extension start."""
+"""Lays the surface on the cube without a flipped triangle; growth and extension start from this layout."""
 
 from dataclasses import replace
 
@@ -15,10 +15,10 @@ USUAL_STEPS = (40, 12, 8, 8, 8, 7, 6, 6, 6)  # of Newton's method in the rounds 
 
 
 def surface_on_cube(task: Task, turn: int) -> CubeLayout:
-    """Lay the surface, laid on the sphere, on the cube without a flipped triangle, its long edges cut.
+    """Return the layout of the surface on the cube, without a flipped triangle, made from the layout on the sphere.
 
-    The mesh's own vertices stay first. turn: of the ways the cube may be turned, which the seed draws, 0 takes the
-    best, 1 the next, ...
+    Long edges of the mesh are cut; the mesh's own vertices stay first. turn: the turn of the cube; 0 is the best turn
+    among those that the seed draws, 1 the next best, and so on.
     """
     sphere = task.sphere
     rotation = best_turn(sphere, np.random.default_rng(task.seed), turn)

@@ -1,4 +1,4 @@
-"""What a start is: it makes a map of a surface, which the rounds then optimise; and what all starts share."""
+"""Defines a start, which makes the map of a surface for the rounds to optimise, and the task that all starts share."""
 
 import logging
 import math
@@ -35,7 +35,7 @@ MOST_POINTS = (
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What all starts share: the surface, options, the place, and what is computed of the surface once."""
+    """Hold the data that all starts share: the surface, the options, the device, and results that are computed once."""
 
     surface: Surface
     config: Config
@@ -48,30 +48,30 @@ class Task:
 
     @property
     def own(self) -> int:
-        """Number of the surface's own vertices, which stay the first ones where edges are cut."""
+        """Return the number of the surface's own vertices, which stay the first vertices where edges are cut."""
         return len(self.surface.vertices)
 
     @property
     def most_starts(self) -> int:
-        """Number of starts that may be tried: the first alone holds corners that the user gives."""
+        """Return the largest number of starts: one where the user gives corners, as only the first start holds them."""
         return self.config.starts if self.given_corners is None else 1
 
     @cached_property
     def mesh(self) -> tuple[Array, IntArray]:
-        """Vertices (n, 3) and faces (m, 3) at volume 1, long edges cut."""
+        """Return the vertices (n, 3) and the faces (m, 3) of the surface at volume 1, with long edges cut."""
         longest = self.config.spline.longest_edge
         return subdivide_finely(self.surface.unit_vertices, self.surface.faces, longest, self.own + MOST_POINTS)
 
     @cached_property
     def sphere(self) -> CubeLayout:
-        """The surface at volume 1, laid on the sphere."""
+        """Return the layout of the surface, at volume 1, on the sphere."""
         surface = self.surface
         return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"])
 
     def fit(self, layout: CubeLayout, coarse: float) -> SurfaceFit:
-        """Return where the surface's points lie on the boundary of the cube to begin with (section 4.3.2, step 1).
+        """Return the surface's points with their first parameters on the boundary of the cube (section 4.3.2, step 1).
 
-        coarse: share of the spans a direction in the first rounds.
+        coarse: the number of spans a direction in the first rounds, as a share of that in the last rounds.
         """
         spline = self.config.spline
         return SurfaceFit(
@@ -85,7 +85,7 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A map, how its rounds went, the surface data that belong to it, and the weights by which it may be refined."""
+    """Hold a map, the course of its rounds, its surface data, and the weights of the energy for its refinement."""
 
     found: Optimized
     course: Course
@@ -94,20 +94,20 @@ class Attempt:
 
     @cached_property
     def distance(self) -> float:
-        """Root mean square distance of the surface's points from the map, at volume 1."""
+        """Return the root mean square distance of the surface's points from the map, at volume 1."""
         return math.sqrt(self.fit.mean_square(self.found.spline.control))
 
     @property
     def rank(self) -> tuple[int, bool, bool, float]:
-        """What is not proved, then the distance: of two attempts the one with the lower rank is better."""
+        """Return the faults of the map, then its distance: of two attempts the one with the lower rank is better."""
         return *self.found.rank, self.distance
 
 
 @dataclass(frozen=True)
 class Start(ABC):
-    """A way to a first map.
+    """Describe a way to a first map.
 
-    name: in report.json. origin: the kind of the way. doing: the way in words, as the log has it.
+    name: the name in report.json. origin: the kind of start. doing: the start in words, as the log shows it.
     """
 
     name: str
@@ -116,7 +116,7 @@ class Start(ABC):
 
     @abstractmethod
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
-        """Return an optimised map; None where the shape does not suit."""
+        """Return an attempt with an optimised map; None where the start does not suit the shape."""
 
 
 def optimized(
@@ -127,7 +127,7 @@ def optimized(
     checkpoints: Checkpoints,
     weights: Weights = Weights(),  # noqa: B008 - frozen
 ) -> Attempt:
-    """Optimise a first map on the knots of `fit`."""
+    """Return the attempt that the rounds make of a first map, on the knots of `fit`."""
     spline = task.config.spline
     with timed(task.seconds, "optimize"):
         made = optimize_coarse_first(first, fit, spline, schedule, weights, checkpoints=checkpoints, **task.report)

@@ -1,4 +1,4 @@
-"""What has become of the starts that were tried, and the best of their maps."""
+"""Describes the starts that were tried, and chooses the best of their maps."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -42,14 +42,14 @@ class AttemptReport:
 
 @dataclass(frozen=True)
 class Tried:
-    """A start that was tried, its map, None where the shape did not suit, and the wall seconds of its steps."""
+    """Hold a start that was tried, its attempt (None where it did not suit the shape), and the wall seconds by step."""
 
     start: Start
     attempt: Attempt | None
     seconds: dict[str, float]
 
     def report(self) -> AttemptReport:
-        """Return what the result and report.json tell."""
+        """Return the report of the start, for the result and for report.json."""
         seconds = {step: spent for step, spent in self.seconds.items() if step in ("train", "fit") and spent > 0.0}
         start = self.start.name, self.start.origin
         if self.attempt is None:
@@ -60,6 +60,6 @@ class Tried:
 
 
 def best_of(tried: Iterable[Tried]) -> tuple[Start, Attempt] | None:
-    """Return the map of which most is proved, then the nearest to the surface, with its start; None without a map."""
+    """Return the start and the attempt of the best map: fewest faults, then the least distance; None without a map."""
     maps = [(one.start, one.attempt) for one in tried if one.attempt is not None]
     return min(maps, key=lambda one: one[1].rank, default=None)

@@ -1,4 +1,4 @@
-"""The device, the precision and the threads that torch works with."""
+"""Chooses the device, the precision and the threads of torch."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ PRECISIONS = {"float32": torch.float32, "float64": torch.float64}
 
 
 def choose_device(name: str) -> str:
-    """Return the device, "cpu" or "cuda", for "auto", "cpu" or "cuda". Raises ValueError where it is not there."""
+    """Return the device, "cpu" or "cuda", for "auto", "cpu" or "cuda". Raises ValueError where it is absent."""
     if name not in ("auto", "cpu", "cuda"):
         raise ValueError(f"device {name!r}: choose auto, cpu or cuda")
     available = torch.cuda.is_available()
@@ -29,10 +29,11 @@ def choose_precision(dtype: Any) -> str:
 
 @contextmanager
 def one_thread_an_operation() -> Iterator[None]:
-    """Most tensors here are small: handing them to a second thread costs more than it saves (up to 4 times).
+    """Let torch use one thread for each operation inside the context.
 
-    A thread of `in_parallel` begins with torch's setting at its first operation and keeps it. All torch work in pieces
-    belongs under this: else such a thread splits its sums, and bits depend on which thread takes a piece.
+    Most tensors here are small: a second thread costs more time than it saves (up to 4 times). A thread of
+    `in_parallel` takes torch's setting at its first operation and keeps it. All torch work in pieces needs this
+    context: otherwise such a thread splits its sums, and the bits depend on which thread computes a piece.
     """
     threads = torch.get_num_threads()
     torch.set_num_threads(1)

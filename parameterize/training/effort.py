@@ -1,4 +1,4 @@
-"""What a training step takes: the points it maps, and a pass of the network to be timed."""
+"""Computes the effort of a training step: the number of mapped points, and a pass of the network to be timed."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from .samples import stencils
 
 
 def points_of_a_step(vertices: Array, faces: IntArray, train: TrainConfig) -> int:
-    """Return how many points the network maps in a step; vertices (n, 3) at volume 1, faces (m, 3)."""
+    """Return the number of points that the network maps in a step; vertices (n, 3) at volume 1, faces (m, 3)."""
     nodes = stencils(vertices, faces, train.cell, device=torch.device("cpu"), dtype=torch.float32).nodes
     return len(nodes) + min(len(vertices), 3 * train.triangles)
 

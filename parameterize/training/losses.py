@@ -1,6 +1,6 @@
-"""The training loss L = L_inner + L_bound (paper, eq. (2) and (3)): its weighted sum, and one function a term.
+"""Computes the training loss L = L_inner + L_bound (paper, eq. (2) and (3)): its weighted sum, and one function a term.
 
-Each term has the name of its weight in `StageWeights`. The paper gives the terms' own formulas without numbers: those
+Each term has the name of its weight in `StageWeights`. The paper gives the formulas of the terms without numbers: those
 of L_bound in section 4.4.1, those of L_inner in 4.4.2.
 """
 
@@ -29,7 +29,7 @@ _UNITS = np.eye(3, dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class EdgePaths:
-    """The paths that go to the cube's edges: vertices (k,), targets (k, 3), pairs of neighbours (s, 2)."""
+    """Hold the paths that go to the cube's edges: vertices (k,), targets (k, 3), pairs of neighbours (s, 2)."""
 
     vertices: Tensor
     targets: Tensor
@@ -38,7 +38,7 @@ class EdgePaths:
 
 @dataclass(frozen=True, eq=False)
 class BoundarySamples:
-    """The surface data of a stage: vertices (n, 3) at volume 1, triangles (m, 3), and the sampler of the triangles.
+    """Hold the surface data of a stage: vertices (n, 3) at volume 1, triangles (m, 3), the sampler of the triangles.
 
     Later stages also have corners (8,), the vertices that go to the cube's corners; labels (m,), the cube face of each
     triangle; and the paths to the cube's edges.
@@ -54,7 +54,7 @@ class BoundarySamples:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """The loss of every stage, as a function of the network at stencils inside the domain and on the surface."""
+    """Compute the loss of every stage from the network's values at stencils inside the domain and on the surface."""
 
     network: InverseMap
     stencils: Stencils
@@ -62,7 +62,7 @@ class Objective:
     def __call__(
         self, stage: Stage, boundary: BoundarySamples, generator: torch.Generator
     ) -> tuple[Tensor, int, dict[str, float]]:
-        """Return the weighted sum of the terms (eq. (2) and (3)), the folded stencils, and the unweighted terms."""
+        """Return the weighted sum of the terms (eq. (2), (3)), the number of folded stencils, the unweighted terms."""
         picks = boundary.sampler.draw(generator)
         used, place = torch.unique(boundary.faces[picks].flatten(), return_inverse=True)
         held = [] if boundary.corners is None else [boundary.corners]
@@ -113,12 +113,12 @@ class Objective:
 
 
 def _neighbour(mapped: Tensor, step: IntArray) -> Tensor:
-    """Return the mapped stencil point at a lattice step from the centre: (r, 3)."""
+    """Return the mapped stencil points (r, 3) at a lattice step from the centres."""
     return mapped[:, _POSITION[tuple(step.tolist())]]
 
 
 def stencil_jacobian(mapped: Tensor, cell: float) -> Tensor:
-    """Return J by central differences of G: stencils (r, 19, 3) -> (3, 3, r), the second index is the direction."""
+    """Return J (3, 3, r) by central differences of G at stencils (r, 19, 3); the second index of J is the direction."""
     columns = [(_neighbour(mapped, e) - _neighbour(mapped, -e)).T for e in _UNITS]
     return torch.stack(columns, dim=1) / (2.0 * cell)
 
@@ -126,7 +126,7 @@ def stencil_jacobian(mapped: Tensor, cell: float) -> Tensor:
 def bijectivity(det: Tensor) -> Tensor:
     """Return L_bij of eq. (3) as the mean of (alpha - det)_+^2.
 
-    The paper has no square; it keeps the gradient continuous where a fold opens.
+    The paper has no square; the square keeps the gradient continuous where a fold opens.
     """
     return (_ALPHA - det).clamp_min(0.0).square().mean()
 
@@ -134,7 +134,7 @@ def bijectivity(det: Tensor) -> Tensor:
 def distortion(jacobian: Tensor, det: Tensor) -> Tensor:
     """Return L_arap of eq. (3): the mean of det * sum (1 / sigma - 1)^2, the ARAP energy of the inverse of G.
 
-    With A = J^-1 and R its closest rotation this is det * |A - R|^2. Smaller determinants count as _LEAST_DET.
+    With A = J^-1 and R its closest rotation this is det * |A - R|^2. Determinants below _LEAST_DET count as _LEAST_DET.
     """
     safe = det.clamp_min(_LEAST_DET)
     inverse = cofactor(jacobian).transpose(0, 1) / safe
@@ -162,12 +162,12 @@ def fairness(mapped: Tensor, cell: float) -> Tensor:
 
 
 def distance(mapped: Tensor, target: Tensor) -> Tensor:
-    """Return the mean squared distance of points (m, 3): L_dist and L_cor of eq. (3)."""
+    """Return the mean squared distance of points (m, 3), which is L_dist and L_cor of eq. (3)."""
     return (mapped - target).square().sum(dim=1).mean()
 
 
 def triangle_normals(corners: Tensor) -> Tensor:
-    """Return the unit normals of triangles (m, 3, 3), last index the coordinate; zero for a triangle without area."""
+    """Return the unit normals (m, 3) of triangles (m, 3, 3), last index the coordinate; 0 where the area is 0."""
     cross = torch.linalg.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return cross / cross.norm(dim=1, keepdim=True).clamp_min(1e-12)
 
@@ -185,7 +185,8 @@ def normal_difference(normals: Tensor, target: Tensor, wrong_side: float) -> Ten
 def star_shape(corners: Tensor, normals: Tensor) -> Tensor:
     """Return L_star of eq. (3): the mean of (-<A v, n> / |A v|)_+^2, A the cube's centre, v a corner of the triangle.
 
-    By the paper's Lemma 1 it is 0 only where the mapped surface is star-shaped. The paper writes it without (.)_+^2.
+    By the paper's Lemma 1 the term is 0 only where the mapped surface is star-shaped. The paper writes it without
+    (.)_+^2.
     """
     arm = corners[:, 0] - 0.5
     facing = (arm * normals).sum(dim=1) / arm.norm(dim=1).clamp_min(1e-12)
@@ -193,9 +194,10 @@ def star_shape(corners: Tensor, normals: Tensor) -> Tensor:
 
 
 def edge_path(mapped: Tensor, target: Tensor, following: Tensor) -> Tensor:
-    """Return L_edge of eq. (3): the mean squared distances of path points (k, 3) and directions to those on the edges.
+    """Return L_edge of eq. (3) from the mapped points (k, 3) of paths and their targets (k, 3) on the cube's edges.
 
-    following: (s, 2) pairs of consecutive path points.
+    L_edge is the mean squared distance of the points from their targets, plus that of the paths' directions from the
+    edges' directions. following: (s, 2), pairs of consecutive path points.
     """
     step = gather(mapped, following[:, 1]) - gather(mapped, following[:, 0])
     aim = target[following[:, 1]] - target[following[:, 0]]

@@ -1,6 +1,6 @@
-"""Closest rotations, cofactors and determinants of 3 x 3 matrices, as tensors.
+"""Computes closest rotations, cofactors and determinants of 3 x 3 matrices, as tensors.
 
-Matrices come as (3, 3, m): row, column, sample. Batched this way every operation runs along contiguous memory.
+Matrices have the shape (3, 3, m): row, column, sample. In this layout every operation runs along contiguous memory.
 """
 
 import torch
@@ -10,12 +10,12 @@ from ..quality.rotations import closest_rotations
 
 
 def determinant(j: Tensor) -> Tensor:
-    """Return the determinants of (3, 3, m): (m,)."""
+    """Return the determinants (m,) of matrices (3, 3, m)."""
     return (j[:1] * _cross(j[1:2], j[2:])).sum(dim=(0, 1))
 
 
 def cofactor(j: Tensor) -> Tensor:
-    """Return the cofactors (3, 3, m): the inverse of J is their transpose over det J."""
+    """Return the cofactors (3, 3, m) of matrices J (3, 3, m): the inverse of J is the transpose over det J."""
     cyclic = torch.cat([j, j[:2]])
     return _cross(cyclic[1:4], cyclic[2:5])
 
@@ -27,5 +27,5 @@ def _cross(a: Tensor, b: Tensor) -> Tensor:
 
 
 def closest_rotation(j: Tensor) -> Tensor:
-    """Return the rotation closest to each matrix of (3, 3, m), detached: see `closest_rotations`."""
+    """Return the rotation closest to each matrix of (3, 3, m), without a gradient: see `closest_rotations`."""
     return torch.from_numpy(closest_rotations(j.detach().cpu().numpy())).to(j.device)

@@ -1,4 +1,4 @@
-"""The network G: an affine map plus a residual MLP on a positional encoding (section 4.2)."""
+"""Defines the network G: an affine map plus a residual MLP on a positional encoding (section 4.2)."""
 
 import math
 from typing import Any
@@ -14,22 +14,23 @@ _SHARES = 4  # the number of pieces is a multiple of this, so that up to so many
 
 
 class ResidualModule(nn.Module):
-    """x + relu(Linear(x))."""
+    """Compute x + relu(Linear(x))."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
         self.linear = nn.Linear(width, width)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return the module's values: (m, width) -> (m, width)."""
+        """Return the module's values (m, width) at x (m, width)."""
         return x + torch.relu(self.linear(x))
 
 
 class InverseMap(nn.Module):
-    """G(x) = c + A (x - c) + MLP(encoding(x)), c = (1/2, 1/2, 1/2), from the domain (volume 1, around c) to the cube.
+    """Compute G(x) = c + A (x - c) + MLP(encoding(x)), c = (1/2, 1/2, 1/2), from the domain to the cube.
 
-    The last layer starts at zero, so G *is* the affine map before the first step: with A = I, the default, the identity
-    that the paper trains towards. A is not trained. generator: draws the other layers' first weights.
+    The domain has volume 1 and lies around c. The last layer starts at zero, so G *is* the affine map before the first
+    step; with the default A = I it is the identity, towards which the paper trains. A is not trained. generator: the
+    random generator of the other layers' first weights.
     """
 
     multiples: Tensor
@@ -52,32 +53,32 @@ class InverseMap(nn.Module):
 
     @torch.no_grad()
     def turn(self, rotation: Tensor) -> None:
-        """Turn the image of G about the middle of the cube, in place: rotation (3, 3)."""
+        """Turn the image of G about the centre of the cube by a rotation (3, 3), in place."""
         for part in (self.affine, self.last.weight, self.last.bias):
             part.copy_(rotation.to(part) @ part)
 
     def encode(self, x: Tensor) -> Tensor:
-        """Return x, sin(n k x) / (n k), cos(n k x) / (n k) for n = 1..N: (m, 3) -> (m, 6 N + 3)."""
+        """Return x, sin(n k x) / (n k), cos(n k x) / (n k) for n = 1..N, (m, 6 N + 3), at points x (m, 3)."""
         nk = self.multiples * self.scale  # (N,)
         phase = x[:, None, :] * nk[:, None]  # (m, N, 3)
         waves = torch.cat([torch.sin(phase), torch.cos(phase)], dim=2) / nk[:, None]
         return torch.cat([x, waves.flatten(1)], dim=1)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return G at points: (m, 3) -> (m, 3)."""
+        """Return G (m, 3) at points (m, 3)."""
         hidden = torch.relu(self.first(self.encode(x)))
         shift: Tensor = self.last(self.residual(hidden))
         return (x - 0.5) @ self.affine.T + 0.5 + shift
 
 
 def map_in_pieces(network: nn.Module, points: Tensor) -> Tensor:
-    """Return network(points), (m, 3) -> (m, 3), with its gradient, on any number of threads to the same bits."""
+    """Return network(points) (m, 3) at points (m, 3), with its gradient; any number of threads gives the same bits."""
     mapped: Tensor = _InPieces.apply(network, points, *network.parameters())  # type: ignore[no-untyped-call]
     return mapped
 
 
 class _InPieces(torch.autograd.Function):
-    """The network on pieces of the points, forward and back; the pieces' gradients are added in their order."""
+    """Run the network forward and backward on pieces of the points, and add the pieces' gradients in their order."""
 
     @staticmethod
     def forward(ctx: Any, network: nn.Module, points: Tensor, *parameters: Tensor) -> Tensor:
@@ -94,9 +95,9 @@ class _InPieces(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> Any:
-        """Return the gradients in the parameters.
+        """Return the gradients with respect to the parameters.
 
-        The gradient of a sum spares torch's symbolic shapes, whose loading takes as long as many steps.
+        The gradient of a sum avoids torch's symbolic shapes, which take as long to load as many steps.
         """
 
         def part(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, ...]:

@@ -1,8 +1,8 @@
-"""The optimiser of the training: Muon for the hidden layers' matrices, Adam for all other numbers.
+"""Optimises the network: Muon for the matrices of the hidden layers, Adam for all other numbers.
 
-Muon takes steps whose singular values are all alike (Jordan et al., 2024), so that directions in which the gradient is
-small advance as fast as the others. That of torch computes in bfloat16, which takes 20 times as long as float32 on
-processors without instructions for it; this one computes in the parameters' own precision.
+Muon takes steps whose singular values are all alike (Jordan et al., 2024), so that directions with a small gradient
+advance as fast as the others. torch's own Muon computes in bfloat16, which takes 20 times as long as float32 on
+processors without instructions for it; this class computes in the precision of the parameters.
 """
 
 import math
@@ -24,10 +24,10 @@ def _gradient(parameter: Tensor) -> Tensor:
 
 
 class Muon:
-    """Takes steps along U V^T, where U S V^T is a matrix's gradient with Nesterov's momentum.
+    """Take steps along U V^T, where U S V^T is a matrix's gradient with Nesterov's momentum.
 
-    lr: about the singular values of a step; those of a matrix with more rows than columns are larger by the square root
-    of the ratio.
+    lr: the approximate singular values of a step; for a matrix with more rows than columns the step is larger by the
+    square root of the ratio.
     """
 
     _MOMENTUM = 0.95
@@ -40,7 +40,7 @@ class Muon:
 
     @torch.no_grad()
     def step(self, share: float) -> None:
-        """Take one step at a share of the rate."""
+        """Take one step at a share of the learning rate."""
         pairs = list(zip(self.parameters, self.moments, strict=True))
         in_parallel(lambda pair: self._step(*pair, share * self._rate), pairs)
 
@@ -55,7 +55,7 @@ class Muon:
     def _orthogonal(self, matrix: Tensor) -> Tensor:
         """Return an approximation of U V^T for a matrix U S V^T.
 
-        Singular values above a hundredth of the matrix' Frobenius norm come to lie between 0.68 and 1.21.
+        Singular values above a hundredth of the matrix's Frobenius norm come to lie between 0.68 and 1.21.
         """
         a, b, c = self._POLYNOMIAL
         tall = matrix.shape[0] > matrix.shape[1]
@@ -68,7 +68,7 @@ class Muon:
 
 
 class Adam:
-    """Adam as torch computes it; the class `torch.optim.Adam` would load torch's compiler, which takes seconds."""
+    """Take Adam's steps as torch computes them; `torch.optim.Adam` would load torch's compiler, which takes seconds."""
 
     def __init__(self, parameters: list[Tensor], lr: float) -> None:
         self.parameters, self._rate = parameters, lr
@@ -79,7 +79,7 @@ class Adam:
 
     @torch.no_grad()
     def step(self, share: float) -> None:
-        """Take one step at a share of the rate."""
+        """Take one step at a share of the learning rate."""
         steps, means, squares = ([row[name] for row in self.moments] for name in ("step", "exp_avg", "exp_avg_sq"))
         adam(
             self.parameters,
@@ -99,7 +99,7 @@ class Adam:
 
 
 class TrainingOptimizer:
-    """Muon and Adam side by side, with one schedule."""
+    """Run Muon and Adam side by side, with one schedule."""
 
     def __init__(self, network: InverseMap, config: TrainConfig) -> None:
         hidden, others = list[Tensor](), list[Tensor]()
@@ -122,7 +122,7 @@ class TrainingOptimizer:
             part.step(share)
 
     def tensors(self) -> Tensors:
-        """Return the moments, to be kept in a checkpoint."""
+        """Return the moments of both optimisers, for a checkpoint."""
         return {
             f"{name}.{index}.{moment}": value
             for name, part in self._parts.items()
@@ -131,6 +131,6 @@ class TrainingOptimizer:
         }
 
     def restore(self, tensors: Tensors) -> None:
-        """Take moments that `tensors` has returned."""
+        """Set the moments that `tensors` has returned."""
         for key, value in self.tensors().items():
             value.copy_(tensors[key])

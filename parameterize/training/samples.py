@@ -1,4 +1,4 @@
-"""Samples that the losses are evaluated on: interior stencils (section 4.4.2) and surface triangles, both seeded."""
+"""Draws the samples of the losses: interior stencils (section 4.4.2) and surface triangles, both with a seed."""
 
 from dataclasses import dataclass
 
@@ -20,9 +20,9 @@ OFFSETS = np.concatenate([_STEPS[np.count_nonzero(_STEPS, axis=1) == moved] for 
 
 @dataclass(frozen=True, eq=False)
 class Stencils:
-    """A lattice that covers the domain, and for each stencil centre its 19 lattice points.
+    """Hold a lattice that covers the domain, and for each stencil centre its 19 lattice points.
 
-    nodes: (n, 3) positions; index: (r, 19) into nodes, ordered as OFFSETS; cell: the lattice spacing h.
+    nodes: (n, 3), positions. index: (r, 19) into nodes, in the order of OFFSETS. cell: the lattice spacing h.
     """
 
     nodes: Tensor
@@ -36,15 +36,15 @@ class Stencils:
 
 
 def gather(rows: Tensor, index: Tensor) -> Tensor:
-    """Return rows[index] for rows (n, k) and any index shape, with a repeatable gradient.
+    """Return rows[index] for rows (n, k) and an index of any shape, with a repeatable gradient.
 
-    Plain indexing adds the gradients of repeated rows in the order in which threads happen to come.
+    The gradient of plain indexing adds repeated rows in an order that depends on the threads.
     """
     return rows.index_select(0, index.flatten()).view(*index.shape, rows.shape[1])
 
 
 def signed_distance(points: Array, vertices: Array, faces: IntArray) -> Array:
-    """Return the distance to the surface, negative inside: (m, 3) -> (m,)."""
+    """Return the distance (m,) of points (m, 3) to the surface, negative inside."""
     kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
     return np.asarray(igl.signed_distance(points, vertices, faces, sign_type=kind)[0])
 
@@ -52,9 +52,9 @@ def signed_distance(points: Array, vertices: Array, faces: IntArray) -> Array:
 def near_or_inside(vertices: Array, faces: IntArray, cell: float, margin: float) -> IntArray:
     """Return the integer coordinates (k, 3), ascending, of all lattice points inside, and of some beside the surface.
 
-    The bounding box, grown by `margin`, is halved until a part is small or far from every triangle, by more than
-    `margin` from its box or plane. Far parts are kept only inside: a thin body that lies askew fills little of its
-    box.
+    The bounding box, extended by `margin`, is halved until a part is small, or farther than `margin` from the box or
+    plane of every triangle. Such far parts are kept only inside the surface: a thin body that is not parallel to the
+    axes fills little of its box.
     """
     corners = vertices[faces]
     grown = np.stack([corners.min(axis=1) - margin, corners.max(axis=1) + margin], axis=1) / cell  # (m, 2, 3)
@@ -98,13 +98,13 @@ def stencils(vertices: Array, faces: IntArray, cell: float, *, device: torch.dev
 
 
 def interior_points(vertices: Array, faces: IntArray, cell: float) -> Array:
-    """Return the lattice points inside the surface: (k, 3)."""
+    """Return the lattice points (k, 3) inside the surface."""
     points = near_or_inside(vertices, faces, cell, 0.0) * cell
     return points[igl.fast_winding_number(vertices, faces, points) > 0.5]
 
 
 class TriangleSampler:
-    """Draws triangles with probability proportional to area; all of them where there are at most `count`."""
+    """Draw triangles with probability proportional to area, or all triangles where there are at most `count`."""
 
     def __init__(self, vertices: Array, faces: IntArray, count: int, device: torch.device) -> None:
         area = np.linalg.norm(doubled_areas(vertices, faces), axis=1)

@@ -1,4 +1,4 @@
-"""The training stages of section 4.3.1: the shape that each one leads to, and its loss weights (paper, Table 1)."""
+"""Defines the training stages of section 4.3.1: their target shapes and their loss weights (paper, Table 1)."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -10,7 +10,7 @@ Target = Literal["S(2)", "S(1)", "cube"]
 
 @dataclass(frozen=True)
 class StageWeights:
-    """The weights of the loss terms in one stage: a row of the paper's Table 1, by default the first one."""
+    """Hold the weights of the loss terms in one stage, a row of the paper's Table 1; the defaults are its first row."""
 
     bij: float = 1e6
     arap: float = 1.0
@@ -24,7 +24,7 @@ class StageWeights:
 
 @dataclass(frozen=True)
 class Stage:
-    """The shape that the mapped surface goes to in a stage, and the weights of the loss."""
+    """Hold the target shape of the mapped surface in a stage, and the weights of the loss."""
 
     target: Target
     weights: StageWeights

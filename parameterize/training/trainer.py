@@ -1,4 +1,4 @@
-"""The training stages as one loop: smooth cuboids S(2), S(1), cube, fixed corners, fixed edges (section 4.3.1).
+"""Trains the network in stages: smooth cuboids S(2), S(1), cube, fixed corners, fixed edges (section 4.3.1).
 
 The loss at the end of the first stage decides whether the network suits the shape.
 """
@@ -37,7 +37,7 @@ _RACE_GAIN = 0.05  # share by which the turned G must be better, first in hollow
 
 @dataclass
 class _Run:
-    """The state of the training: stage, step, and the network at the start of the stage and at its best."""
+    """Hold the state of the training: stage, step, and the network at the start of the stage and at its best."""
 
     number: int
     step: int
@@ -47,10 +47,10 @@ class _Run:
 
 
 class Trainer:
-    """Trains G on one surface.
+    """Train G on one surface.
 
-    vertices: (n, 3), at volume 1. faces: (m, 3). given_corners: (8,) vertex numbers or None.
-    The random numbers of a step depend on the seed, the stage and the step alone.
+    vertices: (n, 3), at volume 1. faces: (m, 3). given_corners: (8,) vertex numbers, or None. The random numbers of a
+    step depend on the seed, the stage and the step only.
     """
 
     def __init__(
@@ -81,11 +81,12 @@ class Trainer:
         self.objective = Objective(self.network, inside)
 
     def run(self, *, give_up: bool = False) -> InverseMap | None:
-        """Train the stages, from a checkpoint on where there is one; return the network at the last one's best state.
+        """Train all stages, or continue from a checkpoint; return the network at the best state of the last stage.
 
         With `give_up`, return None where the first stage ends with a loss above `easy_loss`, see `_misfit`. If the
         mapped surface is still too far from a cube for its edges to be traced, the stages that hold edges are left out
-        with a warning: the spline stage moves edges anyway. Raises PathError instead where the user gave the corners.
+        with a warning, because the spline stage moves the edges in any case; where the user gave the corners, PathError
+        is raised instead.
         """
         given, limit = self.corners is not None, self.config.train.easy_loss
         saved = self._saved()
@@ -113,11 +114,11 @@ class Trainer:
         return self.network
 
     def map(self, points: Array) -> Array:
-        """Return G at points (m, 3), as float64."""
+        """Return G (m, 3) at points (m, 3), as float64."""
         return map_points(self.network, points)
 
     def mapped(self) -> Array:
-        """Return G at the surface's vertices (n, 3), as the network is now."""
+        """Return G at the surface's vertices, (n, 3), for the present network."""
         return self.map(self.vertices)
 
     def _prepare(self, stage: StageConfig) -> BoundarySamples:
@@ -147,8 +148,8 @@ class Trainer:
     def _misfit(self, stage: StageConfig) -> float:
         """Return the loss of a stage at its best state, without the distortion.
 
-        The rest measures how far G is from its target. A straight rod has a large distortion on any ball, and yet suits
-        the network.
+        The other terms measure how far G is from its target. A straight rod has a large distortion on any ball, and yet
+        suits the network.
         """
         rows = [row for row in self.history.rows if row[0] == stage.name]
         _, _, loss, _, terms = min(rows, key=lambda row: (row[3], row[2]))
@@ -156,17 +157,21 @@ class Trainer:
 
     @property
     def _race_stage(self) -> int | None:
-        """The first stage towards the cube, where G may be turned; None where corners are given or no race is set."""
+        """Return the number of the first stage towards the cube, where G may be turned.
+
+        None is returned where corners are given or the options have no race.
+        """
         if self.corners is not None or self.config.train.race == 0.0:
             return None
         return next((number for number, stage in enumerate(self.config.stages) if stage.name == "cube"), None)
 
     def _race(self, number: int, boundary: BoundarySamples) -> tuple[_Run, TrainingOptimizer]:
-        """Begin a stage with G as it is and, where a turn keeps the cube's edges better out of hollows, with G turned.
+        """Begin a stage twice, with G as it is and with G turned by the best turn of the cube; keep the better run.
 
-        Returns the run and the optimiser of the better one, whose state the network then has. The domain is a ball by
-        now. The turn that suits the cube's edges is computed beforehand; only training shows whether it lowers the
-        distortion, for corners may be harder to reach.
+        The turn puts the cube's edges out of hollows; without such a turn the stage begins once. Returns the better run
+        and its optimiser; the network then has its state. The mapped domain is a ball at this stage. The turn is
+        computed beforehand, but only training shows whether it lowers the distortion, because corners may be harder to
+        reach.
         """
         train, begun = self.config.train, len(self.history.rows)
         away, start = self.mapped() - 0.5, self._state()
@@ -207,7 +212,7 @@ class Trainer:
         self.network.load_state_dict(run.best)
 
     def _steps(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer, until: int) -> Iterator[None]:
-        """Take the steps of a stage up to the step `until`, and report each."""
+        """Take the steps of a stage up to the step `until`, and report each step."""
         stage = self.config.stages[run.number]
         later = sum(stage.steps for stage in self.config.stages[run.number + 1 :])
         started, begun = time.perf_counter(), run.step
@@ -251,9 +256,10 @@ class Trainer:
         self.checkpoints.save(_CHECKPOINT, {name: t.detach().cpu().numpy() for name, t in tensors.items()}, state)
 
     def _saved(self) -> tuple[State, dict[str, Any]] | None:
-        """Return the tensors and the state of the checkpoint; None where there is none.
+        """Return the tensors and the state of the checkpoint; None without a checkpoint.
 
-        The tensors are copies: sums over memory that lies otherwise than in the first run round differently.
+        The tensors are copies: sums over memory in another layout than in the first run would have other rounding
+        errors.
         """
         if (saved := self.checkpoints.load(_CHECKPOINT)) is None:
             return None
@@ -273,24 +279,27 @@ class Trainer:
         optimizer.restore(_part(tensors, "optimizer"))
 
     def _share(self, done: float) -> float:
-        """Return the share of the learning rates, which falls along a cosine; done: the share of the steps, below 1."""
+        """Return the share of the learning rates, which falls along a cosine.
+
+        done: the share of the stage's steps that are finished, below 1.
+        """
         last = self.config.train.final_share
         return last + 0.5 * (1.0 - last) * (1.0 + math.cos(math.pi * done))
 
 
 def start_map(points: Array) -> Array:
-    """Return the symmetric map (3, 3) of determinant 1 that makes a cloud (m, 3) equally wide in all directions."""
+    """Return the symmetric map (3, 3) of determinant 1 that gives a cloud (m, 3) equal width in all directions."""
     values, vectors = np.linalg.eigh(np.cov(points.T))
     return np.asarray((vectors * np.sqrt(values.prod() ** (1.0 / 3.0) / values)) @ vectors.T)
 
 
 def _part(tensors: State, prefix: str) -> State:
-    """Return the entries whose names begin with `prefix` and a dot, without that beginning."""
+    """Return the tensors whose names begin with `prefix` and a dot, under the rest of their names."""
     return {key.removeprefix(f"{prefix}."): value for key, value in tensors.items() if key.startswith(f"{prefix}.")}
 
 
 @torch.no_grad()
 def map_points(network: InverseMap, points: Array, block: int = 65_536) -> Array:
-    """Return G at points (m, 3) as float64, computed in blocks, where the network is and in its precision."""
+    """Return G (m, 3) at points (m, 3) as float64, computed in blocks, on the network's device and in its precision."""
     pieces = torch.as_tensor(points).to(network.affine)
     return np.asarray(torch.cat([network(piece) for piece in torch.split(pieces, block)]).double().cpu())

@@ -1,4 +1,4 @@
-"""Data on the images of the cube's faces: Dirichlet's values projected, Neumann's load and Robin's term integrated."""
+"""Discretizes data on the images of the cube's faces: Dirichlet values projected, Neumann and Robin data integrated."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,9 +24,9 @@ def boundary_coefficients(
 ) -> Array:
     """Return coefficients (c, n_u, n_v, n_w) of an approximation of Dirichlet data on their faces, zero elsewhere.
 
-    values: takes points (3, ...) and the name of a face on which they lie, and returns (c, ...), one row for each of
-    the components. Corners are interpolated,
-    then edges and faces projected in L2, in the parametric measure; each keeps the coefficients of the smaller ones.
+    values: a function of points (3, ...) and the name of their face that returns (c, ...), one row a component. Corners
+    are interpolated, then edges and faces are projected in L2, in the parametric measure; an edge or a face keeps the
+    coefficients on its ends or its rim.
     """
     coefficients = np.zeros((components, *space.shape))
     points, bases, projections = zip(*map(_projection, space.knots, space.degrees), strict=True)
@@ -52,7 +52,7 @@ def boundary_coefficients(
 def _projection(knots: Array, degree: int) -> tuple[Array, csr_array, Array]:
     """Return points (q,) of a direction, its functions there (q, n), and the L2 projection (n - 2, q).
 
-    The projection is that onto the functions that vanish at both ends.
+    The projection maps onto the functions that vanish at both ends.
     """
     points, weights = spline_rule(knots, degree, 2 * degree)
     basis = collocation(knots, degree, points)
@@ -63,11 +63,11 @@ def _projection(knots: Array, degree: int) -> tuple[Array, csr_array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class FaceRule:
-    """Gauss points on the image of one face, degree + 1 a span and direction, and the trial functions there.
+    """Hold Gauss points on the image of one face, degree + 1 a span and direction, and the trial functions there.
 
-    points, normal: (3, q_b, q_c) in space, the normal outward and of unit length. measure: (q_b, q_c), surface element
-    times weight, for Robin's term times alpha. bases: (q_b, n_b) and (q_c, n_c), of the two directions along the face.
-    layer: the face's coefficients in an array (n_u, n_v, n_w).
+    points, normal: (3, q_b, q_c), positions in space and outward unit normals. measure: (q_b, q_c), surface element
+    times weight, for Robin's term also times alpha. bases: (q_b, n_b) and (q_c, n_c), the functions of the two
+    directions along the face. layer: the index of the face's coefficients in an array (n_u, n_v, n_w).
     """
 
     points: Points
@@ -77,17 +77,17 @@ class FaceRule:
     layer: tuple[int | slice, ...]
 
     def integrate(self, density: Array) -> Array:
-        """Return integrals (n_b, n_c) of a density (q_b, q_c) times each trial function."""
+        """Return the integrals (n_b, n_c) of a density (q_b, q_c) times each trial function."""
         return self.bases[0].T @ (density * self.measure) @ self.bases[1]
 
     def add_product(self, coefficients: Array, result: Array) -> None:
-        """Add Robin's term, the integral of alpha u v, of coefficients (c, n_u, n_v, n_w) to a result, shaped alike."""
+        """Add Robin's term, the integral of alpha u v, of coefficients (c, n_u, n_v, n_w) to a result of that shape."""
         for component, total in zip(coefficients, result, strict=True):
             values = self.bases[0] @ component[self.layer] @ self.bases[1].T
             total[self.layer] += self.integrate(values)
 
     def add_diagonal(self, component: int, diagonal: Array) -> None:
-        """Add the diagonal of Robin's term, for each component the same, to an array (n_u, n_v, n_w)."""
+        """Add the diagonal of Robin's term, the same for each component, to an array (n_u, n_v, n_w)."""
         b, c = (basis.power(2) for basis in self.bases)
         diagonal[self.layer] += b.T @ self.measure @ c
 
@@ -101,7 +101,7 @@ class FaceRule:
 
 
 def has_face(space: TrialSpace, name: str) -> bool:
-    """Return whether this process integrates over a part of a face, one of FACE_NAMES."""
+    """Return whether this process integrates over a part of the face `name`, one of FACE_NAMES."""
     u = space.breaks[0]
     return len(u) > 1 and (name[0] != "u" or u[-int(name[1])] == float(name[1]))
 

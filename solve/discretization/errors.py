@@ -1,4 +1,4 @@
-"""Errors of a solution against an exact one."""
+"""Computes the errors of a solution against an exact solution."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ POINTS = 2**16  # of a plane that are evaluated at once: they take dozens of arr
 
 @dataclass(frozen=True)
 class Errors:
-    """L2 norm and H1 seminorm of u - u_h, and the same over those of u.
+    """Hold the L2 norm and the H1 seminorm of u - u_h, and their ratios to the norms of u.
 
-    None: the relative errors where u or its gradient is zero, both of H1 where the gradient of u is unknown.
-    An estimate is relative to u_h, and has no H1.
+    The relative errors are None where u or its gradient is zero, both H1 numbers where the gradient of u is unknown. An
+    estimate is relative to u_h, and has no H1 numbers.
     """
 
     l2: float
@@ -41,8 +41,8 @@ def error_norms(
 ) -> Errors:
     """Return error norms over the physical domain, over all components (c, n_u, n_v, n_w) together.
 
-    exact: takes points (3, ...) and returns u (c, ...) and grad u (c, 3, ...), or None in the gradient's place.
-    There are degree + 2 Gauss points a span and direction.
+    exact: a function of points (3, ...) that returns u (c, ...) and grad u (c, 3, ...), or None in place of the
+    gradient. The integrals use degree + 2 Gauss points a span and direction.
     """
     whole, splines = gauss_rule(space, [p + 2 for p in space.degrees]), np.ascontiguousarray(coefficients)
     strips = [(rule, rule.tabulate(space.degrees, space.knots)) for rule in whole.strips(POINTS)]
@@ -76,12 +76,12 @@ def error_norms(
 
 
 def ratio(error: float, size: float) -> float | None:
-    """Return error over size, None where the size is zero."""
+    """Return the error over the size, None where the size is zero."""
     return error / size if size > 0.0 else None
 
 
 def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: BoundaryValueProblem) -> float:
-    """Return the constant that gives a solution (n_u, n_v, n_w) the mean of `exact`, or mean zero without one."""
+    """Return the constant to add to a solution (n_u, n_v, n_w) for the mean of `exact`, or mean zero without it."""
     rule = gauss_rule(space)
     tables, spline = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients)
     plane = np.empty((4, *rule.plane_shape))

@@ -1,4 +1,4 @@
-"""The error of a solution, estimated from its residual (docs/solver.md)."""
+"""Estimates the error of a solution from its residual (docs/solver.md)."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -42,10 +42,11 @@ def error_estimate(
 ) -> Errors | None:
     """Return the estimated error of a solution with coefficients (c, n_u, n_v, n_w), c components.
 
-    energy: a(u_h, u_h), of a symmetric law whose given values are zero, else None. The work of the loads on the error
-    is then the square of its energy norm, and as large a share of u_h is added: bodies that bend are too stiff by it.
-    None where the residual does not suffice: in a space that is only continuous somewhere, whose derivatives jump, of a
-    law with a caveat, and where the derivatives of its coefficients are unknown.
+    energy: a(u_h, u_h) for a symmetric law whose given values are zero, otherwise None. With `energy`, the work of the
+    loads on the error is the square of its energy norm, and an equal share of u_h is added to the estimate: discrete
+    bodies in bending are too stiff by that share. The estimate is None where the residual does not suffice: in a space
+    that is only continuous somewhere, whose derivatives jump; for a law with a caveat; and where the derivatives of the
+    law's coefficients are unknown.
     """
     if space.is_only_continuous or problem.not_differentiable or problem.form.caveat:
         return None
@@ -70,7 +71,7 @@ def _inside(
     problem: BoundaryValueProblem,
     lowest: Sequence[float],
 ) -> Iterator[tuple[float, float, float]]:
-    """Yield the squares of the norms of the error, of its energy norm and of the solution, layer by layer in u."""
+    """Yield the squared norms of the error, of its energy norm and of the solution, layer by layer in u."""
     rule, counts = gauss_rule(space), space.gauss_points
     bases = [
         [[collocation(knots[a], degrees[a], rule.points[a], order) for order in range(3)] for a in range(3)]
@@ -102,10 +103,10 @@ def _from_face(
     lowest: Sequence[float],
     face: str,
 ) -> float:
-    """Return the square of the norm of the error that given values of u make inside where the space misses them.
+    """Return the squared norm of the error inside that comes from given values of u outside of the space.
 
-    A wave on a face, whose factor in the law is S, decays like exp(-k t) along the parameter t across the face, k^2
-    times the factor of t's own direction being S.
+    A wave on a face, whose factor in the law is S, decays like exp(-k t) along the parameter t across the face, where
+    k^2 times the factor of t's own direction is S.
     """
     axis, side = divmod(FACE_NAMES.index(face), 2)
     counts = [1 if a == axis else degree + 2 for a, degree in enumerate(space.degrees)]
@@ -133,8 +134,9 @@ def _from_face(
 def lowest_waves(volume: BSplineVolume, problem: BoundaryValueProblem) -> list[float]:
     """Return for each direction the wave number, on [0, 1], of the slowest wave that the data on its two faces admit.
 
-    Between two faces with given values that is pi; pi / 2 where one of them has a given flux, 0 where both have. With
-    Robin's data, du/dn = -b u on a face, waves cos(k t - s) have k = arctan(b_0 / k) + arctan(b_1 / k).
+    The number is pi between two faces with given values, pi / 2 where one of the faces has a given flux, and 0 where
+    both have a given flux. With Robin data, du/dn = -b u on a face, waves cos(k t - s) have k = arctan(b_0 / k) +
+    arctan(b_1 / k).
     """
     found = []
     for axis in range(3):
@@ -144,9 +146,9 @@ def lowest_waves(volume: BSplineVolume, problem: BoundaryValueProblem) -> list[f
 
 
 def _hold(volume: BSplineVolume, problem: BoundaryValueProblem, axis: int, side: int) -> float:
-    """Return b of du/dn = -b u on a face, n a parameter: infinite where u is given, 0 where its flux is.
+    """Return b of du/dn = -b u on a face, n a parameter: infinite where u is given, 0 where its flux is given.
 
-    With Robin's data it is an average of alpha over kappa, in the length of the parameter.
+    With Robin data b is an average of alpha over kappa, in the length of the parameter.
     """
     face = f"{AXES[axis]}{side}"
     if face in problem.dirichlet:
@@ -164,7 +166,7 @@ def _hold(volume: BSplineVolume, problem: BoundaryValueProblem, axis: int, side:
 
 @dataclass(frozen=True)
 class _Spans:
-    """Spans of a grid: the gradients of the three parameters, means over each span, their sizes and middle points."""
+    """Hold the spans of a grid: means of the gradients of the three parameters over each span, sizes and midpoints."""
 
     slopes: list[Array]  # (3, s_u, s_v, s_w) each
     sizes: list[Array]  # each of a shape that fits (s_u, s_v, s_w)
@@ -172,7 +174,10 @@ class _Spans:
 
     @classmethod
     def of(cls, inverse: Sequence[Array], x: Points, counts: Sequence[int], sizes: Sequence[Array]) -> "_Spans":
-        """Take the rows of J^-1 (3, ...) and points x (3, ...), `counts` of them a span, and the sizes of spans."""
+        """Return the spans from the rows of J^-1 (3, ...) and points x (3, ...).
+
+        counts: the number of points a span in each direction. sizes: the sizes of the spans in each direction.
+        """
         u, v, w = (slice(n // 2, None, n) for n in counts)
         rows = [np.asarray(row)[part] for row, part in zip(x.rows or (), (u, v, w), strict=True)]
         size_u, size_v, size_w = sizes
@@ -180,9 +185,9 @@ class _Spans:
         return cls(means, [size_u[:, None, None], size_v[:, None], size_w], Points.of(np.asarray(x)[:, u, v, w], rows))
 
     def factor(self, problem: BoundaryValueProblem, oscillates: Sequence[bool], lowest: Sequence[float]) -> Array:
-        """Return the factor of the law (s_u, s_v, s_w) for waves of one period a span in some directions.
+        """Return the factor of the law (s_u, s_v, s_w) for waves of one period a span in the oscillating directions.
 
-        lowest: the wave numbers in the others.
+        lowest: the wave numbers in the other directions.
         """
         waves = [
             slope * (2.0 * np.pi / size if is_short else low)
@@ -193,7 +198,7 @@ class _Spans:
 
 
 def _derivatives(bases: list[list[csr_array]], coefficients: Array, layer: slice) -> dict[Orders, Array]:
-    """Return all derivatives up to second order, each (c, q_u, q_v, q_w), of splines (c, n_u, n_v, n_w) on a layer."""
+    """Return all derivatives up to second order, (c, q_u, q_v, q_w) each, of splines (c, n_u, n_v, n_w) on a layer."""
     found = {}
     for i in range(3):
         along_u = apply_along(bases[0][i][layer], coefficients, 1)
@@ -213,7 +218,7 @@ def _inverse(tangents: Sequence[Array]) -> tuple[list[Array], Array]:
 
 
 def _jets(geometry: dict[Orders, Array], spline: dict[Orders, Array], inverse: Sequence[Array]) -> list[Jet]:
-    """Return value and derivatives in space of a spline's components, from those in the parameters and J^-1."""
+    """Return a spline's components as jets in space, from derivatives in the parameters and J^-1."""
     jets = []
     for component, value in enumerate(spline[0, 0, 0]):
         gradient = _dot(inverse, [spline[order][component] for order in FIRST])
@@ -227,8 +232,8 @@ def _jets(geometry: dict[Orders, Array], spline: dict[Orders, Array], inverse: S
 def _parts(residual: Array, counts: Sequence[int]) -> Iterator[tuple[tuple[bool, ...], Array]]:
     """Yield the parts of a residual (c, q_u, q_v, q_w) that are constant on a span in some directions only.
 
-    With each comes in which directions it oscillates, its mean there being zero. What is constant in all three is left
-    out: a Galerkin solution has hardly any of it.
+    Each part comes with the directions in which it oscillates with mean zero. The part that is constant in all three
+    directions is left out: it is almost zero for a Galerkin solution.
     """
     parts: dict[tuple[bool, ...], Array] = {(): _blocks(residual, counts)}
     for axis in INSIDE:
@@ -241,18 +246,18 @@ def _parts(residual: Array, counts: Sequence[int]) -> Iterator[tuple[tuple[bool,
 
 
 def _blocks(field: Array, counts: Sequence[int]) -> Array:
-    """Return (.., s_u, n_u, s_v, n_v, s_w, n_w), spans and their points, of a field (.., q_u, q_v, q_w)."""
+    """Return a field (.., q_u, q_v, q_w) as (.., s_u, n_u, s_v, n_v, s_w, n_w), by spans and their points."""
     n_u, n_v, n_w = counts
     return field.reshape(*field.shape[:-3], -1, n_u, field.shape[-2] // n_v, n_v, field.shape[-1] // n_w, n_w)
 
 
 def _mean(blocks: Array, axis: int) -> Array:
-    """Return the mean over the Gauss points of an axis of blocks, which stays."""
+    """Return the mean over the Gauss points of one axis of blocks; the axis is kept with length 1."""
     return np.average(blocks, axis, np.polynomial.legendre.leggauss(blocks.shape[axis])[1], keepdims=True)
 
 
 def _span_means(field: Array, counts: Sequence[int]) -> Array:
-    """Return the means (.., s_u, s_v, s_w) over the points of each span."""
+    """Return the means (.., s_u, s_v, s_w) of a field over the points of each span."""
     blocks = _blocks(field, counts)
     for axis in INSIDE:
         blocks = _mean(blocks, axis)
@@ -260,7 +265,7 @@ def _span_means(field: Array, counts: Sequence[int]) -> Array:
 
 
 def _on_points(values: Array) -> Array:
-    """Return values (s_u, s_v, s_w) of spans in the shape of blocks."""
+    """Return values (s_u, s_v, s_w) of spans in the shape of blocks, with length 1 for the points."""
     return values[:, None, :, None, :, None]
 
 

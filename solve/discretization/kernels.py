@@ -1,10 +1,10 @@
-"""Compiled sum factorization, one plane of quadrature points (a fixed point of direction u) at a time.
+"""Evaluates and integrates by compiled sum factorization, one plane of quadrature points (with a fixed u) at a time.
 
-Arrays of a plane have shape (q_w, q_v): v runs fastest. A table holds one direction's basis, as `quadrature.Table`
-says; tables are those of u, v, w. The innermost loops run along rows of memory, and those over the functions at a point
-along the table's third part, a tuple: the compiler knows its length, and every degree has machine code of its own.
-The order of the six entries of a symmetric matrix is uu, uv, uw, vv, vw, ww.
-(Antolin, Buffa, Calabro, Martinelli, Sangalli, CMAME 2015.)
+Arrays of a plane have shape (q_w, q_v): v runs fastest. A table holds the basis of one direction (`quadrature.Table`);
+tables are those of u, v, w. The innermost loops run along rows of memory, and the loops over the functions at a point
+along the table's third part, a tuple: the compiler knows its length, and every degree has machine code of its own. The
+order of the six entries of a symmetric matrix is uu, uv, uw, vv, vw, ww. (Antolin, Buffa, Calabro, Martinelli,
+Sangalli, CMAME 2015.)
 """
 
 from collections.abc import Callable
@@ -22,10 +22,10 @@ Tables = tuple[Table, Table, Table]
 
 
 def compiled(function: Kernel) -> Kernel:
-    """Compile on first use, keep the machine code on disk, and let other threads run meanwhile.
+    """Compile a function on first use, keep the machine code on disk, and let other threads run during a call.
 
-    Arguments are arrays, numbers and plain tuples of these: a cache that names a class of ours could not be read any
-    more once the class moves.
+    Arguments must be arrays, numbers and plain tuples of these: a cache with the name of a class of this package would
+    be unreadable once the class moves.
     """
     options = {"cache": True, "nogil": True, "error_model": "numpy"}
     kernel: Kernel = njit(fastmath={"contract", "reassoc", "nsz"}, **options)(function)
@@ -34,9 +34,9 @@ def compiled(function: Kernel) -> Kernel:
 
 @compiled
 def contract(first: IntArray, basis: Array, functions: Functions, source: Array, result: Array) -> None:
-    """Write splines with coefficients (n, m) at the points of a direction: result (q, m).
+    """Write the values (q, m) of splines with coefficients (n, m) at the points of a direction to `result`.
 
-    basis: (q, degree + 1) values, or derivatives, of a table.
+    basis: (q, degree + 1), the values or derivatives of a table.
     """
     for q in range(result.shape[0]):
         at = first[q]
@@ -49,7 +49,7 @@ def contract(first: IntArray, basis: Array, functions: Functions, source: Array,
 
 @compiled
 def spread(first: IntArray, basis: Array, functions: Functions, source: Array, result: Array) -> None:
-    """Transpose of `contract`: adds source (q, m) to result (n, m)."""
+    """Apply the transpose of `contract`: add source (q, m) to result (n, m)."""
     for q in range(source.shape[0]):
         for j in range(len(functions)):
             at, value = first[q] + j, basis[q, j]
@@ -59,7 +59,7 @@ def spread(first: IntArray, basis: Array, functions: Functions, source: Array, r
 
 @compiled
 def evaluate_plane(coefficients: Array, point: int, tables: Tables, result: Array) -> None:
-    """Write a spline and its gradient on the plane of a point of u: result (4, q_w, q_v) = value, d/du, d/dv, d/dw."""
+    """Write a spline and its gradient on the plane of a point of u to result (4, q_w, q_v): value, d/du, d/dv, d/dw."""
     (first_u, u, functions_u), (first_v, v, functions_v), (first_w, w, functions_w) = tables
     _, n_v, n_w = coefficients.shape
     here, flat, planes = first_u[point : point + 1], coefficients.reshape(-1, n_v * n_w), np.empty((2, n_v, n_w))
@@ -76,9 +76,9 @@ def evaluate_plane(coefficients: Array, point: int, tables: Tables, result: Arra
 
 @compiled
 def spread_plane(field: Array, point: int, tables: Tables, has_value: bool, result: Array) -> None:
-    """Transpose of `evaluate_plane`: adds field (4, q_w, q_v), its first entry only if `has_value`.
+    """Apply the transpose of `evaluate_plane`: add field (4, q_w, q_v) to result (n_u, n_v, n_w).
 
-    result: (n_u, n_v, n_w).
+    The first entry of the field is added only if `has_value`.
     """
     (first_u, u, functions_u), (first_v, v, functions_v), (first_w, w, functions_w) = tables
     _, n_v, n_w = result.shape
@@ -98,9 +98,9 @@ def spread_plane(field: Array, point: int, tables: Tables, has_value: bool, resu
 
 @compiled
 def multiply_planes(coefficients: Array, points: IntArray, tables: Tables, factors: Array, result: Array) -> None:
-    """Add the part of some points of u to the product of a scalar operator with coefficients (n_u, n_v, n_w).
+    """Add the part of some points of u to the product of a scalar operator and coefficients (n_u, n_v, n_w).
 
-    factors: (q_u, 6 or 7, q_w, q_v), as `operator.Operator` keeps them. result: (n_u, n_v, n_w).
+    factors: (q_u, 6 or 7, q_w, q_v), as in `operator.Operator`. result: (n_u, n_v, n_w).
     """
     fields = np.empty((4, *factors.shape[2:]))
     rows = fields.reshape(4, -1)
@@ -121,10 +121,10 @@ def multiply_planes(coefficients: Array, points: IntArray, tables: Tables, facto
 
 @compiled
 def plane_rows(fields: Array, weights: Array, rows: Array, measure: Array) -> None:
-    """Geometry of a plane from fields (3, 4, q_w, q_v), a map's components as `evaluate_plane` gives them.
+    """Compute the geometry of a plane from fields (3, 4, q_w, q_v), a map's components from `evaluate_plane`.
 
-    Writes rows (3, 3, q_w, q_v), the rows of J^-1 times the root of w |det J|, the parametric direction first, and
-    measure (q_w, q_v) = w det J.
+    The function writes rows (3, 3, q_w, q_v), the rows of J^-1 times the root of w |det J|, the parametric direction
+    first, and measure (q_w, q_v) = w det J.
     """
     n_w, n_v = weights.shape
     for q in range(n_w):

@@ -1,4 +1,4 @@
-"""The forces of a law that is not linear, and their derivative, a matrix that is kept at the quadrature points."""
+"""Computes the forces of a law that is not linear, and their derivative, a matrix stored at the quadrature points."""
 
 from dataclasses import dataclass, replace
 
@@ -17,14 +17,14 @@ from .quadrature import geometry_planes
 
 @dataclass(frozen=True, eq=False)
 class Forces(MatrixFree):
-    """The integrals of flux : grad v + react . v of any law; `apply` gives them for coefficients, Robin's term too."""
+    """Compute the integrals of flux : grad v + react . v of any law, with Robin's term; `apply` takes coefficients."""
 
     volume: BSplineVolume
     form: Form
 
     @classmethod
     def of(cls, operator: Operator | FormOperator, volume: BSplineVolume, form: Form) -> "Forces":
-        """Return the forces of a law with the rule and the terms on faces of an operator."""
+        """Return the forces of a law with the quadrature rule and the terms on faces of an operator."""
         return cls(operator.space, operator.rule, operator.threads, volume, form, faces=operator.faces)
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
@@ -69,10 +69,10 @@ class Forces(MatrixFree):
 
 @dataclass(frozen=True, eq=False)
 class Tangent(MatrixFree):
-    """The derivative of forces.
+    """Apply the derivative of forces.
 
-    factors: (q_u, c, 4, c, 4, q_w, q_v), of u and its parametric derivatives; weights included.
-    has_reaction: whether the first of the four is used.
+    factors: (q_u, c, 4, c, 4, q_w, q_v), the derivatives with respect to u and its parametric derivatives, with
+    weights. has_reaction: whether the first of the four entries is used.
     """
 
     factors: Array
@@ -80,7 +80,7 @@ class Tangent(MatrixFree):
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether the matrix is its own transpose, on the plane in the middle."""
+        """Return whether the matrix is its own transpose, tested on the plane in the middle."""
         middle = self.factors[len(self.factors) // 2]
         return bool(np.abs(middle - middle.transpose(2, 3, 0, 1, 4, 5)).max() <= ROUNDING * np.abs(middle).max())
 
@@ -94,7 +94,7 @@ class Tangent(MatrixFree):
                 kernels.spread_plane(plane, q, self.tables, self.has_reaction, total)
 
     def block(self, component: int) -> Operator:
-        """Return the symmetric part of a component's diagonal block: of its own gradient and value."""
+        """Return the symmetric part of a component's diagonal block, for its own gradient and value."""
         own = self.factors[:, component, :, component]
         entries = [0.5 * (own[:, 1 + i, 1 + j] + own[:, 1 + j, 1 + i]) for i, j in PAIRS]
         entries += [np.maximum(own[:, 0, 0], 0.0)] if self.has_reaction else []

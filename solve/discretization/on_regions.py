@@ -1,4 +1,4 @@
-"""The terms of a problem's conditions on regions at the points of a face, for `weak.WeakFace`."""
+"""Evaluates a problem's conditions on regions at the points of a face, for `weak.WeakFace`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WHOLE = 0.999  # share of a face's parameters that a region must cover to count 
 
 
 def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace) -> list[WeakFace]:
-    """Return the terms of a problem's conditions on regions, a face each; none where they act on no part of it.
+    """Return the terms of a problem's conditions on regions, one entry a face on which conditions act.
 
     Raises ValueError where a region has no area, and where conditions contradict each other.
     """
@@ -62,7 +62,7 @@ def demand_area(volume: BSplineVolume, problem: BoundaryValueProblem, space: Tri
 def demand_supports(problem: BoundaryValueProblem, space: TrialSpace, faces: list[WeakFace], size: float) -> None:
     """Raise ValueError where the supports leave a motion free that the law does not resist (`Form.free_motions`).
 
-    size: of the body.
+    size: the size of the body, a length.
     """
     holding = [face.weights * (np.einsum("ccm->m", face.projector) + (face.factor > 0.0)) for face in faces]
     area = space.total(sum(float(weights.sum()) for weights in holding))
@@ -109,7 +109,7 @@ class _Builder:
     rule: SurfaceRule
 
     def face(self) -> WeakFace:
-        """Return the terms."""
+        """Return the terms of the face."""
         form, at, weights = self.problem.form, self.rule.at, self.rule.weights
         x, normal = Points.at(np.ascontiguousarray(at.x), at.parameters), at.normal
         projector, given = self._held(x, normal)
@@ -143,7 +143,7 @@ class _Builder:
         return self.rule.codes >> (condition + 1) & 1 == 1
 
     def _held(self, x: Points, normal: Array) -> tuple[Array, Array]:
-        """Return the projector P (c, c, m) on the directions along which u is given, and P g (c, m)."""
+        """Return the projector P (c, c, m) onto the directions along which u is given, and P g (c, m)."""
         c, m = self.problem.form.components, len(self.rule.weights)
         projector, given = np.zeros((c, c, m)), np.zeros((c, m))
         for i, condition in enumerate(self.problem.conditions):
@@ -173,7 +173,7 @@ class _Builder:
         )
 
     def _is_area(self, points: Any, region: Any) -> bool:
-        """Return whether some points are more of a region than the rim along which two regions touch."""
+        """Return whether some points form more of a region than the rim along which two regions touch."""
         return bool(self.rule.weights[points].sum() > RIM * self.rule.weights[region].sum())
 
     def _place(self, point: int) -> str:
@@ -225,8 +225,8 @@ class _Builder:
         """Return Nitsche's parameter (m,) at points with normals (3, m), and the law's factor over the cube's depth.
 
         On the span behind a face |t(u)|^2 integrates to at most (p + 1)^2 / thickness times the energy, times the
-        largest eigenvalue of the law's matrix n . C . n (a polynomial of degree p on [0, 1] has
-        f(0)^2 <= (p + 1)^2 int f^2), times a factor for the map's change across the span.
+        largest eigenvalue of the law's matrix n . C . n (a polynomial of degree p on [0, 1] has f(0)^2 <= (p + 1)^2 int
+        f^2), times a factor for the map's change across the span.
         """
         at, (axis, side) = self.rule.at, divmod(FACE_NAMES.index(self.name), 2)
         strength = np.linalg.eigvalsh(self.problem.form.matrix_along(normal, x))[..., -1]
@@ -259,7 +259,7 @@ class _Builder:
         return count
 
     def _tables(self, axis: int, side: int) -> tuple[tuple[csr_array, csr_array, csr_array], float]:
-        """Return the tables of the face's functions, and the slope across it."""
+        """Return the tables of the face's functions, and the slope of the functions across the face."""
         knots, degrees = self.space.knots, self.space.degrees
         along = [a for a in range(3) if a != axis]
         found = [basis_derivatives(knots[a], degrees[a], self.rule.at.parameters[:, a], derivatives=1) for a in along]

@@ -1,7 +1,7 @@
-"""The operators of laws, matrix-free by sum factorization, and the one pass that assembles them and their load.
+"""Defines the operators of laws, matrix-free by sum factorization, and assembles an operator with its load in one pass.
 
-Of a scalar symmetric law G = det J J^-1 kappa J^-T is kept, six numbers a quadrature point. Any other law is called on
-planes of points: gradients are pulled back, the law turns them into fluxes, and these are pushed forward.
+For a scalar symmetric law, G = det J J^-1 kappa J^-T is stored, six numbers a quadrature point. Any other law is called
+on planes of points: gradients are pulled back, the law turns them into fluxes, and the fluxes are pushed forward.
 """
 
 import math
@@ -27,10 +27,10 @@ from .space import TrialSpace
 
 
 class FaceTerm(Protocol):
-    """Terms of a matrix that are integrals over the image of a face."""
+    """Define terms of a matrix that are integrals over the image of a face."""
 
     def add_product(self, coefficients: Array, result: Array) -> None:
-        """Add the product with coefficients (c, n_u, n_v, n_w) to a result, shaped alike."""
+        """Add the product of the terms and coefficients (c, n_u, n_v, n_w) to a result of the same shape."""
 
     def add_diagonal(self, component: int, diagonal: Array) -> None:
         """Add the diagonal of a component's block to an array (n_u, n_v, n_w)."""
@@ -39,7 +39,7 @@ class FaceTerm(Protocol):
         """Add the integral of the factor of u . v with each function to an array (n_u, n_v, n_w)."""
 
     def stiffness(self, component: int) -> float:
-        """Return the integral of the factor of u . v, of one component: its mean over the face's parameters."""
+        """Return the integral of the factor of u . v for one component, the mean over the face's parameters."""
 
 
 SHARES = 4  # of the pieces of one colour a thread: some wait less where others take longer
@@ -47,11 +47,12 @@ LAYERS = 4  # of elements in a piece of work, where the degree allows so few
 
 
 def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
-    """Return consecutive points in pieces, every other piece in the first list, the rest in the second.
+    """Return consecutive points in pieces, as two lists that take the pieces by turns.
 
-    first: (q,) number of the first function that is not zero at each point. A piece covers at least as many layers of
-    elements as the degree, so that no two of one list share a basis function: they may add to the same array at the
-    same time, and each sum has one order. Pieces of one list are joined to some shares a thread, to one for a single.
+    first: (q,), the number of the first function that is not zero at each point. A piece covers at least as many layers
+    of elements as the degree, so that no two pieces of one list share a basis function: these pieces may be added to
+    the same array at the same time, and each sum has one order. The pieces of one list are joined to a few shares a
+    thread, or to one share for a single thread.
     """
     layers = np.unique(first, return_inverse=True)[1]
     pieces = np.split(np.arange(len(first)), np.flatnonzero(np.diff(layers // max(degree, LAYERS))) + 1)
@@ -62,10 +63,10 @@ def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
 
 @dataclass(frozen=True, eq=False)
 class MatrixFree:
-    """A matrix that is never assembled. Coefficients are (c, n_u, n_v, n_w), for one component also (n_u, n_v, n_w).
+    """Apply a matrix that is never assembled to coefficients (c, n_u, n_v, n_w), or (n_u, n_v, n_w) for one component.
 
-    threads: of a product. folded: number of points of all processes where det J has the wrong sign.
-    faces: the terms on the faces of the cube that have some, as far as this process integrates.
+    threads: the number of threads of a product. folded: the number of points of all processes where det J has the wrong
+    sign. faces: the terms on the faces of the cube over which this process integrates.
     """
 
     space: TrialSpace
@@ -76,16 +77,19 @@ class MatrixFree:
 
     @cached_property
     def tables(self) -> kernels.Tables:
-        """The trial basis at the points of the rule."""
+        """Return the tables of the trial basis at the points of the quadrature rule."""
         return self.rule.tabulate(self.space.degrees, self.space.knots)
 
     def on_planes(self, task: Callable[[IntArray], None]) -> None:
-        """Run a task on all points of u, in pieces: it may add to coefficients that belong to those it is given."""
+        """Run a task on all points of u, in pieces.
+
+        A task may add to the coefficients of the functions that are not zero at its points.
+        """
         for pieces in colours(self.tables[0][0], self.space.degrees[0], self.threads):
             in_parallel(task, pieces, self.threads)
 
     def apply(self, coefficients: Array) -> Array:
-        """Return the product with coefficients, those that are not free included; of a slab, the integrals over it."""
+        """Return the product with all coefficients, fixed ones included; for a slab, the integrals over its spans."""
         source = np.ascontiguousarray(coefficients).reshape(math.prod(coefficients.shape[:-3]), *self.space.shape)
         result = np.zeros_like(source)
         self.on_planes(lambda points: self._multiply(points, source, result))
@@ -109,10 +113,10 @@ class MatrixFree:
 
 @dataclass(frozen=True, eq=False)
 class Operator(MatrixFree):
-    """The positive semidefinite matrix of a scalar symmetric law, for each component the same.
+    """Apply the positive semidefinite matrix of a scalar symmetric law, the same for each component.
 
-    factors: (q_u, 6 or 7, q_w, q_v), the six of G and c |det J| where there is a reaction; weights included.
-    component: of the law whose block it is.
+    factors: (q_u, 6 or 7, q_w, q_v), the six entries of G, and c |det J| where there is a reaction; with weights.
+    component: the component of the law whose block this is.
     """
 
     factors: Array
@@ -123,9 +127,9 @@ class Operator(MatrixFree):
             kernels.multiply_planes(component, points, self.tables, self.factors, total)
 
     def diagonal(self) -> Array:
-        """Return the diagonal of the matrix, shape `space.shape`: squared basis functions in place of the basis.
+        """Return the diagonal of the matrix, in the shape `space.shape`: squared basis functions replace the basis.
 
-        Of a slab it is that of the integrals over it.
+        For a slab it is the diagonal of the integrals over its spans.
         """
         result = np.zeros(self.space.shape)
         products = [  # per direction, (3, q, degree + 1): values of B B, B B' and B' B' at index sum of derivatives
@@ -153,10 +157,10 @@ class Operator(MatrixFree):
 
 @dataclass(frozen=True, eq=False)
 class FormOperator(MatrixFree):
-    """The matrix of any law's form.
+    """Apply the matrix of any law's form.
 
-    rows: (q_u, 3, 3, q_w, q_v), R of `geometry_planes`, kept for a constant law; else it follows from the map in every
-    product.
+    rows: (q_u, 3, 3, q_w, q_v), R of `geometry_planes`, stored for a constant law; for other laws R is computed from
+    the map in every product.
     """
 
     volume: BSplineVolume
@@ -185,7 +189,7 @@ class FormOperator(MatrixFree):
                 kernels.spread_plane(plane, q, self.tables, form.has_reaction, total)
 
     def block(self, component: int) -> Operator:
-        """Return the symmetric part of a component's diagonal block: the law of its own gradient and value."""
+        """Return the symmetric part of a component's diagonal block, for its own gradient and value."""
         law, rule = (self.volume, self.space, self.form), self.rule
         block, _ = assemble(*law, rule=rule, component=component, threads=self.threads)
         assert isinstance(block, Operator)
@@ -204,13 +208,14 @@ def assemble(
 ) -> tuple[Operator | FormOperator, Array]:
     """Return operator and load (c, n_u, n_v, n_w) of a law on a volume; a slab has its part of the load.
 
-    source: takes the points (3, q_w, q_v) of a plane and returns (c, q_w, q_v); None for zero.
-    component: of the symmetric part that is assembled, without coupling of u and its gradient; None for the whole law.
-    threads: of this pass and of the operator; the functions must then be safe to call from several at a time.
+    source: a function of the points (3, q_w, q_v) of a plane that returns (c, q_w, q_v); None for zero. component: the
+    component whose symmetric part is assembled, without coupling of u and its gradient; None for the whole law.
+    threads: the number of threads of the assembly and of the operator; the functions must then be safe for calls from
+    several threads.
 
-    |det J| takes the place of det J: right for a left-handed volume, and where a map is folded the form stays positive,
-    an answer to show if not to trust. The geometry is the volume's own, evaluated exactly whatever the trial space.
-    Raises ValueError where det J is zero at a point, naming it.
+    |det J| takes the place of det J. This is right for a left-handed volume; on a folded map the form stays positive,
+    and the solution can be shown but not trusted. The geometry is the volume's own, evaluated exactly in every trial
+    space. Raises a ValueError that names a point where det J is zero.
     """
     rule = rule or operator_rule(space, "spline")
     parts = space, rule, threads
@@ -250,7 +255,7 @@ def assemble(
 def with_mass(
     volume: BSplineVolume, operator: Operator | FormOperator, form: Form, factor: float
 ) -> Operator | FormOperator:
-    """Return the operator of a law on a volume plus `factor` times the mass matrix, its terms on faces included."""
+    """Return the operator of a law on a volume plus `factor` times the mass matrix, with the terms on faces."""
     law = WithMass(form, factor)
     if isinstance(operator, FormOperator):
         return replace(operator, form=law, rows=None)
@@ -262,9 +267,9 @@ def with_mass(
 def add_integrals(
     tables: Collection[kernels.Table], q: int, field: Array, result: Array, kinds: tuple[int, ...] = (0, 0, 0)
 ) -> None:
-    """Add the integrals of a field (q_w, q_v) of a plane, weights included, times each function to (n_u, n_v, n_w).
+    """Add the integrals of a field (q_w, q_v) of a plane, with weights, times each function to (n_u, n_v, n_w).
 
-    kinds: which of the tables' values, a direction each.
+    kinds: for each direction, 0 for the values in its table and 1 for the derivatives.
     """
     (first, u, _), (first_v, v, functions_v), (first_w, w, functions_w) = tables
     _, n_v, n_w = result.shape
@@ -275,7 +280,7 @@ def add_integrals(
 
 
 def _count_negative(measure: Array, rule: GaussRule, q: int) -> int:
-    """Count the points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J."""
+    """Return the number of points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J."""
     if measure.min() > 0.0:
         return 0
     flat = np.argwhere(measure == 0.0)

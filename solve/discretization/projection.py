@@ -1,4 +1,4 @@
-"""A function as a spline of the trial space: its L2 projection in the parameters, a direction after the other."""
+"""Projects a function onto the trial space in L2, in the parameters, one direction after the other."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ from .space import TrialSpace
 
 
 def projected(volume: BSplineVolume, space: TrialSpace, values: Callable[[Points], Array]) -> Array:
-    """Return coefficients (c, n_u, n_v, n_w) of a function that takes points (3, ...) and returns (c, ...)."""
+    """Return coefficients (c, n_u, n_v, n_w) of a function of points (3, ...) that returns (c, ...)."""
     rows = [spline_rule(knots, degree, 2 * degree) for knots, degree in zip(space.knots, space.degrees, strict=True)]
     found = np.asarray(values(Points.on(volume, *(points for points, _ in rows))), dtype=np.float64)
     for axis, (points, weights) in enumerate(rows):

@@ -1,4 +1,4 @@
-"""Quadrature: tensor-product rules, Gauss' on every span or those of a spline space, and the geometry at their points.
+"""Computes quadrature rules, Gauss' on every span or those of a spline space, and the geometry at their points.
 
 The Gauss rules of a spline space integrate its functions exactly with half as many points as it has dimensions.
 (Bressan, Calo, Hughes; Hiemstra, Calabro, Schillinger, Hughes, CMAME 316 (2017); Johannessen, CMAME 316 (2017).)
@@ -35,19 +35,19 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class GaussRule:
-    """Tensor-product rule: `points[a]` and `weights[a]`, each (q_a,), in the parametric directions."""
+    """Hold a tensor-product rule: `points[a]` and `weights[a]`, each (q_a,), in the parametric directions."""
 
     points: tuple[Array, Array, Array]
     weights: tuple[Array, Array, Array]
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of points per direction."""
+        """Return the number of points per direction."""
         return tuple(len(points) for points in self.points)
 
     @property
     def plane_shape(self) -> tuple[int, int]:
-        """Shape (q_w, q_v) of the plane of points that belongs to one point of the first direction.
+        """Return the shape (q_w, q_v) of the plane of points for one point of the first direction.
 
         Direction v runs fastest: the kernels contract w over rows of v.
         """
@@ -59,7 +59,7 @@ class GaussRule:
         return w_u[q] * (w_w[:, None] * w_v)
 
     def strips(self, most: int) -> list["GaussRule"]:
-        """Return rules of consecutive points of w that make up this one, with at most `most` points in a plane."""
+        """Return rules of consecutive points of w, at most `most` points a plane, which together are this rule."""
         (u, v, w), (weights_u, weights_v, weights_w) = self.points, self.weights
         step = max(1, most // len(v))
         parts = [slice(start, start + step) for start in range(0, len(w), step)]
@@ -68,8 +68,8 @@ class GaussRule:
     def tabulate(self, degrees: tuple[int, int, int], knots: Knots) -> kernels.Tables:
         """Return tables of any spline basis (the trial space's or the map's) at the points of this rule.
 
-        A direction's table is the index (q,) of the first function that is nonzero at each point, the values and first
-        derivatives (2, q, degree + 1) of the nonzero ones, and a tuple of degree + 1 zeros.
+        The table of a direction is the number (q,) of the first function that is not zero at each point, the values and
+        first derivatives (2, q, degree + 1) of the functions that are not zero, and a tuple of degree + 1 zeros.
         """
         u, v, w = (
             (*basis_derivatives(row, degree, points, derivatives=1), (0,) * (degree + 1))
@@ -85,11 +85,10 @@ def gauss_rule(space: TrialSpace, counts: Sequence[int] | None = None) -> GaussR
 
 
 def operator_rule(space: TrialSpace, quadrature: str, rough: bool = True) -> GaussRule:
-    """Return the rule of the operator.
+    """Return the quadrature rule of the operator.
 
-    quadrature: as in `solve_problem`. rough: whether the factors vary much from span to span (`is_rough`), which takes
-        more points.
-    Raises ValueError for any other quadrature.
+    quadrature: a name as in `solve_problem`. rough: whether the factors vary much from span to span (`is_rough`), which
+    needs more points. Raises ValueError for any other quadrature.
     """
     if quadrature not in QUADRATURES:
         raise ValueError(f"quadrature must be one of {', '.join(QUADRATURES)}, got {quadrature!r}")
@@ -102,15 +101,19 @@ def operator_rule(space: TrialSpace, quadrature: str, rough: bool = True) -> Gau
 
 
 def rule_of(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array], quadrature: str) -> GaussRule:
-    """Return the rule of a law's operator on a volume; tensor as in `is_rough`, quadrature as in `operator_rule`."""
+    """Return the quadrature rule of a law's operator on a volume.
+
+    tensor: the law's tensor, as in `is_rough`. quadrature: a name, as in `operator_rule`.
+    """
     return operator_rule(space, quadrature, quadrature == "spline" and is_rough(volume, space.whole, tensor))
 
 
 def _fewest_points(knots: Array, degree: int, gauss: int, rough: bool) -> tuple[Array, Array]:
     """Return points and weights of a direction: L2 errors stay within 0.5 % of those of degree + 1 Gauss points a span.
 
-    Measured on the twisted cube and, rough, on trained maps: degrees 4 and 5 would lose 1 to 3 % there with 2 p, and
-    degree 2 on smooth ones as much with 2 p - 1, but nothing with as many Gauss points on every span (`gauss`).
+    The numbers were measured on the twisted cube and, for rough factors, on trained maps: degrees 4 and 5 would lose 1
+    to 3 % there with 2 p, and degree 2 on smooth maps as much with 2 p - 1, but nothing with as many Gauss points on
+    every span (`gauss`).
     """
     if rough:
         return spline_rule(knots, degree, 2 * degree + int(degree > 3))
@@ -118,26 +121,26 @@ def _fewest_points(knots: Array, degree: int, gauss: int, rough: bool) -> tuple[
 
 
 def _tensor_rule(space: TrialSpace, rows: Iterable[tuple[Array, Array]]) -> GaussRule:
-    """Return the rule of three rows of points and weights, in u those on this process's spans."""
+    """Return the rule of three rows of points and weights; in u it has the points on this process's spans."""
     (u, v, w), (weights_u, weights_v, weights_w) = zip(*rows, strict=True)
     here = slice(*np.searchsorted(u, space.breaks[0][[0, -1]]))
     return GaussRule((u[here], v, w), (weights_u[here], weights_v, weights_w))
 
 
 def gauss_on_spans(knots: Array, count: int) -> tuple[Array, Array]:
-    """Return points and weights, each (m,), of Gauss' rule with `count` points on every span, in order."""
+    """Return points and weights, (m,) each, of Gauss' rule with `count` points on every span, in ascending order."""
     points, weights = gauss_points(knots, count)
     return points.ravel(), weights.ravel()
 
 
 def spline_rule(knots: Array, degree: int, exact: int) -> tuple[Array, Array]:
-    """Return points and positive weights, each (m,), of the Gauss rule that belongs to a trial space of one direction.
+    """Return points and positive weights, (m,) each, of the Gauss rule that belongs to a trial space of one direction.
 
-    knots: open knot vector of splines of degree `degree`. The rule is exact for splines of degree `exact` that are at
-    every inner knot one derivative less smooth; 2 m is their number, or a few more. Points lie in order.
-    Where splines on `knots` are only continuous somewhere, it is Gauss' rule on every span, `degree` + 1 points: fewer
-    would miss some of their derivatives. Where Newton's method does not find the rule, a line of the log says so, and
-    Gauss' rule on every span, exact for the same degree, takes its place.
+    knots: the open knot vector of splines of degree `degree`. The rule is exact for splines of degree `exact` that are
+    at every inner knot one derivative less smooth; the number of these splines is 2 m or a few less. Points lie in
+    ascending order. Where splines on `knots` are only continuous somewhere, the rule is Gauss' rule on every span with
+    `degree` + 1 points, because fewer points would miss some of their derivatives. Where Newton's method does not find
+    the rule, the log says so, and Gauss' rule on every span, exact for the same degree, takes its place.
     """
     return _cached_rule(tuple(knots.tolist()), degree, exact)
 
@@ -156,11 +159,11 @@ def _cached_rule(knots: tuple[float, ...], degree: int, exact: int) -> tuple[Arr
 
 
 def _newton(knots: Array, degree: int, spare: int) -> tuple[Array, Array] | None:
-    """Return points and weights that integrate every B-spline of a knot vector, None where the iteration fails.
+    """Return points and weights that integrate every B-spline of a knot vector; None where the iteration fails.
 
-    Where the dimension is odd, or points are to spare, there are more unknowns than equations, and every step is the
-    least that serves. Of an odd dimension the number of points is even: none lies at a breakpoint in the middle, where
-    slopes may jump.
+    Where the dimension is odd, or there are spare points, there are more unknowns than equations, and every step is the
+    least solution. For an odd dimension the number of points is even: no point lies at a breakpoint in the middle,
+    where slopes may jump.
     """
     integrals = (knots[degree + 1 :] - knots[: -degree - 1]) / (degree + 1)
     points, weights = _first_guess(knots, degree, integrals, spare)
@@ -186,7 +189,7 @@ def _newton(knots: Array, degree: int, spare: int) -> tuple[Array, Array] | None
 
 
 def _first_guess(knots: Array, degree: int, integrals: Array, spare: int) -> tuple[Array, Array]:
-    """Return averaged Greville points, and as weights the integrals of the B-splines next to them."""
+    """Return averaged Greville points, with the integrals of the B-splines next to them as weights."""
     n = len(integrals)
     m = (n // 2 if n % 2 == 0 else 2 * -(-n // 4)) + spare
     points = np.interp((np.arange(m) + 0.5) * n / m - 0.5, np.arange(n), greville(knots, degree))
@@ -199,8 +202,8 @@ def map_planes(
 ) -> Iterator[tuple[int, Array, Points]]:
     """Yield for every point q of direction u: q, the map on its plane, and its points in space, (3, q_w, q_v).
 
-    The map is (3, 4, q_w, q_v): components x value and gradient. points: the q wanted, default all. The arrays are
-    reused from one step to the next.
+    The map is (3, 4, q_w, q_v): value and gradient of its components. points: the numbers q, all by default. The arrays
+    are reused from one step to the next.
     """
     (first, basis, functions), table_v, table_w = rule.tabulate(volume.degrees, volume.knots)
     tables = (np.zeros_like(first), basis, functions), table_v, table_w
@@ -222,7 +225,7 @@ def geometry_planes(
 ) -> Iterator[tuple[int, Array, Array, Points]]:
     """Yield as `map_planes` does: q, rows R (3, 3, q_w, q_v), w det J (q_w, q_v), and the points in space.
 
-    R is J^-1 times the root of w |det J|: docs/solver.md says how gradients and fluxes go through it.
+    R is J^-1 times the root of w |det J|; docs/solver.md explains how gradients and fluxes are multiplied by it.
     """
     rows, measure = np.empty((3, 3, *rule.plane_shape)), np.empty(rule.plane_shape)
     for q, fields, x in map_planes(volume, rule, points):
@@ -233,9 +236,9 @@ def geometry_planes(
 def is_rough(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array]) -> bool:
     """Return whether G = det J J^-1 kappa J^-T varies much from span to span of a trial space.
 
-    Measured are second differences of G between the middles of three neighbouring spans, relative to G, at SAMPLES^3
-    places. G is rough where their root mean square exceeds LIMIT in a direction, and on fewer than three spans.
-    tensor: takes points (3, ...) and returns the six entries of kappa (6, ...).
+    The measure is the second difference of G between the midpoints of three neighbouring spans, relative to G, at
+    SAMPLES^3 places. G is rough where the root mean square of these exceeds LIMIT in a direction, and on fewer than
+    three spans. tensor: a function of points (3, ...) that returns the six entries of kappa (6, ...).
     """
     u, v, w = (_stencils(knots) for knots in space.knots)
     rule = GaussRule((u, v, w), (np.ones_like(u), np.ones_like(v), np.ones_like(w)))
@@ -247,7 +250,7 @@ def is_rough(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points]
 
 
 def _stencils(knots: Array) -> Array:
-    """Return the middles of SAMPLES times three neighbouring spans, of all spans where there are fewer than three."""
+    """Return the midpoints of SAMPLES times three neighbouring spans; of all spans where these are fewer than three."""
     middles = midpoints(knots)
     if len(middles) < 3:
         return middles

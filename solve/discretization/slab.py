@@ -1,8 +1,8 @@
-"""Slab: the part of a trial space that a process of an MPI job has, and its messages to the other processes.
+"""Defines Slab: the part of a trial space on one process of an MPI job, and its messages to the other processes.
 
 The processes share the space in consecutive spans of u (docs/mpi.md). A process integrates over its spans with the
 kernels of one process. Each function of u, a row, has an owner among the processes on whose spans it is not zero; the
-others have copies, up to `degree` rows after their own.
+others have copies, up to `degree` rows after their own rows.
 """
 
 import logging
@@ -29,7 +29,7 @@ Message = tuple[int, Array]  # another process, and the array that is sent to it
 
 @contextmanager
 def agreed(comm: Any) -> Iterator[None]:
-    """Raise an error of the block on one process on all of them; the block must not wait for other processes."""
+    """Raise an error of the block on one process on all processes; the block must not wait for other processes."""
     fault = None
     try:
         yield
@@ -41,7 +41,7 @@ def agreed(comm: Any) -> Iterator[None]:
 
 
 class Messenger:
-    """Passes arrays between the processes of a communicator of mpi4py.
+    """Pass arrays between the processes of a communicator of mpi4py.
 
     sent: the number of bytes that this process has sent so far, by purpose.
     """
@@ -51,7 +51,7 @@ class Messenger:
         self.sent: Counter[str] = Counter()
 
     def exchange(self, sent: Sequence[Message], received: Sequence[Message]) -> None:
-        """Send arrays to other processes, and fill arrays by theirs."""
+        """Send arrays to other processes, and fill arrays with the messages of other processes."""
         requests = [self.comm.Irecv(part, rank) for rank, part in received]
         requests += [self.comm.Isend(part, rank) for rank, part in sent]
         self.sent["halo"] += sum(part.nbytes for _, part in sent)
@@ -59,16 +59,17 @@ class Messenger:
             request.Wait()
 
     def transpose(self, sent: Array, sizes: Any, received: Array, counts: Any, kept: int) -> None:
-        """Send a part of an array to each process; kept: the number of entries that stay here."""
+        """Send a part of an array to each process; kept: the number of entries that stay on this process."""
         self.comm.Alltoallv((sent, sizes), (received, counts))
         self.sent["transposition"] += 8 * (sent.size - kept)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Slab(TrialSpace):
-    """The part of a trial space that this process has: some rows of u, all of v and w.
+    """Hold the part of a trial space on this process: some rows of u, and all rows of v and w.
 
-    Its knots of u are those of its rows, which are not open. parent: the space that all processes share.
+    The knots of u belong to the slab's rows, and are not an open knot vector. parent: the space that all processes
+    share.
     """
 
     parent: TrialSpace
@@ -86,87 +87,87 @@ class Slab(TrialSpace):
 
     @property
     def whole(self) -> TrialSpace:
-        """The space that all processes share."""
+        """Return the space that all processes share."""
         return self.parent
 
     @property
     def comm(self) -> Any:
-        """The communicator."""
+        """Return the communicator."""
         return self.messenger.comm
 
     @property
     def rank(self) -> int:
-        """Number of this process, 0 for the first."""
+        """Return the number of this process, 0 for the first."""
         return int(self.comm.rank)
 
     @cached_property
     def spans(self) -> IntArray:
-        """The first span of u of each process, and the number of spans: (size + 1,); a process may have no span."""
+        """Return the first span of u of each process, and the number of spans: (size + 1,); it may have no span."""
         return (len(breakpoints(self.parent.knots[0])) - 1) * np.arange(self.comm.size + 1) // self.comm.size
 
     @property
     def breaks(self) -> tuple[Array, Array, Array]:
-        """The ends of the spans that this process integrates over, a direction each."""
+        """Return the ends of the spans over which this process integrates, one array a direction."""
         u, v, w = map(breakpoints, self.parent.knots)
         return u[self.spans[self.rank] : self.spans[self.rank + 1] + 1], v, w
 
     @cached_property
     def firsts(self) -> IntArray:
-        """The first function on each span of u of the whole space, and the number of all functions."""
+        """Return the first function on each span of u of the whole space, and the number of all functions."""
         knots, degree = self.parent.knots[0], self.degrees[0]
         return np.append(find_spans(knots, degree, breakpoints(knots)[:-1]) - degree, self.parent.shape[0])
 
     @cached_property
     def owned(self) -> list[slice]:
-        """The rows that each process owns."""
+        """Return the rows that each process owns."""
         return [slice(int(a), int(b)) for a, b in pairwise(self.firsts[self.spans])]
 
     @cached_property
     def kept(self) -> list[slice]:
-        """The rows that each process has, its own first."""
+        """Return the rows that each process has, its own rows first."""
         degree = self.degrees[0]
         ends = [self.firsts[b - 1] + degree + 1 if a < b else self.firsts[a] for a, b in pairwise(self.spans)]
         return [slice(own.start, int(end)) for own, end in zip(self.owned, ends, strict=True)]
 
     @property
     def rows(self) -> slice:
-        """The rows of the whole space that this process has."""
+        """Return the rows of the whole space that this process has."""
         return self.kept[self.rank]
 
     @property
     def own(self) -> slice:
-        """The rows of this process's arrays that it owns; each row has one owner."""
+        """Return the rows of this process's arrays that it owns; each row has one owner."""
         owned = self.owned[self.rank]
         return slice(0, owned.stop - owned.start)
 
     @property
     def window(self) -> Window:
-        """The free coefficients that this process owns, in its arrays."""
+        """Return the free coefficients that this process owns, as indices of its arrays."""
         u, v, w = self.free
         return _common(self.owned[self.rank], u, self.rows.start), v, w
 
     @cached_property
     def starts(self) -> IntArray:
-        """The first own row of each process among all free rows, and the number of free rows: (size + 1,)."""
+        """Return the first own row of each process among all free rows, and the number of free rows: (size + 1,)."""
         return np.cumsum([0] + [len(_rows(_common(own, self.free[0]))) for own in self.owned])
 
     @cached_property
     def column_starts(self) -> IntArray:
-        """The first column of each process among the free functions of v, and the number of these: (size + 1,)."""
+        """Return the first column of each process among the free functions of v, and their number: (size + 1,)."""
         return len(_rows(self.free[1])) * np.arange(self.comm.size + 1) // self.comm.size
 
     @property
     def place(self) -> slice:
-        """The own rows of this process among all free rows."""
+        """Return the own rows of this process among all free rows."""
         return slice(*self.starts[self.rank : self.rank + 2])
 
     @property
     def columns(self) -> slice:
-        """The free functions of v that this process has after `to_columns`."""
+        """Return the free functions of v that this process has after `to_columns`."""
         return slice(*self.column_starts[self.rank : self.rank + 2])
 
     def agreed(self) -> AbstractContextManager[None]:
-        """Return a context that raises an error of one process on all of them."""
+        """Return a context that raises an error of one process on all processes."""
         return agreed(self.comm)
 
     def shared(self, value: Any) -> list[Any]:
@@ -179,14 +180,14 @@ class Slab(TrialSpace):
         return sum(self.shared(self.messenger.sent), Counter())
 
     def fill(self, coefficients: Array) -> None:
-        """Overwrite copies (.., n_u, n_v, n_w) by the values of their owners."""
+        """Overwrite the copies of rows (.., n_u, n_v, n_w) by the values of their owners."""
         own, copies = self._halo
         for part in coefficients.reshape(math.prod(coefficients.shape[:-3]), *self.shape):
             sent, received = [(rank, part[rows]) for rank, rows in own], [(rank, part[rows]) for rank, rows in copies]
             self.messenger.exchange(sent, received)
 
     def add(self, integrals: Array) -> None:
-        """Add the parts of own rows (.., n_u, n_v, n_w) that other processes have integrated."""
+        """Add to own rows (.., n_u, n_v, n_w) the parts that other processes have integrated."""
         own, copies = self._halo
         for part in integrals.reshape(math.prod(integrals.shape[:-3]), *self.shape):
             found = [(rank, np.empty_like(part[rows])) for rank, rows in own]
@@ -212,7 +213,7 @@ class Slab(TrialSpace):
         return whole
 
     def to_columns(self, x: Any) -> Any:
-        """Return (m_u, columns, m_w), of all free rows, from own free rows (rows, m_v, m_w)."""
+        """Return all free rows of this process's columns, (m_u, columns, m_w), from own free rows (rows, m_v, m_w)."""
         columns = self.column_starts[1:-1]
         parts = np.split(x, columns, axis=1)
         result = np.empty((self.starts[-1], parts[self.rank].shape[1], x.shape[2]))
@@ -222,7 +223,7 @@ class Slab(TrialSpace):
         return result
 
     def to_rows(self, x: Any) -> Any:
-        """Invert `to_columns`."""
+        """Return own free rows (rows, m_v, m_w) from columns: the inverse of `to_columns`."""
         height, widths = int(np.diff(self.starts)[self.rank]), np.diff(self.column_starts)
         result, counts = np.empty(height * int(widths.sum()) * x.shape[2]), height * widths * x.shape[2]
         self.messenger.transpose(x, np.diff(self.starts) * x[0].size, result, counts, height * x[0].size)
@@ -230,21 +231,24 @@ class Slab(TrialSpace):
         return np.concatenate([part.reshape(height, width, x.shape[2]) for part, width in parts], axis=1)
 
     def receive(self, part: Array, after: bool = False) -> bool:
-        """Overwrite `part` by the message of the process with the free rows before, or after; False without one."""
+        """Overwrite `part` by the message of the neighbouring process; return False where there is no such process.
+
+        The neighbour has the free rows before own rows, or after own rows with `after`.
+        """
         source = self._neighbour(after)
         if source is not None:
             self.comm.Recv(part, source)
         return source is not None
 
     def send(self, part: Array, after: bool = False) -> None:
-        """Send `part` to the process with the free rows before, or after, where there is one."""
+        """Send `part` to the process with the free rows before own rows, or after them, where there is one."""
         target = self._neighbour(after)
         if target is not None:
             self.comm.Send(part, target)
             self.messenger.sent["substitution"] += part.nbytes
 
     def _neighbour(self, after: bool) -> int | None:
-        """Return the process with the free rows before, or after, own ones; None where there are none of either."""
+        """Return the process with the free rows before own rows, or after them; None where there is no such process."""
         busy = np.flatnonzero(np.diff(self.starts)).tolist()
         if self.rank not in busy:
             return None
@@ -253,12 +257,12 @@ class Slab(TrialSpace):
 
 
 def shared_space(space: TrialSpace, comm: Any) -> TrialSpace:
-    """Return this process's part of a space: its slab, or all of it without a communicator or with one process."""
+    """Return this process's slab of a space, or the whole space without a communicator or with one process."""
     return space if comm is None or comm.size == 1 else Slab.of(space, comm)
 
 
 def _common(a: slice, b: slice, origin: int = 0) -> slice:
-    """Return the intersection of two ranges, counted from an origin; an empty range within the first without one."""
+    """Return the intersection of two ranges, counted from an origin; without one, an empty range in the first."""
     start = min(max(a.start, b.start), a.stop)
     return slice(start - origin, max(start, min(a.stop, b.stop)) - origin)
 

@@ -1,4 +1,4 @@
-"""The trial space: tensor-product splines on a volume's own knots, refined and raised in degree."""
+"""Defines the trial space: tensor-product splines on a volume's own knots, refined and raised in degree."""
 
 import math
 from collections import Counter
@@ -22,12 +22,12 @@ MOST_DEGREE = 8
 
 @dataclass(frozen=True, eq=False)
 class TrialSpace:
-    """Scalar trivariate splines on the unit cube, of three degrees on three open knot vectors on [0, 1].
+    """Describe scalar trivariate splines on the unit cube, of three degrees on three open knot vectors on [0, 1].
 
     dirichlet: names of the cube's faces on which boundary data fix the coefficients.
 
-    The operators ask a space for the rows of their process, the functions of u, and for sums over all processes. A
-    single process has all rows and sends nothing; `Slab` is the space of a process that has some of the rows.
+    The operators ask a space for the rows of their process, which are functions of u, and for sums over all processes.
+    A single process has all rows and sends nothing; `Slab` is the space of a process that has some of the rows.
     """
 
     degrees: tuple[int, int, int]
@@ -36,32 +36,32 @@ class TrialSpace:
 
     @property
     def whole(self) -> "TrialSpace":
-        """The space that all processes share."""
+        """Return the space that all processes share."""
         return self
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of basis functions per direction, in u those of `rows`."""
+        """Return the number of basis functions per direction, in u the number of `rows`."""
         return tuple(len(k) - p - 1 for k, p in zip(self.knots, self.degrees, strict=True))
 
     @property
     def dofs(self) -> int:
-        """Number of basis functions, those fixed by the boundary data included."""
+        """Return the number of basis functions, with those that boundary data fix."""
         return int(np.prod(self.whole.shape))
 
     @property
     def elements(self) -> int:
-        """Number of non-empty knot spans."""
+        """Return the number of non-empty knot spans."""
         return int(np.prod([len(breakpoints(k)) - 1 for k in self.whole.knots]))
 
     @property
     def gauss_points(self) -> tuple[int, ...]:
-        """Gauss points per span and direction that the operator needs with Gauss' rule on every span.
+        """Return the number of Gauss points per span and direction for the operator with Gauss' rule on every span.
 
         `degree` points keep the full order of convergence (they are exact for degree 2 p - 1) and cost 2.2 times less
-        than degree + 1 in three dimensions. Where the space is only continuous somewhere, as for degree 1, they would
-        let hourglass modes through, and on a single span they are fewer than the functions, whose mass matrix would be
-        singular: one point more.
+        than degree + 1 points in three dimensions. One point more is taken where the space is only continuous
+        somewhere, as for degree 1, because `degree` points would admit hourglass modes; and on a single span, because
+        there would be fewer points than functions, and a singular mass matrix.
         """
         return tuple(
             degree + int(_is_only_continuous(knots, degree) or len(breakpoints(knots)) == 2)
@@ -70,56 +70,56 @@ class TrialSpace:
 
     @property
     def is_only_continuous(self) -> bool:
-        """Whether the functions' derivatives jump somewhere inside."""
+        """Return whether the functions' derivatives jump somewhere inside."""
         return any(map(_is_only_continuous, self.whole.knots, self.degrees))
 
     @property
     def free(self) -> Window:
-        """The coefficients of the whole space that boundary data leave free, a box."""
+        """Return the coefficients of the whole space that boundary data leave free, a box of indices."""
         low, high = ([name in self.dirichlet for name in FACE_NAMES[side::2]] for side in (0, 1))
         u, v, w = (slice(int(a), n - int(b)) for a, b, n in zip(low, high, self.whole.shape, strict=True))
         return u, v, w
 
     @property
     def rank(self) -> int:
-        """Number of this process, 0 for the first."""
+        """Return the number of this process, 0 for the first."""
         return 0
 
     @property
     def breaks(self) -> tuple[Array, Array, Array]:
-        """The ends of the spans that this process integrates over, a direction each."""
+        """Return the ends of the spans over which this process integrates, one array a direction."""
         u, v, w = map(breakpoints, self.knots)
         return u, v, w
 
     @property
     def rows(self) -> slice:
-        """The rows of the whole space that this process has."""
+        """Return the rows of the whole space that this process has."""
         return slice(0, self.shape[0])
 
     @property
     def own(self) -> slice:
-        """The rows of this process's arrays that it owns; each row has one owner."""
+        """Return the rows of this process's arrays that it owns; each row has one owner."""
         return slice(0, self.shape[0])
 
     @property
     def window(self) -> Window:
-        """The free coefficients that this process owns, in its arrays."""
+        """Return the free coefficients that this process owns, as indices of its arrays."""
         return self.free
 
     @property
     def place(self) -> slice:
-        """The own rows of this process among all free rows."""
+        """Return the own rows of this process among all free rows."""
         u, _, _ = self.free
         return slice(0, u.stop - u.start)
 
     @property
     def columns(self) -> slice:
-        """The free functions of v that this process has after `to_columns`."""
+        """Return the free functions of v that this process has after `to_columns`."""
         _, v, _ = self.free
         return slice(0, v.stop - v.start)
 
     def agreed(self) -> AbstractContextManager[None]:
-        """Return a context that raises an error of one process on all of them."""
+        """Return a context that raises an error of one process on all processes."""
         return nullcontext()
 
     def shared(self, value: Any) -> list[Any]:
@@ -135,29 +135,32 @@ class TrialSpace:
         return Counter()
 
     def fill(self, coefficients: Array) -> None:
-        """Overwrite copies (.., n_u, n_v, n_w) by the values of their owners."""
+        """Overwrite the copies of rows (.., n_u, n_v, n_w) by the values of their owners."""
 
     def add(self, integrals: Array) -> None:
-        """Add the parts of own rows (.., n_u, n_v, n_w) that other processes have integrated."""
+        """Add to own rows (.., n_u, n_v, n_w) the parts that other processes have integrated."""
 
     def gather(self, own: Array) -> Array:
         """Return the rows (c, m_u, ..) of all processes, one after another."""
         return own
 
     def to_columns(self, x: Any) -> Any:
-        """Return (m_u, columns, m_w), of all free rows, from own free rows (rows, m_v, m_w)."""
+        """Return all free rows of this process's columns, (m_u, columns, m_w), from own free rows (rows, m_v, m_w)."""
         return x
 
     def to_rows(self, x: Any) -> Any:
-        """Invert `to_columns`."""
+        """Return own free rows (rows, m_v, m_w) from columns: the inverse of `to_columns`."""
         return x
 
     def receive(self, part: Array, after: bool = False) -> bool:
-        """Overwrite `part` by the message of the process with the free rows before, or after; False without one."""
+        """Overwrite `part` by the message of the neighbouring process; return False where there is no such process.
+
+        The neighbour has the free rows before own rows, or after own rows with `after`.
+        """
         return False
 
     def send(self, part: Array, after: bool = False) -> None:
-        """Send `part` to the process with the free rows before, or after, where there is one."""
+        """Send `part` to the process with the free rows before own rows, or after them, where there is one."""
 
 
 def _is_only_continuous(knots: Array, degree: int) -> bool:
@@ -168,10 +171,10 @@ def _is_only_continuous(knots: Array, degree: int) -> bool:
 def trial_space(
     volume: BSplineVolume, refine: int = 0, degree: int | None = None, dirichlet: Collection[str] = FACE_NAMES
 ) -> TrialSpace:
-    """Return the trial space of a volume: every span halved `refine` times, in a degree, by default the map's own.
+    """Return the trial space of a volume: every span halved `refine` times, in a degree, by default the map's degree.
 
-    It is as smooth as the map at the map's own knots, and as its degree allows at the knots that halving adds.
-    Raises ValueError for numbers that are not whole, a negative `refine`, one that gives more than MOST_ELEMENTS, or a
+    The space is as smooth as the map at the map's own knots, and as smooth as its degree allows at new knots. Raises
+    ValueError for numbers that are not whole, a negative `refine`, a `refine` that gives more than MOST_ELEMENTS, or a
     degree below 1 or above MOST_DEGREE.
     """
     if not isinstance(refine, int | np.integer):
@@ -195,10 +198,10 @@ def trial_space(
 
 
 def embedded(coefficients: Array, degrees: tuple[int, int, int], knots: Knots, space: TrialSpace) -> Array:
-    """Return the coefficients in `space` of a spline given in a smaller space of the same degrees; exact.
+    """Return the exact coefficients in `space` of a spline from a smaller space of the same degrees.
 
-    They are those of the rows that this process has.
-    Raises ValueError where the smaller space is not contained in the larger.
+    The coefficients are those of the rows of this process. Raises ValueError where the smaller space is not contained
+    in the larger space.
     """
     try:
         if degrees != space.degrees:
@@ -214,7 +217,7 @@ def embedded(coefficients: Array, degrees: tuple[int, int, int], knots: Knots, s
 
 
 def same_smoothness(knots: Array, old: int, new: int) -> Array:
-    """Return a knot vector of degree `new` on the same breakpoints, as smooth at each as degree `old` was."""
+    """Return a knot vector of degree `new` on the same breakpoints, with the smoothness of degree `old` at each."""
     values, repeats = np.unique(knots, return_counts=True)
     repeats = np.maximum(1, repeats + new - old)  # smoothness = degree - multiplicity
     repeats[[0, -1]] = new + 1
@@ -222,7 +225,7 @@ def same_smoothness(knots: Array, old: int, new: int) -> Array:
 
 
 def longest_edge(volume: BSplineVolume, space: TrialSpace) -> float:
-    """h: the longest straight distance between neighbouring corners of the mapped elements, in the volume's units."""
+    """Return h: the longest straight distance between neighbouring corners of an element, in the volume's units."""
     u, v, w = space.breaks
     longest = 0.0
     for start in range(0, len(u) - 1, LAYERS):

@@ -1,9 +1,9 @@
-"""Quadrature on the image of a face of the cube whose parts end between knots, as regions do.
+"""Integrates on the image of a face of the cube whose parts end between knots, as regions do.
 
 Every point has a code, which says to which regions it belongs. A cell (at first a span) on which the code is constant
-has Gauss points. Any other is cut into lines along one of its directions, the codes' jumps on each are found by
-bisection, and every piece between two jumps has Gauss points. Where the lines of a cell meet the rim alike, that is
-exact to high order; where the rim ends or bends between them, the cell is halved.
+has Gauss points. Any other cell is cut into lines along one of its directions, the jumps of the code on each line are
+found by bisection, and every piece between two jumps has Gauss points. Where all lines of a cell meet the rim in the
+same way, this is exact to high order; where the rim ends or bends between lines, the cell is halved.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,9 +35,10 @@ TANGENTS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 @dataclass(frozen=True, eq=False)
 class FacePoints:
-    """Points of a face at parameters (m, 3), their images, and the map's derivatives there.
+    """Hold points of a face at parameters (m, 3), their images, and the map's derivatives there.
 
-    x, area: (3, m), the points in space and the outward normals as long as the surface element. jacobian: (m, 3, 3).
+    x, area: (3, m), the points in space, and the outward normals with the length of the surface element. jacobian: (m,
+    3, 3).
     """
 
     parameters: Array
@@ -56,19 +57,19 @@ class FacePoints:
 
     @property
     def size(self) -> Array:
-        """The surface element (m,)."""
+        """Return the surface element (m,)."""
         return np.asarray(np.linalg.norm(self.area, axis=0))
 
     @property
     def normal(self) -> Array:
-        """The outward unit normals (3, m), zero where the face shrinks to a point."""
+        """Return the outward unit normals (3, m), zero where the face shrinks to a point."""
         size = self.size
         return np.asarray(self.area / np.where(size > 0.0, size, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceRule:
-    """Points on a face, their weights (m,) in space and their codes (m,)."""
+    """Hold points on a face, their weights (m,) in space and their codes (m,)."""
 
     at: FacePoints
     weights: Array
@@ -76,10 +77,10 @@ class SurfaceRule:
 
 
 def surface_rule(volume: BSplineVolume, space: TrialSpace, axis: int, side: int, codes: Codes) -> SurfaceRule | None:
-    """Return the rule of a face, without the points whose code is zero; None where all are.
+    """Return the rule of a face, without the points whose code is zero; None where all codes are zero.
 
-    Cells in which lines differ are halved until their usual error is within TOLERANCE of the regions' area.
-    Of a slab they are the points on its spans, of the rule of the whole face: so that it does not depend on processes.
+    Cells in which lines differ are halved until their usual error is within TOLERANCE of the regions' area. For a slab,
+    the points are those of the whole face's rule that lie on its spans, so that they do not depend on the processes.
     """
     whole = _Cutter(volume, orientation(volume), space.whole, axis, side, codes).rule()
     if whole is None or space.whole is space:
@@ -98,7 +99,7 @@ class _Cutter:
     codes: Codes
 
     def rule(self) -> SurfaceRule | None:
-        """Return the rule."""
+        """Return the quadrature rule of the face."""
         cells, parts, covered = self._spans(), [], 0.0
         samples = max(SAMPLES, -(-FEWEST // int(len(cells) ** 0.5)))
         for halvings in range(HALVINGS + 1):
@@ -121,9 +122,10 @@ class _Cutter:
         return _joined(found) if found else None
 
     def _across_rims(self, cells: Array) -> tuple[Array, Mask]:
-        """Return cells at rims, those first whose lines run in the first direction, and in which of them lines differ.
+        """Return the cells at rims, and the mask of the cells in which lines differ.
 
-        Lines differ where a rim ends, bends or leaves the cell between them; else the rule is exact to high order.
+        Cells with lines in the first direction come first. Lines differ where a rim ends, bends or leaves the cell
+        between two lines; otherwise the rule is exact to high order.
         """
         if not len(cells):
             return cells, np.zeros(0, dtype=bool)
@@ -140,7 +142,7 @@ class _Cutter:
         return cells, bent
 
     def _directions(self, cells: Array) -> tuple[IntArray, IntArray]:
-        """Return the numbers of the cells whose codes jump more often along the first direction, and of the others."""
+        """Return the numbers of the cells whose codes jump more often along the first direction, and of the rest."""
         seen = self._seen(cells, SAMPLES)
         jumps = [np.count_nonzero(np.diff(seen, axis=1 + along), axis=(1, 2)) for along in (0, 1)]
         return np.flatnonzero(jumps[0] >= jumps[1]), np.flatnonzero(jumps[0] < jumps[1])
@@ -153,14 +155,14 @@ class _Cutter:
         return np.stack([low, high], axis=1)
 
     def _code(self, across: Array) -> tuple[FacePoints, IntArray]:
-        """Return points with parameters (m, 2), and their codes."""
+        """Return the points with parameters (m, 2), and their codes (m,)."""
         at = FacePoints.of(self.volume, self.hand, self.axis, self.side, across)
         return at, self.codes(at.x, at.normal)
 
     def _seen(self, cells: Array, samples: int) -> IntArray:
         """Return the codes (k, samples + 2, samples + 2) of cells on grids that contain their ends.
 
-        A grid reaches one point beyond its cell: so it sees a rim that bulges into the cell between two points.
+        A grid extends one point beyond its cell, so that it finds a rim that bulges into the cell between two points.
         """
         step = 1.0 / (samples - 1)
         t = np.linspace(-step, 1.0 + step, samples + 2)
@@ -182,14 +184,14 @@ class _Cutter:
         )
 
     def _weighted(self, across: Array, weights: Array, codes: IntArray) -> SurfaceRule | None:
-        """Return a rule from weights in the parameters; None where there is no point of a code that is not zero."""
+        """Return a rule from weights in the parameters; None where all codes are zero."""
         if not len(across):
             return None
         at = FacePoints.of(self.volume, self.hand, self.axis, self.side, across)
         return SurfaceRule(at, weights * at.size, codes)
 
     def _on_lines(self, cells: Array) -> SurfaceRule | None:
-        """Return points on cells at a rim: on lines in that direction in which the code jumps more often."""
+        """Return points on cells at a rim: they lie on lines in the direction in which the code jumps more often."""
         if not len(cells):
             return None
         parts = [self._lines_along(cells[chosen], along) for along, chosen in enumerate(self._directions(cells))]
@@ -237,7 +239,7 @@ def _placed(cells: Array, places: Array) -> Array:
 
 
 def _unit_rule(count: int) -> tuple[Array, Array]:
-    """Return Gauss points and weights on [0, 1]."""
+    """Return `count` Gauss points and weights on [0, 1]."""
     points, weights = np.polynomial.legendre.leggauss(count)
     return 0.5 * (points + 1.0), 0.5 * weights
 
@@ -255,7 +257,7 @@ def _quartered(cells: Array) -> Array:
 
 
 def _sizes(cells: Array) -> Array:
-    """Return the sizes (k,) of cells in the parameters."""
+    """Return the areas (k,) of cells in the parameters."""
     return np.asarray(np.prod(cells[:, 1] - cells[:, 0], axis=-1))
 
 
@@ -264,7 +266,7 @@ def _with_ends(t: Array) -> Array:
 
 
 def _part(rule: SurfaceRule, chosen: IntArray) -> SurfaceRule | None:
-    """Return some points of a rule; None for none."""
+    """Return the chosen points of a rule; None where there are none."""
     if not len(chosen):
         return None
     at = rule.at

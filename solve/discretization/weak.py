@@ -1,4 +1,4 @@
-"""WeakFace: conditions on regions of a face, in weak form - Nitsche's method for values, loads, exchange.
+"""Imposes conditions on regions of a face in weak form: values by Nitsche's method, loads and exchange.
 
 Values u . d = h along directions d are held by Nitsche's symmetric method (Freund and Stenberg 1995), P the projector
 on the directions, t = flux(u) . n:
@@ -26,16 +26,17 @@ from ..forms.form import Form
 
 @dataclass(frozen=True, eq=False)
 class WeakFace:
-    """The terms of all regions' conditions on one face of the cube, c components, at m points.
+    """Hold the terms of all regions' conditions on one face of the cube, for c components, at m points.
 
-    x, normal: (3, m), points in space and outward unit normals. weights: (m,), of integrals in space. inverse:
-    (3, 3, m), J^-1. codes: (m,), bit i + 1 where condition i holds.
-    projector: (c, c, m), P. values: (c, m), P g. gamma: (m,). slowest: (m,), the law's factor over the depth of the
-    cube behind the face: gamma without its constants on a single span. factor: (m,), of exchange. loads: (c, m), the
-    given flux into the body, outside of P. is_whole: whether some P is given at all points of the face.
-    tables: values of the face's functions and their derivatives in its two directions, (m, n_b n_c) each. slope: the
-    derivative across the face of its layer's functions, less that of the next layer's. layers: the coefficients of the
-    face's functions and of the next ones in an array (n_u, n_v, n_w).
+    x, normal: (3, m), points in space and outward unit normals. weights: (m,), the weights of integrals in space.
+    inverse: (3, 3, m), J^-1. codes: (m,), bit i + 1 where condition i holds. projector: (c, c, m), P. values: (c, m), P
+    g. gamma: (m,). slowest: (m,), the law's factor over the depth of the cube behind the face, that is gamma without
+    its constants on a single span. factor: (m,), the factor of an exchange. loads: (c, m), the given flux into the
+    body, outside of P. is_whole: whether some P is given at all points of the face.
+
+    tables: (m, n_b n_c) each, values of the face's functions and their derivatives in its two directions. slope: the
+    derivative across the face of the functions of its layer, minus that of the next layer. layers: the coefficients of
+    the face's functions and of the next layer in an array (n_u, n_v, n_w).
     """
 
     name: str
@@ -58,22 +59,22 @@ class WeakFace:
 
     @cached_property
     def held(self) -> Array:
-        """Weights times P, (c, c, m)."""
+        """Return the weights times P, (c, c, m)."""
         return self.weights * self.projector
 
     @cached_property
     def stiff(self) -> Array:
-        """Weights times the factor (c, c, m) of u . v: gamma P, and the factor of exchange elsewhere."""
+        """Return the weights times the factor (c, c, m) of u . v: gamma P, and the factor of an exchange elsewhere."""
         free = np.eye(len(self.projector))[:, :, None] - self.projector
         return self.weights * (self.gamma * self.projector + self.factor * free)
 
     @property
     def axis(self) -> int:
-        """The direction across the face."""
+        """Return the direction across the face."""
         return FACE_NAMES.index(self.name) // 2
 
     def holds(self, condition: int) -> Any:
-        """Return the mask (m,) of the points of a condition, which is given by its number."""
+        """Return the mask (m,) of the points where the condition with this number holds."""
         return self.codes >> (condition + 1) & 1 == 1
 
     def traces(self, coefficients: Array) -> tuple[Array, Array]:
@@ -86,7 +87,7 @@ class WeakFace:
         return u.T, (self._flux(u.T, grad) * self.normal).sum(axis=1)
 
     def add_product(self, coefficients: Array, result: Array) -> None:
-        """Add the product of the terms with coefficients (c, n_u, n_v, n_w) to a result, shaped alike."""
+        """Add the product of the terms and coefficients (c, n_u, n_v, n_w) to a result of the same shape."""
         u, flux = self.traces(coefficients)
         tested = np.einsum("cdm,dm->cm", self.stiff, u) - np.einsum("cdm,dm->cm", self.held, flux)
         self._spread(tested, -np.einsum("cdm,dm->cm", self.held, u), result)
@@ -115,11 +116,11 @@ class WeakFace:
         layer += (self.tables[0].T @ self.stiff[component, component]).reshape(layer.shape)
 
     def stiffness(self, component: int) -> float:
-        """Return the factor of u v of one component that stands for the face in the preconditioner, integrated over it.
+        """Return the factor of u v of one component that represents the face in the preconditioner, integrated over it.
 
         It is the integral of gamma and of the factors. Where values are given on a part of the face only, waves along
-        the face see a factor between gamma and nothing: the geometric mean of gamma and 1 / depth, of the whole cube
-        behind the face, took the fewest iterations, 80 where gamma took 100 and a hundredth of this mean 105.
+        the face have a factor between gamma and zero: the geometric mean of gamma and 1 / depth, of the whole cube
+        behind the face, took the fewest iterations, 80, where gamma took 100 and a hundredth of this mean 105.
         """
         held = self.held[component, component]
         fast, slow = float(held @ self.gamma), float(held @ self.slowest)
@@ -129,8 +130,8 @@ class WeakFace:
     def force(self, coefficients: Array, points: Any) -> Array:
         """Return the reaction that holds u at some of the points: the integral (c,) of P t - gamma P (u - g).
 
-        Of all points, together with loads and sources, it is zero to the accuracy of the linear solver: so tests that
-        are constant say.
+        Summed over all points, with loads and sources, it is zero to the accuracy of the linear solver, as constant
+        test functions show.
         """
         u, flux = self.traces(coefficients)
         pull = self.gamma * (np.einsum("cdm,dm->cm", self.projector, u) - self.values)
@@ -145,7 +146,7 @@ class WeakFace:
         return np.asarray(self.form.flux(u, grad, self.x), dtype=np.float64)
 
     def _pulled(self, vectors: Array) -> Array:
-        """Return flux(d (x) n) (c, 3, m) of vectors d (c, m), pulled back to the parameters, for the tests t(v) . d."""
+        """Return flux(d (x) n) (c, 3, m) of vectors d (c, m), pulled back to the parameters, for the terms t(v) . d."""
         flux = self._flux(np.zeros_like(vectors), vectors[:, None] * self.normal)
         return np.einsum("adm,cdm->cam", self.inverse, flux)
 

@@ -1,4 +1,4 @@
-"""BoundaryValueProblem: a law and its data in the volume and on its boundary, as the solver asks for them."""
+"""Defines BoundaryValueProblem: a law and its data in the volume and on its boundary, as the solver evaluates them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Robin = Mapping[str, tuple[Data, Data | None]]
 
 
 class BoundaryValueProblem:
-    """A law and its data at points (3, ...), components first: the interface of a problem to the solver.
+    """Evaluate a law and its data at points (3, ...), components first: the interface of a problem to the solver.
 
     Data have roles: exact, source, boundary; "neumann u0", "robin u0" and "robin u0: alpha" of a face; and those of the
     law's own coefficients. Every method raises ExpressionError where data are not finite.
@@ -49,9 +49,9 @@ class BoundaryValueProblem:
         conditions: tuple[Condition, ...] = (),
         **counts: int,
     ) -> None:
-        """Parse the data. Raises ValueError where they do not fit together or cannot be known.
+        """Parse the data. Raises ValueError where the data do not fit together or cannot be derived.
 
-        counts: role -> number of entries of its datum, where this is not the number of the law's components.
+        counts: by role, the number of entries of a datum, where it is not the number of the law's components.
         """
         self._check_components()
         self._check_faces(neumann, robin)
@@ -92,7 +92,7 @@ class BoundaryValueProblem:
             )
 
     def _check_faces(self, neumann: Natural, robin: Robin) -> None:
-        """Raise ValueError for names that are no faces, faces with two kinds of data, and incomplete Robin data."""
+        """Raise ValueError for names of no face, for faces with two kinds of data, and for incomplete Robin data."""
         for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
             if not isinstance(faces, Mapping):
                 raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
@@ -105,7 +105,7 @@ class BoundaryValueProblem:
             raise ValueError(f"face {min(both)} has both Neumann and Robin data; give only one")
 
     def _parsed(self, given: Mapping[str, Data | None], counts: Mapping[str, int]) -> dict[str, Datum]:
-        """Return the data of the volume and of faces by role, without roles that have none."""
+        """Return the data of the volume and of faces by role, without roles that have no data."""
         data = {}
         for role, entry in given.items():
             if entry is not None:
@@ -130,19 +130,19 @@ class BoundaryValueProblem:
             raise ValueError(f"{name} has no data: {why}; give {name}=... too, or formulas")
 
     def label(self, role: str) -> str:
-        """Return the name by which messages call the datum of a role."""
+        """Return the name of the datum of a role for messages."""
         first, _, rest = role.partition(" ")
         return f"{self.labels.get(first, first)} {rest}".rstrip()
 
     @property
     def formulas(self) -> list[tuple[str, Datum, Expression]]:
-        """The data that are formulas: role, datum, and each of its formulas."""
+        """Return the data that are formulas: role, datum, and each formula of the datum."""
         return [(role, datum, entry) for role, datum in self.data.items() for entry in datum.formulas]
 
     def on(self, volume: BSplineVolume) -> Self:
-        """Return the same problem with X, Y, Z measured in a volume: its size is 1 in them, the middle of its box 0.
+        """Return the same problem with X, Y, Z measured in a volume, which has size 1 in X, Y, Z and its middle at 0.
 
-        Raises ValueError for a field that was found on another volume.
+        The middle is that of the bounding box. Raises ValueError for a field of another volume.
         """
         for datum in self.data.values():
             if not all(entry.fits(volume) for entry in datum.entries if isinstance(entry, SplineField)):
@@ -152,17 +152,17 @@ class BoundaryValueProblem:
         return self.placed(UnitFrame.of(volume)) if self.is_scaled else self
 
     def demand_held(self) -> None:
-        """Raise ValueError where it is plain from the data that nothing fixes the solution."""
+        """Raise ValueError where the data alone show that nothing fixes the solution."""
 
     @property
     def is_scaled(self) -> bool:
-        """Whether X, Y or Z occurs in a formula or in the condition of a region."""
+        """Return whether X, Y or Z occurs in a formula or in the condition of a region."""
         return any(formula.is_scaled for _, _, formula in self.formulas) or any(
             condition.region.is_scaled for condition in self.conditions
         )
 
     def on_surface(self, part: Part) -> Self:
-        """Return the same problem with the faces and groups of its regions found on a part's surface mesh."""
+        """Return the same problem, whose regions find faces and groups on a part's surface mesh."""
         other = copy(self)
         regions = (replace(condition, region=condition.region.placed(surface=part)) for condition in self.conditions)
         object.__setattr__(other, "conditions", tuple(regions))
@@ -170,12 +170,12 @@ class BoundaryValueProblem:
 
     @property
     def needs_surface(self) -> bool:
-        """Whether a face or a group of the part is among the regions, and its surface is not known."""
+        """Return whether a region names a face or a group of the part, and the surface of the part is unknown."""
         return any(c.region.needs_surface and c.region.surface is None for c in self.conditions)
 
     @property
     def fixes_nothing(self) -> bool:
-        """Whether no value of u is given anywhere, and no exchange with the outside."""
+        """Return whether there are neither given values of u nor an exchange with the outside."""
         if self.conditions:
             return not any(c.is_essential or c.kind in WITH_FACTOR for c in self.conditions)
         return len(self.natural) == len(FACE_NAMES)
@@ -190,9 +190,9 @@ class BoundaryValueProblem:
 
     @property
     def not_differentiable(self) -> str:
-        """Why the derivatives of the law's coefficients are unknown; "" where they are known.
+        """Return why the derivatives of the law's coefficients are unknown; "" where they are known.
 
-        Raises LawError where the law's results have wrong shapes: that is said first.
+        Raises LawError first where the law's results have wrong shapes.
         """
         try:
             strong_form(self.form, [Jet(np.ones(1))] * self.form.components, np.ones((3, 1)))
@@ -203,30 +203,30 @@ class BoundaryValueProblem:
 
     @property
     def exact_formulas(self) -> list[Expression]:
-        """The formulas of `exact`; none where it is not given as formulas."""
+        """Return the formulas of `exact`; an empty list where it is not given as formulas."""
         exact = self.data.get("exact")
         return exact.formulas if exact and exact.is_formula else []
 
     def source_at(self, x: Array) -> Array:
-        """Return the source f (c, ...)."""
+        """Return the source f (c, ...) at points x (3, ...)."""
         return self.data["source"](x) if "source" in self.data else self.source_of_exact(x)
 
     def source_of_exact(self, x: Array) -> Array:
-        """Return -div flux + react (c, ...) of the formulas `exact`."""
+        """Return -div flux + react (c, ...) of the formulas `exact` at points x (3, ...)."""
         found = strong_form(self.form, self._exact_jets(x), x)
         return finite(f"{self.label('source')} (from exact)", found, x, self._first_formula)
 
     def size_of_exact(self, x: Array) -> float:
-        """Return the size of the largest term in -div flux + react of the formulas `exact`, where these may cancel."""
+        """Return the size of the largest term in -div flux + react of the formulas `exact`; terms may cancel."""
         return max(float(np.abs(t).max()) for row in strong_terms(self.form, self._exact_jets(x), x) for t in row)
 
     def _exact_jets(self, x: Array, hessian: Numbers = (0.0,) * 6) -> list[Jet]:
         return [formula.jet(coordinates(np.asarray(x), hessian)) for formula in self.exact_formulas]
 
     def boundary_at(self, x: Array, face: str = "") -> Array:
-        """Return the values of u (c, ...) given on the boundary: those of `exact` or zero where none are given.
+        """Return the values of u (c, ...) given on the boundary, or the values of `exact`, or zero.
 
-        face: on which the points lie, where regions give a face its own values.
+        face: the face on which the points lie, where regions give a face its own values.
         """
         of_face = [c.role for c in self.conditions if c.is_strong and face in c.region.faces]
         for role in (*of_face[:1], "boundary", "exact"):
@@ -250,7 +250,7 @@ class BoundaryValueProblem:
         return alpha, flux if alpha is None else flux + alpha * self.data["exact"](x)
 
     def _flux_of_exact(self, role: str, x: Array, normal: Array) -> Array:
-        """Return flux . n (c, ...) of the formulas `exact`, data of a role."""
+        """Return flux . n (c, ...) of the formulas `exact`; role: the role that messages name."""
         u, grad = known(self._exact_jets(x, ()), x.shape[1:])
         flux = (np.asarray(self.form.flux(u, grad, x), dtype=np.float64) * normal).sum(axis=1)
         return finite(f"{self.label(role)} (from exact)", flux, x, self._first_formula)
@@ -264,7 +264,8 @@ class BoundaryValueProblem:
     def flux_on(self, condition: Condition | None, x: Array, normal: Array) -> Array:
         """Return the flux (c, m) into the body that a condition gives at points (3, m) with normals (3, m).
 
-        None stands for the rest of the boundary, with the flux of `exact` or none. The flux of a factor is for u = 0.
+        A condition None is the rest of the boundary, with the flux of `exact` or without flux. For a condition with a
+        factor, the flux is that for u = 0.
         """
         if condition is None or (condition.data is None and condition.role not in self.data):
             if not self.exact_formulas:

@@ -1,4 +1,4 @@
-"""Condition: data on a region of the boundary - values, a flux, or an exchange with the outside."""
+"""Defines Condition: data on a region of the boundary, which are values, a flux, or an exchange with the outside."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ GivenRegions = Regions | Mapping[Any, Any]  # Region or str -> data
 
 @dataclass(frozen=True)
 class Condition:
-    """Data of one kind on a region.
+    """Hold data of one kind on a region.
 
-    kind: its name. data: of a factor the pair (factor, value outside); None for the data of the exact solution.
-    free: of a value, the components that are left free.
+    kind: the name of the kind. data: for a factor the pair (factor, value outside); None for the data of the exact
+    solution. free: of values, the components that are left free.
     """
 
     kind: Kind
@@ -37,28 +37,28 @@ class Condition:
 
     @property
     def role(self) -> str:
-        """The name of its datum in a problem, and in messages."""
+        """Return the name of the condition's datum in a problem and in messages."""
         return f"{self.kind} {str(self.region)!r}"
 
     @property
     def is_essential(self) -> bool:
-        """Whether it gives values of u, or of its normal part."""
+        """Return whether the condition gives values of u, or of its normal component."""
         return self.kind in ESSENTIAL
 
     @property
     def is_strong(self) -> bool:
-        """Whether the trial space itself can hold it: all components of u on whole faces of the cube."""
+        """Return whether the trial space can hold the condition: all components of u on whole faces of the cube."""
         return self.kind in ("value", "fix") and bool(self.region.faces) and not any(self.free)
 
     def given(self) -> dict[str, tuple[Data | None, int | None]]:
-        """Return its data by role, each with its number of entries, None for the law's components."""
+        """Return the condition's data by role, each with its number of entries, None for the number of components."""
         if self.kind in WITH_FACTOR:
             factor, outside = self.data
             return {f"{self.role}: factor": (factor, 1), self.role: (outside, None)}
         return {self.role: (self.data, 1 if self.kind in ALONG_NORMAL else None)}
 
     def directions(self, components: int, normal: Array) -> list[Array]:
-        """Return the directions (c, m) along which values are given, of length 1 each, for normals (3, m)."""
+        """Return the unit directions (c, m) along which values are given, for normals (3, m)."""
         if self.kind in ("roller", "symmetry"):
             return [normal]
         units = np.eye(components)[:, :, None] * np.ones(normal.shape[1])
@@ -66,10 +66,10 @@ class Condition:
 
 
 def conditions_of(components: int, exact: Any = None, **kinds: GivenRegions | None) -> tuple[Condition, ...]:
-    """Return the conditions that keywords of a problem give, each kind a dictionary of regions, or regions alone.
+    """Return the conditions from the keywords of a problem; each kind is a dictionary of regions, or regions alone.
 
-    Regions alone have the data of the exact solution, where there is one, and else zero.
-    Raises ValueError for data of a wrong kind, ExpressionError for a region that is refused.
+    Regions alone have the data of the exact solution, or zero without an exact solution. Raises ValueError for data of
+    a wrong kind, ExpressionError for a region that is refused.
     """
     found = []
     for kind, entries in kinds.items():
@@ -87,7 +87,7 @@ def conditions_of(components: int, exact: Any = None, **kinds: GivenRegions | No
 
 
 def _nothing(kind: str, region: Region, components: int) -> Any:
-    """Return the data of a kind that is given without any: zero. Raises ValueError for a kind that needs some."""
+    """Return zero data for regions without data. Raises ValueError for a kind that needs data."""
     if kind not in ESSENTIAL:
         raise ValueError(f"{kind} {str(region)!r}: has no data")
     return 0.0 if kind in ALONG_NORMAL or components == 1 else [0.0] * components

@@ -1,4 +1,4 @@
-"""Data of a problem: formulas in x, y, z and X, Y, Z, functions or fields, checked at every point."""
+"""Evaluates data of a problem: formulas in x, y, z and X, Y, Z, functions or fields, checked at every point."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,10 +27,10 @@ Entry = Expression | SplineField | Callable[[Array], ArrayLike]
 
 @dataclass(frozen=True)
 class Datum:
-    """One datum of a problem.
+    """Hold one datum of a problem.
 
-    name: as messages call it. entries: one a component, or one function or field for all components.
-    face: the only face on which it acts; "" for the whole volume.
+    name: the name in messages. entries: one entry a component, or one function or field for all components. face: the
+    only face with this datum; "" for the whole volume.
     """
 
     name: str
@@ -40,12 +40,12 @@ class Datum:
 
     @property
     def formulas(self) -> list[Expression]:
-        """Its entries that are formulas."""
+        """Return the entries that are formulas."""
         return [entry for entry in self.entries if isinstance(entry, Expression)]
 
     @property
     def is_formula(self) -> bool:
-        """Whether all its derivatives are known: those of where, min and max jump."""
+        """Return whether all derivatives of the datum are known, as for formulas without where, min and max."""
         return len(self.formulas) == len(self.entries) and all(formula.is_smooth for formula in self.formulas)
 
     def placed(self, frame: UnitFrame) -> "Datum":
@@ -55,8 +55,8 @@ class Datum:
     def __call__(self, x: Array) -> Array:
         """Return values (c, ...) at points (3, ...).
 
-        Raises ExpressionError where they are not finite, ValueError where a function fails or returns another shape or
-        kind.
+        Raises ExpressionError where values are not finite, ValueError where a function fails or returns another shape
+        or kind.
         """
         each = x.shape[1:] if len(self.entries) == self.components else (self.components, *x.shape[1:])
         parts = []
@@ -77,7 +77,7 @@ class Datum:
         return np.stack(parts).reshape(self.components, *x.shape[1:])
 
     def _called(self, function: Callable[[Array], ArrayLike], x: Array) -> ArrayLike:
-        """Return the values of a user's function. Raises ValueError that names the datum where the function fails."""
+        """Return the values of a user's function. Raises a ValueError that names the datum where the function fails."""
         try:
             return function(x)
         except Exception as error:
@@ -85,10 +85,10 @@ class Datum:
 
 
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:
-    """Translate a user's datum of c components; a number is the formula of that constant.
+    """Return a user's datum of c components as a Datum; a number is the formula of that constant.
 
-    of_coordinates: functions take three arrays x, y, z instead of one array (3, ...).
-    Raises ExpressionError for a refused formula, ValueError for an object that is no datum; both name the datum.
+    of_coordinates: whether functions take three arrays x, y, z instead of one array (3, ...). Raises ExpressionError
+    for a refused formula, ValueError for an object that is no datum; both messages name the datum.
     """
     data = data.tolist() if isinstance(data, np.ndarray) else data
     is_vector = isinstance(data, Sequence) and not isinstance(data, str | bytes)
@@ -134,7 +134,7 @@ def finite(name: str, found: Array, x: Array, entry: Entry | None = None) -> Arr
 
 
 def in_scaled(entry: Entry | None, x: Array) -> str:
-    """Return the remedy for a formula in x, y, z on a domain far from size 1 or from the origin: the same in X, Y, Z.
+    """Return the remedy for a formula in x, y, z on a domain far from size 1 or from the origin: a formula in X, Y, Z.
 
     x: points (3, ...) of the domain.
     """
@@ -147,7 +147,7 @@ def in_scaled(entry: Entry | None, x: Array) -> str:
 
 
 def demand(good: NDArray[np.bool_], name: str, must: str, x: Array) -> None:
-    """Raise ExpressionError naming the first of the points (3, ...) where a condition on the data does not hold."""
+    """Raise an ExpressionError that names the first of the points (3, ...) where a condition on the data fails."""
     if not good.all():
         raise ExpressionError(f"{name} must be {must}, and is not at {_first(~good, x)}, a point of the domain")
 

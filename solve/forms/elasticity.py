@@ -1,4 +1,4 @@
-"""Elasticity: the law and the data of -div sigma(u) = f, isotropic, with displacement or traction on each face."""
+"""Defines Elasticity: -div sigma(u) = f for an isotropic body, with displacement or traction on each face."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class Elasticity(LawWithData):
 
     @staticmethod
     def lame(first: float, shear: float) -> dict[str, float]:
-        """Return `young` and `poisson_ratio` of Lame's lambda (`first`) and mu (`shear`), to be passed on."""
+        """Return `young` and `poisson_ratio`, as keywords, from Lame's constants lambda (`first`) and mu (`shear`)."""
         if not (shear > 0.0 and 3.0 * first + 2.0 * shear > 0.0):
             raise ValueError(f"Lame's constants must have mu > 0 and 3 lambda + 2 mu > 0, got {first} and {shear}")
         total = first + shear
@@ -124,7 +124,7 @@ class Elasticity(LawWithData):
 
     @property
     def constants(self) -> tuple[float, float]:
-        """Lame's constants lambda and mu."""
+        """Return Lame's constants lambda and mu."""
         nu = self.poisson_ratio
         return self.young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.young / (2.0 * (1.0 + nu))
 
@@ -140,21 +140,25 @@ class Elasticity(LawWithData):
 
     @property
     def caveat(self) -> str:
-        """Why a body that hardly changes its volume is hard to solve, and the error not estimated."""
+        """Return why a nearly incompressible body is hard to solve and its error not estimated; "" for other bodies."""
         nu = self.poisson_ratio
         return (
             f"Poisson's ratio {nu:g} is near 1/2, where a body hardly changes its volume" if nu > NEARLY_RIGID else ""
         )
 
     def free_motions(self, x: Array) -> Array:
-        """Return the six motions of a rigid body (6, 3, m): along x, y, z, and about them."""
+        """Return the six rigid motions (6, 3, m) of a body: along x, y, z, and about x, y, z."""
         shifts = np.eye(3)[:, :, None] * np.ones(x.shape[1])
         turns = [np.cross(axis, x, axisb=0).T for axis in np.eye(3)]
         return np.concatenate([shifts, np.stack(turns)])
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """Also strain and stress (3, 3, ...), von Mises' and principal stresses (3, ...), the first and third alone."""
+        """Return the quantities of a solution by name.
+
+        Beside those of every law these are strain and stress (3, 3, ...), von Mises' stress (...), the principal
+        stresses (3, ...), and the first and the third principal stress (...).
+        """
         return {
             **super().quantities,
             "strain": lambda u, grad, x: 0.5 * (grad + np.swapaxes(grad, 0, 1)),
@@ -167,11 +171,11 @@ class Elasticity(LawWithData):
 
     @property
     def reported(self) -> tuple[str, ...]:
-        """The displacement's length, von Mises' stress, the largest and the smallest principal stress."""
+        """Return the names: the displacement's length, von Mises' stress, the first and the third principal stress."""
         return ("magnitude", "von_mises", "first_principal", "third_principal")
 
     def symbol(self, wave: Array, x: Array) -> Array:
-        """Return the factor mu (k . k) of shear waves, the least, for wave vectors k (3, ...)."""
+        """Return mu (k . k), the factor of shear waves, which is the least factor, for wave vectors k (3, ...)."""
         found: Array = self.constants[1] * (wave * wave).sum(axis=0)
         return found
 
@@ -191,8 +195,8 @@ def principal(stress: Array) -> Array:
 def outer_principal(stress: Array) -> Array:
     """Return the largest and the smallest principal stress (2, ...) of a symmetric stress tensor (3, 3, ...).
 
-    By the cosines of the characteristic polynomial's angle: `principal` takes ten times as long. Where two stresses
-    are one, they are right to 1e-8 of the deviator.
+    They follow from the cosines of the characteristic polynomial's angle: `principal` takes ten times as long. Where
+    two principal stresses are equal, the results are accurate to 1e-8 of the deviator.
     """
     mean = (stress[0, 0] + stress[1, 1] + stress[2, 2]) / 3.0
     xx, yy, zz = (stress[i, i] - mean for i in range(3))

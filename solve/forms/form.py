@@ -1,4 +1,4 @@
-"""Form: the law of a linear second-order PDE, from which all else follows."""
+"""Defines Form: the law of a linear second-order PDE, from which the solver derives everything else."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -64,23 +64,23 @@ class Form:
         raise NotImplementedError(f"{type(self).__name__} must define flux(self, u, grad, x)")
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return the term (c, ...) without derivatives of the test, of u and grad, too; none here."""
+        """Return the term (c, ...) of u and grad that is multiplied by the test function itself; 0 by default."""
         return 0.0
 
     @property
     def caveat(self) -> str:
-        """Why a law takes many iterations, and why its error cannot be estimated from the residual; "" where it can."""
+        """Return why the law takes many iterations and has no error estimate from the residual; "" otherwise."""
         return ""
 
     def free_motions(self, x: Array) -> Array:
-        """Return the motions (k, c, m) at points x (3, m) that a vector law does not resist; none here."""
+        """Return the motions (k, c, m) at points x (3, m) that a vector law does not resist; none by default."""
         return np.zeros((0, self.components, x.shape[1]))
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """The quantities of a solution of this law, by name; a law of one's own may add some.
+        """Return the quantities of a solution of this law, by name; a subclass may add some.
 
-        `magnitude` is the length of u, `gradient_magnitude` and `flux_magnitude` those of the others.
+        `magnitude` is the length of u, `gradient_magnitude` and `flux_magnitude` are the lengths of gradient and flux.
         """
         return {
             "u": lambda u, grad, x: u,
@@ -93,12 +93,12 @@ class Form:
 
     @property
     def reported(self) -> tuple[str, ...]:
-        """The names of quantities with one number a point whose extremes a report shows."""
+        """Return the names of quantities with one number a point whose extremes a report shows."""
         return ("u" if self.components == 1 else "magnitude", "gradient_magnitude", "flux_magnitude")
 
     @property
     def has_reaction(self) -> bool:
-        """Whether the law has a term `react`."""
+        """Return whether the law has a term `react`."""
         return type(self).react is not Form.react
 
     def tensor(self, x: Array, component: int = 0) -> Array:
@@ -131,7 +131,7 @@ class Form:
         return _symmetric(columns)
 
     def symbol(self, wave: Array, x: Array) -> Array:
-        """Return the least factor (...) by which the law multiplies waves exp(i k . x), k (3, ...)."""
+        """Return the least factor (...) by which the law multiplies waves exp(i k . x) with wave vectors k (3, ...)."""
         matrix = self.matrix_along(wave, x)
         if self.has_reaction:
             units = np.eye(self.components).reshape(self.components, -1, *(1,) * (wave.ndim - 1))
@@ -156,7 +156,7 @@ def reaction(form: Form, u: Array, grad: Array, x: Array) -> Array:
 def strong_terms(form: Form, u: Sequence[Jet], x: Array) -> list[list[Number]]:
     """Return for each of c functions the terms of -div flux + react at points x (3, ...): arrays (...) or numbers.
 
-    u: their jets, with second derivatives.
+    u: the functions as jets with second derivatives.
     """
     values = as_objects([Jet(jet.value, jet.gradient, ()) for jet in u], (len(u),))
     slopes = [
@@ -181,20 +181,20 @@ def strong_form(form: Form, u: Sequence[Jet], x: Array) -> Array:
 
 
 def as_objects(jets: Sequence[Jet], shape: tuple[int, ...]) -> Any:
-    """Return jets as an array of objects of a shape."""
+    """Return jets as an array of objects of the given shape."""
     array = np.empty(len(jets), dtype=object)
     array[:] = jets
     return array.reshape(shape)
 
 
 class LawError(ValueError):
-    """A law that is not defined, or whose results on arrays have wrong shapes."""
+    """Raised for a law that is not defined, or whose results on arrays have wrong shapes."""
 
 
 def _results(form: Form, u: Array, grad: Array, x: Array) -> tuple[Array, Array]:
-    """Return flux (c, 3, m) and reaction (c, m) of a law.
+    """Return the flux (c, 3, m) and the reaction (c, m) of a law.
 
-    Raises LawError where their shapes are others, ValueError where the law fails or they are not finite real numbers.
+    Raises LawError where they have other shapes, ValueError where the law fails or they are not finite real numbers.
     """
     name, results = type(form).__name__, []
     for part, shape in (("flux", grad.shape), ("react", u.shape)):
@@ -218,7 +218,10 @@ def _length(values: Array) -> Array:
 
 
 def check_shapes(form: Form) -> None:
-    """Raise LawError for a law whose results have wrong shapes; one that wants more than plain arrays is not judged."""
+    """Raise LawError for a law whose results have wrong shapes.
+
+    A law that needs more than plain arrays is not judged.
+    """
     c, m = form.components, 5
     try:
         _results(form, np.ones((c, m)), np.ones((c, 3, m)), np.ones((3, m)))
@@ -231,8 +234,9 @@ def check_shapes(form: Form) -> None:
 def check_law(form: Form, x: Array) -> bool:
     """Check a law on random arguments at points x (3, m), and return whether it couples u with its gradient.
 
-    Raises ValueError where its results have wrong shapes, are not linear, not symmetric though `symmetric` says so, or
-    where a wave has no positive energy (the Legendre-Hadamard condition): no solver could do anything with it.
+    Raises ValueError where the law's results have wrong shapes, are not linear, or are not symmetric although
+    `symmetric` says so, and where a wave has no positive energy (the Legendre-Hadamard condition), for which no solver
+    works.
     """
     c, m, name = form.components, x.shape[1], type(form).__name__
     if not form.linear:

@@ -1,4 +1,4 @@
-"""UnitFrame: the scaled coordinates X, Y, Z in which formulas mean the same in millimetres and in metres."""
+"""Defines UnitFrame: the scaled coordinates X, Y, Z, in which a formula means the same in millimetres and in metres."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ BOX_SAMPLES = 8  # intervals a span and direction in which the boundary is sampl
 
 @dataclass(frozen=True)
 class UnitFrame:
-    """The map (X, Y, Z) = (x - center) / length that gives a body volume 1 about the middle of its bounding box.
+    """Map x to (X, Y, Z) = (x - center) / length, so that a body has volume 1 about the middle of its bounding box.
 
     center: (3,), in the body's units. length: the cube root of the body's volume.
     """
@@ -28,10 +28,10 @@ class UnitFrame:
 
     @classmethod
     def of(cls, volume: BSplineVolume) -> "UnitFrame":
-        """The frame of a spline volume.
+        """Return the frame of a spline volume.
 
-        The volume follows exactly from the six faces (divergence theorem); the bounding box is that of points on them,
-        BOX_SAMPLES a span and direction. A folded map counts its folded parts with the opposite sign.
+        The size of the volume follows exactly from the six faces (divergence theorem); the bounding box is that of
+        points on the faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
         Raises ValueError where the volume encloses nothing.
         """
         rows = [divided_spans(knots, BOX_SAMPLES) for knots in volume.knots]
@@ -45,16 +45,16 @@ class UnitFrame:
         return cls((x, y, z), float(np.cbrt(enclosed)))
 
     def to_units(self, points: Array) -> Array:
-        """Points (..., 3) given in X, Y, Z, in the body's own units."""
+        """Return points (..., 3), given in X, Y, Z, in the body's own units."""
         return self.length * points + np.asarray(self.center)
 
     def as_dict(self) -> dict[str, Any]:
-        """The frame as report.json holds it."""
+        """Return the frame for report.json."""
         return {"center": list(self.center), "length": self.length}
 
 
 def face_geometry(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Points, Array]:
-    """Return points on a face and the outward normals, as long as the surface element: (3, q_b, q_c) each.
+    """Return points on a face, and outward normals with the length of the surface element: (3, q_b, q_c) each.
 
     rows: parameters of a tensor grid in the cube. The volume may be left-handed. Where a map is folded, normals point
     inward.

@@ -1,8 +1,8 @@
-"""Jets: values that carry their derivatives through formulas and laws.
+"""Defines jets: values that carry their derivatives through formulas and laws.
 
-Value, gradient and Hessian follow together by forward automatic differentiation (Griewank and Walther, *Evaluating
-Derivatives*, 2nd ed., chapter 13), so a source -div flux(u) is exact. An array of jets is a NumPy array of objects:
-NumPy's arithmetic and its functions sin, cos, tan, exp, log, sqrt, tanh and abs then act on each jet.
+Value, gradient and Hessian are computed together by forward automatic differentiation (Griewank and Walther,
+*Evaluating Derivatives*, 2nd ed., chapter 13), so a source -div flux(u) is exact. An array of jets is a NumPy array of
+objects: NumPy's arithmetic and its functions sin, cos, tan, exp, log, sqrt, tanh and abs then act on each jet.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,9 +40,10 @@ def _operation(rule: Callable[["Jet", "Jet"], "Jet"]) -> Callable[["Jet", Any], 
 
 @dataclass(frozen=True, eq=False)
 class Jet:
-    """A function's value, gradient and Hessian (xx, xy, xz, yy, yz, zz) at the points of an array.
+    """Hold a function's value, gradient and Hessian (xx, xy, xz, yy, yz, zz) at the points of an array.
 
-    Constant derivatives are scalars. Variables seeded without Hessian carry none, and no work is spent on it.
+    Constant derivatives are scalars. Jets from variables without a Hessian have no Hessian, which saves its
+    computation.
     """
 
     value: Number
@@ -64,7 +65,7 @@ class Jet:
 
     @_operation
     def __mul__(self, b: "Jet") -> "Jet":
-        """Multiply: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
+        """Return the product: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
 
         def product(da: Number, db: Number) -> Number:
             return _plus(_times(self.value, db), _times(b.value, da))
@@ -78,14 +79,17 @@ class Jet:
         return Jet(self.value * b.value, _each(product, self.gradient, b.gradient), hessian)
 
     def power(self, n: float) -> "Jet":
-        """Raise to a constant power; the factors n and n (n - 1) that vanish keep 0 ** negative out."""
+        """Return a constant power; the factors n and n (n - 1) that vanish prevent 0 ** negative."""
         v = self.value
         first = n * v ** (n - 1.0) if n != 0.0 else 0.0
         second = n * (n - 1.0) * v ** (n - 2.0) if n not in (0.0, 1.0) else 0.0
         return self._chain(v**n, first, second)
 
     def __abs__(self) -> "Jet":
-        """Derivatives hold away from the zeros of the argument; the source of a kink is not a function."""
+        """Return the absolute value.
+
+        Derivatives hold away from the zeros of the argument; the source of a kink is not a function.
+        """
         return self._chain(np.abs(self.value), np.sign(self.value), 0.0)
 
     sin = _function(lambda v: ((sine := np.sin(v)), np.cos(v), -sine))
@@ -104,7 +108,7 @@ class Jet:
     __rpow__ = _operation(lambda a, b: (a * b.log()).exp())
 
     def _chain(self, value: Number, first: Number, second: Number) -> "Jet":
-        """Chain rule for h(a) from h, h' and h'' at a: h(a)_ij = h' a_ij + h'' a_i a_j."""
+        """Return h(a) by the chain rule from h, h' and h'' at a: h(a)_ij = h' a_ij + h'' a_i a_j."""
 
         def entry(second_a: Number, pair: tuple[int, int]) -> Number:
             i, j = pair
@@ -128,17 +132,17 @@ def _times(a: Number, b: Number) -> Number:
 
 
 def _each(operation: Callable[[Number, Number], Number], a: Numbers, b: Numbers) -> Numbers:
-    """Apply an operation entry by entry; the shorter row, a Hessian left out, decides how many there are."""
+    """Return the results of an operation entry by entry, as many as the shorter row has; an absent Hessian is empty."""
     return tuple(operation(*entries) for entries in zip(a, b, strict=False))
 
 
 def coordinates(x: Sequence[Array] | Array, hessian: Numbers = ()) -> list[Jet]:
-    """Return the jets of x, y, z at points (3, ...); with second derivatives where `hessian` is six zeros."""
+    """Return the jets of x, y, z at points (3, ...), with second derivatives where `hessian` is six zeros."""
     return [Jet(row, unit, hessian) for row, unit in zip(x, UNITS, strict=True)]
 
 
 def stacked(rows: Sequence[Number], shape: tuple[int, ...]) -> Array:
-    """Return rows, constants among them, as one array (len(rows), *shape)."""
+    """Return rows, some of which may be constants, as one array (len(rows), *shape)."""
     full = np.empty((len(rows), *shape))
     for i, row in enumerate(rows):
         full[i] = row

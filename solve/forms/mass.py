@@ -1,4 +1,4 @@
-"""The law of the mass matrix, and laws to which a multiple of it is added."""
+"""Defines the law of the mass matrix, and laws with a multiple of the mass added."""
 
 from typing import Any
 
@@ -10,10 +10,10 @@ from .form import Form, reaction
 
 
 class Mass(Form):
-    """The law of the mass matrix: int u . v."""
+    """Define the law of the mass matrix: int u . v."""
 
     def tensor(self, x: Array, component: int = 0) -> Array:
-        """Return zero (6, ...): there is no flux."""
+        """Return zero (6, ...), because there is no flux."""
         return np.zeros((6, *x.shape[1:]))
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
@@ -22,7 +22,7 @@ class Mass(Form):
 
 
 class WithMass(Form):
-    """A law plus `factor` times the mass."""
+    """Define a law plus `factor` times the mass."""
 
     def __init__(self, law: Form, factor: float) -> None:
         self.law, self.factor = law, factor
@@ -30,7 +30,7 @@ class WithMass(Form):
 
     @property
     def has_reaction(self) -> bool:
-        """True: the mass is one."""
+        """Return True, because the mass is a reaction."""
         return True
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
@@ -38,7 +38,7 @@ class WithMass(Form):
         return self.law.flux(u, grad, x)
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return the law's reaction and factor u."""
+        """Return the law's reaction plus `factor` times u."""
         return reaction(self.law, u, grad, x) + self.factor * u
 
     def tensor(self, x: Array, component: int = 0) -> Array:
@@ -46,5 +46,5 @@ class WithMass(Form):
         return self.law.tensor(x, component)
 
     def mass(self, x: Array, component: int = 0) -> Array:
-        """Return the law's factor of a component, and the factor."""
+        """Return the law's factor of a component plus `factor`."""
         return self.law.mass(x, component) + self.factor

@@ -1,8 +1,8 @@
-"""Formulas a user types, such as "exp(X+Z)*sin(Y)": parsed by a whitelist, evaluated on arrays and on jets.
+"""Parses formulas that a user types, such as "exp(X+Z)*sin(Y)", by a whitelist, for arrays and for jets.
 
-x, y, z are coordinates in the user's units; X, Y, Z are the same scaled to a body of volume 1 (`frame.UnitFrame`).
-Nothing is ever passed to eval or exec. Python's own parser makes the tree; every node is then checked against the few
-kinds allowed and translated.
+x, y, z are coordinates in the user's units; X, Y, Z are the same scaled to a body of volume 1 (`frame.UnitFrame`). No
+text is ever passed to eval or exec. Python's own parser makes the tree; every node is then compared with the few
+allowed kinds and translated.
 """
 
 import ast
@@ -93,23 +93,23 @@ class Expression:
         object.__setattr__(self, "is_smooth", not translator.chooses)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the text, which is parsed again."""
+        """Return the text for a pickle; the copy parses it again."""
         return Expression, (self.text, self.frame)
 
     @property
     def is_scaled(self) -> bool:
-        """Whether X, Y or Z occurs in the formula."""
+        """Return whether X, Y or Z occurs in the formula."""
         return not self.variables.isdisjoint(SCALED)
 
     @property
     def scaled_text(self) -> str | None:
-        """The formula with X, Y, Z in place of x, y, z; None where none of these occurs."""
+        """Return the formula with X, Y, Z in place of x, y, z; None where x, y, z do not occur."""
         if self.variables.isdisjoint(COORDINATES):
             return None
         return re.sub(r"\b[xyz]\b", lambda match: match.group().upper(), self.text)
 
     def placed(self, frame: UnitFrame) -> "Expression":
-        """Return the same formula with X, Y, Z measured in this frame."""
+        """Return the same formula with X, Y, Z measured in a frame."""
         return replace(self, frame=frame)
 
     def __call__(self, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
@@ -120,7 +120,7 @@ class Expression:
     def jet(self, x: Sequence[Jet]) -> Jet:
         """Return the formula's jet from those of x, y and z.
 
-        Raises ExpressionError where X, Y, Z mean nothing.
+        Raises ExpressionError where X, Y, Z occur without a frame.
         """
         variables = list(x)
         if self.is_scaled:
@@ -144,10 +144,10 @@ def _shorten(text: str, length: int = 40) -> str:
 
 
 class Translator:
-    """Turns a text into nested closures, and refuses every construct that is not on the list.
+    """Translate a text into nested closures, and refuse every construct that is not on the list.
 
     variables: the names of numbers. marks: the names of conditions. used: the names that occur. chooses: whether where,
-    min or max does. Raises ExpressionError, here and in `number` and `condition`, for a refused construct.
+    min or max occurs. Raises ExpressionError, here and in `number` and `condition`, for a refused construct.
     """
 
     def __init__(self, text: str, variables: Sequence[str] = VARIABLES, marks: Sequence[str] = ()) -> None:
@@ -178,11 +178,11 @@ class Translator:
         self.body = tree.body
 
     def number(self) -> Evaluator:
-        """Return the text as a function of the values that gives a number a point."""
+        """Return the text as a function of the values that gives one number a point."""
         return self._node(self.body, 1)
 
     def condition(self) -> Decider:
-        """Return the text as a function of the values that says at which points it holds."""
+        """Return the text as a function of the values that gives the mask of the points where the condition holds."""
         return self._condition(self.body, 1)
 
     def _refuse(self, node: ast.expr, why: str) -> ExpressionError:
@@ -297,12 +297,12 @@ class Translator:
 
 
 def _all_hold(tests: Sequence[Callable[[Any, Any], Any]], sides: Sequence[Any]) -> Any:
-    """Return whether each number stands in its relation to the next, as in 0 < x < 1."""
+    """Return whether each number and the next satisfy the comparison between them, as in 0 < x < 1."""
     return functools.reduce(np.logical_and, [test(*pair) for test, pair in zip(tests, pairwise(sides), strict=True)])
 
 
 def _chosen(condition: Any, a: Jet, b: Jet) -> Jet:
-    """Return a jet where a condition holds and another where it does not."""
+    """Return a jet with the values of `a` where a condition holds, and of `b` elsewhere."""
 
     def entry(one: Any, other: Any) -> Any:
         return np.where(condition, one, other)

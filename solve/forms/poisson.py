@@ -1,4 +1,4 @@
-"""Poisson: the law and the data of -div(kappa grad u) + c u = f."""
+"""Defines Poisson: the law and the data of -div(kappa grad u) + c u = f."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Poisson(LawWithData):
         self._set({**given, "kappa": kappa}, self.neumann, self.robin, on_regions, kappa=count)
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return kappa grad u."""
+        """Return the flux kappa grad u, (1, 3, ...)."""
         if "kappa" not in self.data:
             return grad
         kappa = _coefficient(self.data["kappa"], x)
@@ -109,21 +109,21 @@ class Poisson(LawWithData):
 
     @property
     def reported(self) -> tuple[str, ...]:
-        """The value, and the lengths of gradient and flux, which are one without kappa."""
+        """Return the names of the value and of the lengths of gradient and flux; without kappa, the two are equal."""
         return super().reported if "kappa" in self.data else ("u", "gradient_magnitude")
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return c u."""
+        """Return the reaction c u, (1, ...)."""
         return _coefficient(self.data["reaction"], x)[0] * u if self.has_reaction else 0.0
 
     @property
     def has_reaction(self) -> bool:
-        """Whether there is a term c u."""
+        """Return whether there is a term c u."""
         return "reaction" in self.data
 
     @property
     def not_differentiable(self) -> str:
-        """Why the derivatives of kappa, or the values of c on jets, are unknown; "" where they are known."""
+        """Return why the derivatives of kappa, or the values of c on jets, are unknown; "" where they are known."""
         if "kappa" in self.data and not self.data["kappa"].is_formula:
             return f"kappa is {NOT_SMOOTH}"
         return "reaction is a field" if isinstance(self.reaction, SplineField) else ""
@@ -146,9 +146,9 @@ class Poisson(LawWithData):
 
 
 def _six(kappa: Data | None) -> Data | None:
-    """Return the six entries of a symmetric tensor in place of its nine, or of three rows of three.
+    """Return the six entries of a symmetric tensor from its nine entries, or from three rows of three.
 
-    Raises ValueError for any other number.
+    Raises ValueError for any other number of entries.
     """
     kappa = kappa.tolist() if isinstance(kappa, np.ndarray) else kappa
     if kappa is None or not isinstance(kappa, Sequence) or isinstance(kappa, str):
@@ -170,7 +170,7 @@ def _six(kappa: Data | None) -> Data | None:
 
 
 def _coefficient(datum: Datum, x: Any) -> Any:
-    """Return a coefficient (c, ...) at points, or on jets: there a function's derivatives are not numbers."""
+    """Return a coefficient (c, ...) at points, or on jets; on jets, a function's derivatives are not numbers."""
     if x.dtype != object:
         return datum(x)
     if datum.is_formula:

@@ -1,4 +1,4 @@
-"""Problem: a law of one's own with its data, and the base of laws that are their own problem."""
+"""Defines Problem, a user's own law with its data, and the base class of laws that are their own problem."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from .form import Form
 
 
 class LawWithData(BoundaryValueProblem, Form):
-    """A problem that is its own law; functions as data take three arrays x, y, z."""
+    """State a problem that is its own law; functions as data take three arrays x, y, z."""
 
     of_coordinates = True
 
     @property
     def form(self) -> Form:  # type: ignore[override]
-        """The problem itself."""
+        """Return the problem itself."""
         return self
 
 

@@ -1,4 +1,4 @@
-"""Region: a part of the solid's boundary, named by a condition on position and outward normal."""
+"""Defines Region: a part of the solid's boundary, named by a condition on position and outward normal."""
 
 from __future__ import annotations
 
@@ -28,20 +28,23 @@ Mask = NDArray[np.bool_]
 
 
 class Part(Protocol):
-    """The surface mesh of a part, as regions ask it."""
+    """Describe the surface mesh of a part, as regions need it."""
 
     @property
     def normals(self) -> Array:
-        """The outward unit normals (m, 3) of the triangles."""
+        """Return the outward unit normals (m, 3) of the triangles."""
 
     def group(self, name: str) -> IntArray:
-        """Return the triangles (k,) of a group of the mesh. Raises ValueError for a name that there is not."""
+        """Return the triangles (k,) of a group of the mesh. Raises ValueError for a name of no group."""
 
     def nearest(self, points: Array, normals: Array | None = None) -> IntArray:
-        """Return the triangle (m,) nearest to each point (m, 3); of equally near ones that of the likest normal."""
+        """Return the triangle (m,) nearest to each point (m, 3).
+
+        Of triangles at the same distance, the one whose normal is closest to the given normal is chosen.
+        """
 
     def flood(self, triangle: int, angle: float) -> IntArray:
-        """Return the triangles (k,) reached from one across edges that bend by less than an angle in degrees."""
+        """Return the triangles (k,) reached from a triangle across edges that bend by less than an angle in degrees."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ class Region:
             object.__setattr__(self, name, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the text, which is parsed again."""
+        """Return the text for a pickle; the copy parses it again."""
         return Region, (self.text, self.surface, self.frame)
 
     def __str__(self) -> str:
@@ -126,39 +129,39 @@ class Region:
 
     @property
     def is_scaled(self) -> bool:
-        """Whether X, Y or Z occurs in the condition."""
+        """Return whether X, Y or Z occurs in the condition."""
         return not self._used.isdisjoint(SCALED)
 
     @cached_property
     def faces(self) -> tuple[str, ...]:
-        """The names of the cube's faces that make up the region; none where anything else stands in its text."""
+        """Return the names of the cube's faces that make up the region; empty where the text contains anything else."""
         words = re.split(r"\s+or\s+", self.text.strip())
         return tuple(words) if all(word in FACE_NAMES for word in words) else ()
 
     def placed(self, frame: UnitFrame | None = None, surface: Part | None = None) -> Region:
-        """Return the same region with X, Y, Z measured in a frame, and on a surface where it has none."""
+        """Return the same region with X, Y, Z measured in a frame, and with a surface where it has none."""
         return replace(self, frame=frame or self.frame, surface=self.surface or surface)
 
     @property
     def needs_cube(self) -> bool:
-        """Whether a face of the cube occurs in the condition."""
+        """Return whether a face of the cube occurs in the condition."""
         return not self._used.isdisjoint(FACE_NAMES)
 
     @property
     def needs_surface(self) -> bool:
-        """Whether a group or a face of the part occurs in the condition."""
+        """Return whether a group or a face of the part occurs in the condition."""
         return bool(self._of_part)
 
     @property
     def _of_part(self) -> list[str]:
-        """The marks that are groups or faces of the part."""
+        """Return the marks that are groups or faces of the part."""
         return [f"_mark{i}" for i, entry in enumerate(self._marks) if entry.startswith(("group ", "face "))]
 
     def holds(self, x: Array, normal: Array, face: str = "") -> Mask:
-        """Return at which of the points (3, ...) with outward unit normals (3, ...) the condition holds, (...).
+        """Return the mask (...) of the points (3, ...) with outward unit normals (3, ...) where the condition holds.
 
-        face: the cube's face on whose image they lie, if any.
-        Raises ExpressionError where X, Y, Z mean nothing, ValueError where the surface lacks a face or group.
+        face: the cube's face on whose image the points lie, if any. Raises ExpressionError where X, Y, Z occur without
+        a frame, ValueError where the surface lacks a face or group.
         """
         x, normal = np.asarray(x), np.asarray(normal)
         jets = [Jet(row, (), ()) for row in x]
@@ -177,7 +180,10 @@ class Region:
             return np.broadcast_to(np.asarray(self._decide(values), dtype=bool), shape)
 
     def _marked(self, entry: str, x: Array, nearest: IntArray | None) -> Mask:
-        """Return at which points, with nearest triangles of the part (...), a box, a group or a face of it lies."""
+        """Return the mask (...) of the points that lie in a box, a group or a face of the part.
+
+        nearest: (...), the nearest triangle of the part for each point.
+        """
         kind, argument = entry.split(" ", 1)
         if kind == "box":
             low, high = np.sort(np.reshape(_numbers(argument), (2, 3)), axis=0)
@@ -229,7 +235,7 @@ def _check_mark(entry: str) -> None:
 
 
 def _readable(message: str, marks: Sequence[str]) -> str:
-    """Return a message with the user's words in place of the marks."""
+    """Return a message with the user's text in place of the marks."""
     for i in range(len(marks) - 1, len(FACE_NAMES) - 1, -1):
         kind, argument = marks[i].split(" ", 1)
         shown = f"group:{argument}" if kind == "group" else f"{kind}({argument})"

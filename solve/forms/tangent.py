@@ -1,4 +1,4 @@
-"""The derivative of a law that need not be linear, by jets: exact, as the law is written."""
+"""Computes the derivative of a law that need not be linear, by jets: exactly, from the law as it is written."""
 
 from typing import Any
 
@@ -15,8 +15,8 @@ SEEDS = 3  # directions in which a jet carries derivatives
 def derivative(form: Form, u: Array, grad: Array, x: Array) -> Array:
     """Return the derivative (c, 4, c, 4, ...) of a law at u (c, ...), grad (c, 3, ...) and points x (3, ...).
 
-    Of the two axes of four, the first entry belongs to reaction and u, the other three to flux and gradient.
-    Raises ValueError where the law does not run on jets, or returns another shape.
+    In each axis of length four, the first entry belongs to the reaction or u, the other three to the flux or the
+    gradient. Raises ValueError where the law does not accept jets, or returns another shape.
     """
     c, shape = len(u), u.shape[1:]
     values = [entry for i in range(c) for entry in (u[i], *grad[i])]  # 4 c of them
@@ -33,13 +33,13 @@ def derivative(form: Form, u: Array, grad: Array, x: Array) -> Array:
 
 
 def _seeded(values: list[Array], first: int) -> list[Jet]:
-    """Return the values as jets; those from `first` on are the variables of which derivatives are carried."""
+    """Return the values as jets; the jets from number `first` on are the variables of the derivatives."""
     none = (0.0,) * SEEDS
     return [Jet(value, UNITS[i - first] if first <= i < first + SEEDS else none, ()) for i, value in enumerate(values)]
 
 
 def _law_on_jets(form: Form, jets: list[Jet], x: Any) -> list[list[Number | Jet]]:
-    """Return for each component the reaction and the three entries of the flux. Raises ValueError as `derivative`."""
+    """Return for each component the reaction and the three entries of the flux; errors are as in `derivative`."""
     c = len(jets) // 4
     table = as_objects(jets, (c, 4))
     u, grad = table[:, 0], table[:, 1:]

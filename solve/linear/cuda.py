@@ -1,8 +1,8 @@
-"""The linear solve on torch tensors, on a GPU or, for tests, on the CPU: operator, preconditioner and iteration.
+"""Solves the linear system on torch tensors, on a GPU or, for tests, on the CPU: operator, preconditioner, iteration.
 
-Where a CPU gains from knowing that few functions are nonzero at a point, a GPU gains from large matrix products: the
-bases of directions v and w are dense matrices here, direction u goes layer by layer. Everything is double precision.
-Geometry factors and load come from `operator.assemble` on the CPU.
+A CPU profits from the fact that few functions are nonzero at a point; a GPU profits from large matrix products: here
+the bases of directions v and w are dense matrices, and direction u is processed layer by layer. All numbers are in
+double precision. Geometry factors and load come from `operator.assemble` on the CPU.
 """
 
 from dataclasses import replace
@@ -22,7 +22,7 @@ LAYER_BYTES = 2**28  # of one field on a layer of points of u
 
 
 def check_available(device: str) -> None:
-    """Raise ValueError where torch has no such device here."""
+    """Raise ValueError where torch has no such device on this machine."""
     if device.startswith("cuda") and not torch.cuda.is_available():
         raise ValueError(f"device {device!r}: torch finds no CUDA GPU here; use device='cpu'")
 
@@ -36,7 +36,7 @@ def solve_on_device(
     device: str,
     start: Array | None = None,
 ) -> LinearResult:
-    """As `conjugate_gradients` for an operator's free coefficients, on a torch device."""
+    """Return the result of `conjugate_gradients` for an operator's free coefficients, computed on a torch device."""
     b, first = (None if x is None else torch.as_tensor(np.ascontiguousarray(x), device=device) for x in (right, start))
     inverse = device_preconditioner(preconditioner, device)
     found = conjugate_gradients(
@@ -46,7 +46,7 @@ def solve_on_device(
 
 
 class DeviceOperator:
-    """The operator with its factors as a tensor on a device."""
+    """Apply the operator with its factors as a tensor on a device."""
 
     def __init__(self, operator: Operator, device: str) -> None:
         self._window, self._shape = operator.space.window, operator.space.shape
@@ -64,7 +64,7 @@ class DeviceOperator:
         ]
 
     def apply_free(self, free: Tensor) -> Tensor:
-        """The product restricted to the free coefficients, a tensor of their shape."""
+        """Return the product restricted to the free coefficients, a tensor of their shape."""
         full = free.new_zeros(self._shape)
         full[self._window] = free
         result = torch.zeros_like(full)
@@ -73,7 +73,7 @@ class DeviceOperator:
         return result[self._window]
 
     def _add_layer(self, x: Tensor, points: slice, functions: slice, result: Tensor) -> None:
-        """Add the part of some points of u, which see the given functions of u."""
+        """Add the part of some points of u, at which the given functions of u are not zero, to the product."""
         (b_v, d_v), (b_w, d_w) = self._v, self._w
         b_u, d_u = (matrix[points, functions] for matrix in self._u)
         planes, planes_u = (torch.tensordot(matrix, x[functions], 1) for matrix in (b_u, d_u))  # (q, n_v, n_w)
@@ -91,7 +91,7 @@ class DeviceOperator:
 
 
 def device_preconditioner(preconditioner: FastDiagonalization, device: str) -> FastDiagonalization:
-    """Return fast diagonalization on a device, of tensors."""
+    """Return fast diagonalization with tensors on a device."""
     arrays = (*preconditioner.vectors, preconditioner.inverse, preconditioner.scaling)
     u, v, w, inverse, scaling = (torch.as_tensor(part, device=device) for part in arrays)
     return _OnDevice(preconditioner.space, (u, v, w), inverse, scaling, preconditioner.singular)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""SciPy's GMRES with the history of its residuals, as `conjugate_gradients` has it."""
+"""Solves by SciPy's GMRES, with the history of its residuals as in `conjugate_gradients`."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ RESTART = 60  # iterations of GMRES between restarts: as many vectors are kept
 
 
 class _Breakdown(ArithmeticError):
-    """A product whose numbers are not finite; the message says whose."""
+    """Raised where the numbers of a product are not finite; the message names the product."""
 
 
 def generalized_residuals(
@@ -23,9 +23,9 @@ def generalized_residuals(
     max_iterations: int = 1000,
     start: Array | None = None,
 ) -> LinearResult:
-    """Solve A x = b, not symmetric, by GMRES; arguments as in `conjugate_gradients`.
+    """Return the solution of A x = b, A not symmetric, by GMRES; arguments and result as in `conjugate_gradients`.
 
-    The preconditioner P stands on the right, A P y = b - A x with x + P y the answer: residuals are those of A.
+    The preconditioner P is applied on the right, A P y = b - A x with the solution x + P y: residuals are those of A.
     """
     norm = float(np.linalg.norm(b))
     if norm == 0.0:
@@ -65,7 +65,7 @@ def generalized_residuals(
 
 
 def _finite(x: Array, fault: str) -> Array:
-    """Return x. Raises _Breakdown where its numbers are not finite."""
+    """Return x. Raises _Breakdown with the message `fault` where its numbers are not finite."""
     if not np.isfinite(x).all():
         raise _Breakdown(fault)
     return x

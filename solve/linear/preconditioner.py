@@ -1,7 +1,7 @@
-"""Fast diagonalization: the exact inverse of a Laplacian with separable coefficients, as preconditioner.
+"""Preconditions by fast diagonalization: the exact inverse of a Laplacian with separable coefficients.
 
-Sangalli, Tani, SIAM J. Sci. Comput. 38 (2016), for constant coefficients; docs/solver.md says how real maps, a reaction
-and Robin's conditions enter.
+Sangalli, Tani, SIAM J. Sci. Comput. 38 (2016), for constant coefficients; docs/solver.md explains how real maps, a
+reaction and Robin's conditions are included.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ COLUMNS, LAYERS = 4096, 8  # in a piece of work
 
 @dataclass(frozen=True, eq=False)
 class FastDiagonalization:
-    """Applies D (U (x) U (x) U) L^-1 (U (x) U (x) U)^T D to residuals of the free coefficients.
+    """Apply D (U (x) U (x) U) L^-1 (U (x) U (x) U)^T D to residuals of the free coefficients.
 
     vectors: per direction (n, n), generalized eigenvectors in columns. inverse, scaling: (n_u, n_v, n_w), the diagonals
-    L^-1 and D. singular: constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin face), and
-    the preconditioner keeps to their orthogonal complement. local: of a sheared map, what is added (`shear`).
-    weakness: the part that had to be left out, a sentence of the report; "" for none.
-    Of a slab `inverse` has the columns that `space.to_columns` gives, everything else its own rows.
+    L^-1 and D. singular: whether constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin
+    face); the preconditioner then stays in their orthogonal complement. local: the part that is added for a sheared map
+    (`shear`). weakness: the part that had to be left out, as a sentence for the report; "" for none. For a slab,
+    `inverse` has the columns that `space.to_columns` gives, and all other arrays have the slab's own rows.
     """
 
     space: TrialSpace
@@ -71,18 +71,18 @@ class FastDiagonalization:
     def _to_columns(
         self, u: Array, v: Array, w: Array, x: Array, before: Array | None = None, after: Array | None = None
     ) -> Array:
-        """Apply three small matrices along the three axes of own rows x, and return columns.
+        """Return columns: three small matrices applied along the three axes of own rows x.
 
         before, after: diagonals that are applied first, in rows, and last, in columns.
         """
         return self._along_u(u, self.space.to_columns(self._across(v, w, x, before=before)), after)
 
     def _to_rows(self, u: Array, v: Array, w: Array, x: Array, after: Array | None = None) -> Array:
-        """Apply three small matrices along the three axes of columns x, then a diagonal, and return own rows."""
+        """Return own rows: three small matrices applied along the three axes of columns x, and then a diagonal."""
         return self._across(v, w, self.space.to_rows(self._along_u(u, x)), after=after)
 
     def _along_u(self, u: Array, x: Array, after: Array | None = None) -> Array:
-        """Return x, a matrix applied along the first axis, then a diagonal."""
+        """Return x after a matrix along the first axis, and then a diagonal."""
         result = np.empty_like(x)
         columns, rows = x.reshape(len(x), -1), result.reshape(len(x), -1)
         factors = None if after is None else after.reshape(len(x), -1)
@@ -97,7 +97,7 @@ class FastDiagonalization:
         return result
 
     def _across(self, v: Array, w: Array, x: Array, before: Array | None = None, after: Array | None = None) -> Array:
-        """Return x, a diagonal applied, two matrices along the other axes, and another diagonal."""
+        """Return x after a diagonal, two matrices along the second and third axis, and another diagonal."""
         result = np.empty_like(x)
 
         def multiply(start: int) -> None:
@@ -112,10 +112,10 @@ class FastDiagonalization:
 
 
 def fast_diagonalization(operator: Operator) -> FastDiagonalization:
-    """Build the preconditioner of an operator restricted to its free coefficients.
+    """Return the preconditioner of an operator restricted to its free coefficients.
 
-    Where the local part does not give finite numbers it is left out, and where nothing does, the diagonal is taken.
-    All processes that share the space call it.
+    Where the local part does not give finite numbers it is left out; where no part does, the inverse of the diagonal is
+    returned. All processes that share the space call this function.
     """
     with np.errstate(all="ignore"):  # it is looked at afterwards
         found = _without_local(operator)
@@ -128,13 +128,13 @@ def fast_diagonalization(operator: Operator) -> FastDiagonalization:
 
 
 def _is_usable(preconditioner: FastDiagonalization) -> bool:
-    """Whether a residual without pattern gives finite numbers."""
+    """Return whether the preconditioner gives finite numbers for a residual without a pattern."""
     residual = np.random.default_rng(0).uniform(-1.0, 1.0, preconditioner.scaling.shape)
     return all(preconditioner.space.shared(bool(np.isfinite(preconditioner(residual)).all())))
 
 
 def _without_local(operator: Operator) -> FastDiagonalization:
-    """Return fast diagonalization alone; its numbers are not finite where the coefficients are too extreme."""
+    """Return fast diagonalization without a local part; its numbers are not finite for extreme coefficients."""
     space = operator.space
     here = {name: face.stiffness(operator.component) for name, face in operator.faces.items()}
     stiff = {name: float(space.total(here.get(name, 0.0))) for name in FACE_NAMES}
@@ -152,7 +152,7 @@ def _without_local(operator: Operator) -> FastDiagonalization:
 
 
 def _eigh(slope: Array, mass: Array) -> tuple[Array, Array]:
-    """Return generalized eigenvalues and eigenvectors; NaN where there are none in double precision."""
+    """Return generalized eigenvalues and eigenvectors; NaN where double precision does not suffice."""
     try:
         values, vectors = eigh(slope, mass)
     except (np.linalg.LinAlgError, ValueError):  # a mass that is not positive, or numbers that are not finite
@@ -161,7 +161,7 @@ def _eigh(slope: Array, mass: Array) -> tuple[Array, Array]:
 
 
 def _of_the_diagonal(operator: Operator, singular: bool) -> FastDiagonalization:
-    """Return the inverse of the operator's diagonal, as an instance whose eigenvectors are unit vectors."""
+    """Return the inverse of the operator's diagonal as a FastDiagonalization, whose eigenvectors are unit vectors."""
     space = operator.space
     u, v, w = (np.eye(free.stop - free.start) for free in space.free)
     spectrum = np.ones((len(u), space.columns.stop - space.columns.start, len(w)))
@@ -174,8 +174,8 @@ def _directional_matrices(
 ) -> tuple[list[Array], list[Array], list[float]]:
     """Return per direction the stiffness matrix K_d and the mass matrix M_d on the free coefficients, and M_d's mean.
 
-    The mean is that of the weight b_d over the direction's parameter. stiff: of each face, the average over its
-    parameters of the factor of u v, Robin's or Nitsche's, times the surface element.
+    The mean is that of the weight b_d over the direction's parameter. stiff: by face, the average over its parameters
+    of the factor of u v, from Robin's or Nitsche's terms, times the surface element.
     """
     along, across = _separable_coefficients(operator)
     averages = [float(w @ b) for w, b in zip(operator.rule.weights, across, strict=True)]
@@ -193,7 +193,7 @@ def _directional_matrices(
 
 
 def _diagonal(space: TrialSpace, slopes: list[Array], masses: list[Array], reaction: float) -> Array:
-    """Return the diagonal of P on the own free coefficients."""
+    """Return the diagonal of the preconditioner's separable matrix P on the own free coefficients."""
     place = space.place, slice(None), slice(None)
     stiff, mass = (
         [np.diag(matrix)[own] for matrix, own in zip(matrices, place, strict=True)] for matrices in (slopes, masses)
@@ -204,9 +204,9 @@ def _diagonal(space: TrialSpace, slopes: list[Array], masses: list[Array], react
 
 
 def _scaling(operator: Operator, diagonal: Array | float) -> Array:
-    """Return the square root of a diagonal over that of the operator, on the own free coefficients.
+    """Return the square root of a diagonal over the operator's diagonal, on the own free coefficients.
 
-    It is zero where the operator's is, which the law does not reach, so that nothing is sought there.
+    It is zero where the operator's diagonal is zero, because the law does not act on these coefficients.
     """
     found = operator.diagonal()
     operator.space.add(found)
@@ -216,11 +216,11 @@ def _scaling(operator: Operator, diagonal: Array | float) -> Array:
 
 
 def _separable_coefficients(operator: Operator) -> tuple[list[Array], list[Array]]:
-    """Return the weights a_d and b_d at the Gauss points of each direction: two lists of (q_d,).
+    """Return the weights a_d and b_d at the Gauss points of each direction: two lists of arrays (q_d,).
 
     G_dd is close to a_d of its own parameter times b_e and b_f of the two others, in the sense of least squares of
-    logarithms. There the fit is additive, and its terms are averages of log G_dd over planes. One point a span, the
-    middle one, stands for the span.
+    logarithms. For logarithms the fit is additive, and its terms are averages of log G_dd over planes. One point a
+    span, the middle one, represents the span.
     """
     starts = [np.unique(first, return_index=True)[1] for first, _, _ in operator.tables]  # of the spans
     counts = [np.diff(s, append=q) for s, q in zip(starts, operator.rule.shape, strict=True)]  # points per span

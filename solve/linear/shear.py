@@ -1,12 +1,12 @@
-"""The local part of the preconditioner, for maps whose parameter lines meet at small angles.
+"""Computes the local part of the preconditioner, for maps whose parameter lines meet at small angles.
 
-Fast diagonalization knows G's diagonal alone. Where the map shears cubes flat, what it leaves are errors that oscillate
-across the shear, many and local. Trilinear elements on the Greville points see the whole of G, and their values
+Fast diagonalization uses the diagonal of G only. Where the map shears cubes flat, the errors that it leaves oscillate
+across the shear, and are many and local. Trilinear elements on the Greville points use the whole of G, and their values
 correspond to spline coefficients by collocation, uniformly in the mesh width: an incomplete Cholesky factorization of
 their stiffness matrix without fill (Meijerink, van der Vorst, Math. Comp. 31 (1977)) reduces these errors.
 
 Without fill a pivot may vanish, or fall below zero, although the matrix is positive definite. The diagonal then grows
-by a share, the least of SHIFTS for which no pivot does so (Manteuffel, Math. Comp. 34 (1980)).
+by a share, the least of SHIFTS for which all pivots are positive (Manteuffel, Math. Comp. 34 (1980)).
 """
 
 from dataclasses import dataclass
@@ -31,11 +31,11 @@ HIGHEST = 3  # degree: of degree 4 the iterations saved just pay for the factors
 
 @dataclass(frozen=True, eq=False)
 class IncompleteCholesky:
-    """Solves L L^T x = r on the nodes of a grid.
+    """Solve L L^T x = r on the nodes of a grid.
 
-    factor: (nodes, 14), L at the nodes of OFFSETS, the inverse of its diagonal last. steps: (14,), what OFFSETS add to
-    the number of a node. inverses: per direction (n, n), from values at the free nodes to coefficients.
-    Of a slab the nodes are those of its own rows; processes work one after another, and pass on a row.
+    factor: (nodes, 14), L at the nodes of OFFSETS, and the inverse of its diagonal last. steps: (14,), the differences
+    of node numbers for OFFSETS. inverses: per direction (n, n), from values at the free nodes to coefficients. For a
+    slab the nodes are those of its own rows; processes work one after another, and pass on a row.
     """
 
     space: TrialSpace
@@ -44,7 +44,7 @@ class IncompleteCholesky:
     inverses: tuple[Array, Array, Array]
 
     def __call__(self, values: Array) -> Array:
-        """Return x for values r, arrays of any shape with as many entries as nodes."""
+        """Return x for values r; both are arrays of any shape with one entry a node."""
         reach, row = -self.steps[0], -self.steps[4]
         padded = np.pad(values.ravel(), reach)
         before, last = padded[reach - row : reach], padded[-reach - row : -reach]
@@ -61,9 +61,9 @@ class IncompleteCholesky:
 
 
 def helps(operator: Operator) -> bool:
-    """Whether degrees are low and the map is flat in enough places.
+    """Return whether the degrees are low and the map is flat in enough places.
 
-    There G, scaled to ones on its diagonal, has a small determinant.
+    At such places G, scaled to ones on its diagonal, has a small determinant.
     """
     if max(operator.space.degrees) > HIGHEST:
         return False
@@ -78,13 +78,13 @@ def helps(operator: Operator) -> bool:
 
 
 def _place(space: TrialSpace, count: int) -> tuple[int, int]:
-    """Return where those of this process begin among what all processes count, and the number of all."""
+    """Return the first number of this process where all processes count together, and the total count."""
     counts = space.shared(count)
     return sum(counts[: space.rank]), sum(counts)
 
 
 def incomplete_cholesky(operator: Operator) -> IncompleteCholesky | None:
-    """Return the factorization that belongs to an operator's free coefficients; None where no shift lets it succeed."""
+    """Return the factorization for an operator's free coefficients; None where it fails for every shift."""
     space = operator.space
     for shift in SHIFTS:
         found = _factor(operator, shift)
@@ -99,7 +99,7 @@ def incomplete_cholesky(operator: Operator) -> IncompleteCholesky | None:
 def _factor(operator: Operator, shift: float) -> tuple[Array, IntArray] | None:
     """Return `factor` and `steps` of an IncompleteCholesky; None where a pivot of any process is too small.
 
-    Processes work one after another, also behind one that has failed, whose result is dropped with theirs.
+    Processes work one after another. Processes after one that has failed work too, and all results are dropped.
     """
     space, factor = operator.space, _stencils(operator)
     strides = np.array([factor.shape[1] * factor.shape[2], factor.shape[2], 1])
@@ -113,7 +113,7 @@ def _factor(operator: Operator, shift: float) -> tuple[Array, IntArray] | None:
 
 
 def _places() -> IntArray:
-    """Return, (13, 13), which of OFFSETS leads to the neighbour of a neighbour; -1 where none does."""
+    """Return the numbers (13, 13) of the OFFSETS that lead to the neighbour of a neighbour; -1 where no offset does."""
     sums = OFFSETS[:-1, None] + OFFSETS[:-1]
     return np.where(np.abs(sums).max(axis=-1) > 1, -1, (sums + 1) @ (9, 3, 1))
 
@@ -121,7 +121,7 @@ def _places() -> IntArray:
 def _stencils(operator: Operator) -> Array:
     """Return the lower half of the elements' stiffness matrix on the free nodes, (n_u, n_v, n_w, 14).
 
-    G of a cell is that of the quadrature point nearest to its middle. Terms on faces are lumped.
+    G of a cell is that of the quadrature point nearest to its midpoint. Terms on faces are lumped.
     """
     space, widths, picks = operator.space, *_nearest_points(operator)
     start, _ = _place(space, operator.rule.shape[0])
@@ -153,9 +153,9 @@ def _stencils(operator: Operator) -> Array:
 
 
 def _nearest_points(operator: Operator) -> tuple[list[Array], list[IntArray]]:
-    """Return the widths of the cells of each direction, and the points nearest to their middles.
+    """Return the widths of the cells of each direction, and the quadrature points nearest to their midpoints.
 
-    Points are those at which the functions of both ends are not zero; in u they count those of all processes.
+    Only points where the functions of both ends are not zero are used; in u, points are numbered over all processes.
     """
     space, widths, picks = operator.space, [], []
     for axis, (knots, degree) in enumerate(zip(space.whole.knots, space.degrees, strict=True)):
@@ -171,7 +171,7 @@ def _nearest_points(operator: Operator) -> tuple[list[Array], list[IntArray]]:
 
 
 def _reference() -> Array:
-    """Return the element matrices (6, 8, 8) on the unit cube that belong to the six entries of G."""
+    """Return the element matrices (6, 8, 8) on the unit cube for the six entries of G."""
     mass, jump = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0, np.array([[1.0, -1.0], [-1.0, 1.0]])
     mixed = np.array([[-0.5, -0.5], [0.5, 0.5]])  # row: the function that is differentiated
     matrices = []
@@ -185,9 +185,9 @@ def _reference() -> Array:
 
 @compiled
 def _factorize(lower: Array, start: int, steps: IntArray, places: IntArray, shift: float) -> bool:
-    """Overwrite a lower half, its diagonal grown by a share, from the node `start` on by its incomplete factor.
+    """Overwrite a lower half, with its diagonal increased by a share, by its incomplete factor, from node `start` on.
 
-    Returns False at the first pivot that is less than PIVOT of its diagonal entry, and leaves the rest as it was.
+    Returns False at the first pivot that is less than PIVOT of its diagonal entry, and leaves the rest unchanged.
     """
     for i in range(start, len(lower)):
         row = lower[i]
@@ -208,9 +208,9 @@ def _factorize(lower: Array, start: int, steps: IntArray, places: IntArray, shif
 
 @compiled
 def _forward(lower: Array, steps: IntArray, x: Array) -> None:
-    """Overwrite r by y, L y = r; zeros before and after them stand for the neighbours that nodes at the ends lack.
+    """Overwrite r by y, L y = r; zeros before and after r replace the neighbours that nodes at the ends do not have.
 
-    With one free node across, some of OFFSETS lead to a later node, past the last one too.
+    With one free node across, some of OFFSETS lead to a later node, or past the last node.
     """
     reach = -steps[0]
     for i in range(len(lower)):
@@ -222,7 +222,7 @@ def _forward(lower: Array, steps: IntArray, x: Array) -> None:
 
 @compiled
 def _backward(lower: Array, steps: IntArray, x: Array) -> None:
-    """Overwrite y by x, L^T x = y, with what neighbours before the first node get from them in their places."""
+    """Overwrite y by x, L^T x = y; entries before the first node receive the parts of neighbours that do not exist."""
     reach = -steps[0]
     for i in range(len(lower) - 1, -1, -1):
         value = x[reach + i] * lower[i, 13]
