@@ -7,7 +7,7 @@ from .starts.extension import EXTENSION
 from .starts.growth import GROWTH, LAST, STIFF
 from .starts.network import NETWORK
 from .starts.start import Start, Task
-from .starts.tried import Tried, best_of
+from .starts.tried import Tried
 
 _log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ def attempts(task: Task, checkpoints: Checkpoints) -> tuple[Tried, ...]:
     tried: tuple[Tried, ...] = ()
     while len(tried) < task.most_starts and (start := next_start(tried)) is not None:
         if tried:
-            _tell(tried, start)
+            _tell(tried[-1], start)
         before = dict(task.seconds)
         attempt = start.make(task, checkpoints.of_part(len(tried)) if tried else checkpoints)
         spent = {step: seconds - before.get(step, 0.0) for step, seconds in task.seconds.items()}
@@ -42,11 +42,7 @@ def attempts(task: Task, checkpoints: Checkpoints) -> tuple[Tried, ...]:
     return tried
 
 
-def _tell(tried: tuple[Tried, ...], start: Start) -> None:
-    """Log why another start follows."""
-    if (best := best_of(tried)) is None:
-        _log.info("the shape is hard for the network: %s instead", start.doing)
-        return
-    found = best[1].found
-    fault = "the boundary meets itself" if found.meets_itself else "not certified"
-    _log.warning("%s; %s instead", fault if any(found.faults) else "far from the surface", start.doing)
+def _tell(last: Tried, start: Start) -> None:
+    """Log the fault of the last start, and the start that follows it."""
+    level = logging.INFO if last.attempt is None else logging.WARNING
+    _log.log(level, "%s: %s; %s instead", last.start.name, last.fault, start.doing)

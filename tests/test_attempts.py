@@ -26,7 +26,7 @@ def tried(start, unproved=0, *, meets=False, distance=NEAR):
     return Tried(start, Attempt(found, Course({}, {}, Reason.STALLED), fit, None), {})
 
 
-HARD = Tried(NETWORK, None, {})
+HARD = Tried(NETWORK, None, {"train": 1.0})
 FOLDED, CROSSED = tried(NETWORK, 3), tried(NETWORK, meets=True)
 
 

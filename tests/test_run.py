@@ -214,7 +214,7 @@ def few_shares(monkeypatch):
 def test_a_shape_that_is_hard_to_train_is_grown_after_the_first_stage(surface, undisturbed, caplog):
     with caplog.at_level(logging.INFO, "parameterize"):
         result = parameterize(surface, hard_config(), seed=3, device="cpu")
-    assert "hard for the network: growing a map from a cube instead" in caplog.text
+    assert "network: hard for the network; growing a map from a cube instead" in caplog.text
     stages = result.history["stage"]
     assert [(stages == stage.name).sum() for stage in tiny_config().stages] == [STEPS[0], 0, 0, 0, 0]
     assert not np.array_equal(result.volume.control_points, undisturbed.volume.control_points)
@@ -232,6 +232,7 @@ def test_where_every_shape_counts_as_hard_nothing_is_trained(surface):
     result = parameterize(surface, hard_config(easy_loss=0.0), seed=3, device="cpu")
     assert set(result.history["stage"]) == {"spline"}
     assert "train" not in result.seconds and result.origin == "growth"
+    assert [attempt.ending for attempt in result.attempts][0] == "not trained"
 
 
 def test_a_hard_shape_with_given_corners_is_trained_to_the_end_which_the_log_says(surface, caplog):

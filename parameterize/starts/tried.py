@@ -48,12 +48,22 @@ class Tried:
     attempt: Attempt | None
     seconds: dict[str, float]
 
+    @property
+    def fault(self) -> str:
+        """Return why another start follows, in words for the log and for report.json."""
+        if self.attempt is None:
+            return "hard for the network" if "train" in self.seconds else "not trained"
+        found = self.attempt.found
+        if not any(found.faults):
+            return "far from the surface"
+        return "the boundary meets itself" if found.meets_itself else "not certified"
+
     def report(self) -> AttemptReport:
         """Return the report of the start, for the result and for report.json."""
         seconds = {step: spent for step, spent in self.seconds.items() if step in ("train", "fit") and spent > 0.0}
         start = self.start.name, self.start.origin
         if self.attempt is None:
-            return AttemptReport(*start, "hard for the network", {}, seconds)
+            return AttemptReport(*start, self.fault, {}, seconds)
         found, course = self.attempt.found, self.attempt.course
         rounds, seconds = dict(course.rounds), seconds | course.seconds
         return AttemptReport(*start, str(course.ending), rounds, seconds, *found.faults, self.attempt.distance)
