@@ -1,0 +1,96 @@
+"""Defines Interface: two faces of patches that are one surface, and finds it from the control points of the faces."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ..arrays import Floats
+from .volume import FACE_NAMES, BSplineVolume
+
+KNOT_TOLERANCE = 1e-9  # of the interval [0, 1]: files give knots in decimals, and reversed ones are rounded
+
+Face = tuple[int, str]  # the number of a patch, and the name of one of its faces
+
+
+@dataclass(frozen=True)
+class Interface:
+    """Two faces of patches that are one surface, with the same trace.
+
+    A face has two directions, in the order u, v, w. An array of the second face, such as its control points, lies on
+    that of the first after its two axes have been exchanged (`swapped`) and then reversed (`flipped`).
+
+    Attributes
+    ----------
+    first, second : (int, str)
+        The number of the patch and the name of its face. A patch may be glued to itself.
+    swapped : bool
+        Whether the first direction of the one face is the second direction of the other.
+    flipped : two bool
+        Whether the two faces run in opposite ways along the first and the second direction of the first face.
+    """
+
+    first: Face
+    second: Face
+    swapped: bool = False
+    flipped: tuple[bool, bool] = (False, False)
+
+    def __str__(self) -> str:
+        return f"{face_label(*self.first)} = {face_label(*self.second)}"
+
+    def turned(self, second: Floats) -> Floats:
+        """Return an array (m_a, m_b, ...) of the second face in the order of the first."""
+        array = second.swapaxes(0, 1) if self.swapped else second
+        steps = (slice(None, None, -1 if flip else 1) for flip in self.flipped)
+        return array[tuple(steps)]
+
+
+def face_label(patch: int, face: str) -> str:
+    """Return the name of a patch's face, such as "p2_u0"."""
+    return f"p{patch}_{face}"
+
+
+def axis_side(face: str) -> tuple[int, int]:
+    """Return the constant direction of a face, and its value there, 0 or 1."""
+    return divmod(FACE_NAMES.index(face), 2)
+
+
+def varying(face: str) -> tuple[int, int]:
+    """Return the two directions along a face, in ascending order."""
+    a, b = (axis for axis in range(3) if axis != axis_side(face)[0])
+    return a, b
+
+
+def face_layer(array: Floats, face: str) -> Floats:
+    """Return the layer (m_a, m_b, ...) of an array (n_u, n_v, n_w, ...) of a patch that belongs to a face."""
+    axis, side = axis_side(face)
+    return np.take(array, -1 if side else 0, axis=axis)
+
+
+def orientations(first: Face, second: Face) -> Iterator[Interface]:
+    """Yield the eight ways in which two faces may lie on each other."""
+    for swapped, a, b in product((False, True), repeat=3):
+        yield Interface(first, second, swapped, (a, b))
+
+
+def knots_agree(patches: Sequence[BSplineVolume], interface: Interface) -> bool:
+    """Return whether degrees and knots along the two faces of an interface are the same, up to KNOT_TOLERANCE."""
+    (p, face_p), (q, face_q) = interface.first, interface.second
+    axes_q = varying(face_q)[::-1] if interface.swapped else varying(face_q)
+    for axis_p, axis_q, flip in zip(varying(face_p), axes_q, interface.flipped, strict=True):
+        row, other = patches[p].knots[axis_p], patches[q].knots[axis_q]
+        if patches[p].degrees[axis_p] != patches[q].degrees[axis_q] or len(row) != len(other):
+            return False
+        if np.abs(row - (1.0 - other[::-1] if flip else other)).max() > KNOT_TOLERANCE:
+            return False
+    return True
+
+
+def gap(patches: Sequence[BSplineVolume], interface: Interface) -> float:
+    """Return the largest distance of two control points of an interface that should be one; infinite for other nets."""
+    first, second = (face_layer(patches[p].control_points, face) for p, face in (interface.first, interface.second))
+    second = interface.turned(second)
+    if first.shape != second.shape:
+        return float("inf")
+    return float(np.linalg.norm(first - second, axis=-1).max())

@@ -1,0 +1,179 @@
+"""Defines MultiPatch: spline volumes glued along whole faces, and the numbers of the control points that they share."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..arrays import Array, IntArray
+from ..display import Brief, Shown
+from .interface import Face, Interface, face_label, face_layer, gap, knots_agree, orientations
+from .volume import FACE_NAMES, BSplineVolume, demand_volume
+
+TOLERANCE = 1e-6  # of the body's size: distance of two control points that are taken for one
+FLAT = 1e-9  # of the squared size: the area of a face that has shrunk to an edge or a point
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MultiPatch(Brief, Shown):
+    """Spline volumes that are glued along whole faces.
+
+    Parameters
+    ----------
+    patches : tuple of BSplineVolume
+        Of any degrees and knots.
+    interfaces : tuple of Interface
+        Pairs of faces with equal degrees, knots and control points; a face is glued once at most.
+
+    Raises
+    ------
+    ValueError
+        Where two faces of an interface do not have the same trace; the message names the faces.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> left = iga_nn.BSplineVolume.from_function(lambda u, v, w: (u, v, w), control_points=4)
+    >>> right = iga_nn.BSplineVolume.from_function(lambda u, v, w: (2 - u, 1 - v, w), control_points=4)
+    >>> rod = iga_nn.MultiPatch.from_patches([left, right])
+    >>> print(rod.interfaces[0], len(rod.outer[0]))
+    p0_u1 = p1_u1 5
+    """
+
+    patches: tuple[BSplineVolume, ...]
+    interfaces: tuple[Interface, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "patches", tuple(self.patches))
+        object.__setattr__(self, "interfaces", tuple(self.interfaces))
+        if not self.patches:
+            raise ValueError("a body has one patch or more")
+        for patch in self.patches:
+            demand_volume(patch)
+        seen: set[Face] = set()
+        for interface in self.interfaces:
+            for patch, face in (interface.first, interface.second):
+                if face not in FACE_NAMES or not 0 <= patch < len(self.patches):
+                    raise ValueError(f"interface {interface}: there is no such face")
+                if (patch, face) in seen:
+                    raise ValueError(f"{face_label(patch, face)} is glued twice")
+                seen.add((patch, face))
+            if not knots_agree(self.patches, interface):
+                raise ValueError(f"interface {interface}: degrees or knots along the two faces differ")
+            if gap(self.patches, interface) > 0.0:
+                raise ValueError(f"interface {interface}: the control points of the two faces differ")
+
+    @classmethod
+    def from_patches(cls, patches: Sequence[BSplineVolume], tolerance: float = TOLERANCE) -> "MultiPatch":
+        """Return the body of patches, glued where two faces have the same control points.
+
+        tolerance: the largest distance of two control points that are taken for one, as a share of the body's size;
+        they become one, that of the patch that comes first. Raises ValueError where two faces have the same corners
+        and the same shape, but not the same degrees, knots and control points, and where three faces are the same.
+        """
+        given = tuple(patches)
+        for patch in given:
+            demand_volume(patch)
+        points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in given])
+        size = float(np.ptp(points, axis=0).max())
+        found = tuple(_interfaces(given, tolerance * size, size))
+        labels, _ = shared_numbers([patch.shape for patch in given], found)
+        return cls(_merged(given, labels), found)
+
+    @cached_property
+    def outer(self) -> tuple[tuple[str, ...], ...]:
+        """Return for each patch the names of the faces that are not glued: together they are the body's boundary."""
+        glued = {face for interface in self.interfaces for face in (interface.first, interface.second)}
+        return tuple(tuple(name for name in FACE_NAMES if (i, name) not in glued) for i in range(len(self.patches)))
+
+    def __len__(self) -> int:
+        return len(self.patches)
+
+    def __iter__(self) -> Iterator[BSplineVolume]:
+        return iter(self.patches)
+
+
+def shared_numbers(
+    shapes: Sequence[tuple[int, ...]], interfaces: Sequence[Interface]
+) -> tuple[tuple[IntArray, ...], int]:
+    """Return the number of each coefficient of each patch, arrays of the given shapes, and how many numbers there are.
+
+    Coefficients that the interfaces make one have the same number. Numbers begin with 0, in the order in which the
+    coefficients of the patches come.
+    """
+    sizes = [int(np.prod(shape)) for shape in shapes]
+    starts = np.cumsum([0, *sizes])
+    rows = [np.arange(a, b).reshape(shape) for a, b, shape in zip(starts, starts[1:], shapes, strict=False)]
+    pairs: list[Any] = [np.empty((2, 0), dtype=np.int64)]
+    for interface in interfaces:
+        (p, face_p), (q, face_q) = interface.first, interface.second
+        first, second = face_layer(rows[p], face_p), interface.turned(face_layer(rows[q], face_q))
+        pairs.append(np.stack([first.ravel(), second.ravel()]))
+    i, j = np.concatenate(pairs, axis=1)
+    graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(starts[-1],) * 2)
+    _, groups = connected_components(graph, directed=False)
+    _, first_places, groups = np.unique(groups, return_index=True, return_inverse=True)
+    order = np.empty(len(first_places), dtype=np.int64)
+    order[np.argsort(first_places)] = np.arange(len(first_places))
+    numbers = order[groups]
+    return tuple(numbers[row] for row in rows), len(order)
+
+
+def _merged(patches: Sequence[BSplineVolume], labels: Sequence[IntArray]) -> tuple[BSplineVolume, ...]:
+    """Return the patches with one control point for each label, the first that has it."""
+    every = np.concatenate([label.ravel() for label in labels])
+    points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in patches])
+    _, first = np.unique(every, return_index=True)
+    chosen = points[first]
+    return tuple(
+        BSplineVolume(patch.degrees, patch.knots, chosen[label]) for patch, label in zip(patches, labels, strict=True)
+    )
+
+
+def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float) -> Iterator[Interface]:
+    """Yield the pairs of faces with the same control points; raise ValueError for those that nearly match."""
+    faces = [(i, name) for i in range(len(patches)) for name in FACE_NAMES]
+    nets = [face_layer(patches[i].control_points, name) for i, name in faces]
+    has_area = [_area(net) > FLAT * size**2 for net in nets]
+    middles = np.array([_corners(net).mean(axis=0) for net in nets])
+    taken: dict[int, int] = {}
+    for i, j in sorted(cKDTree(middles).query_pairs(2.0 * tolerance)):
+        if not (has_area[i] and has_area[j]) or not _same_points(_corners(nets[i]), _corners(nets[j]), tolerance):
+            continue
+        ways = (way for way in orientations(faces[i], faces[j]) if knots_agree(patches, way))
+        way = next((way for way in ways if gap(patches, way) <= tolerance), None)
+        if way is None:
+            if _same_points(nets[i].reshape(-1, 3), nets[j].reshape(-1, 3), tolerance):
+                raise ValueError(
+                    f"{face_label(*faces[i])} and {face_label(*faces[j])} are the same surface with other degrees or "
+                    "knots: give both faces the same ones"
+                )
+            continue  # two surfaces over the same corners
+        for one, other in ((i, j), (j, i)):
+            if one in taken:
+                names = ", ".join(face_label(*faces[k]) for k in (one, other, taken[one]))
+                raise ValueError(f"{names} are one surface: at most two patches meet at a face")
+            taken[one] = other
+        yield way
+
+
+def _corners(net: Array) -> Array:
+    """Return the four corners (4, 3) of a face's control points (n_a, n_b, 3)."""
+    return net[:: len(net) - 1, :: net.shape[1] - 1].reshape(4, 3)
+
+
+def _area(net: Array) -> float:
+    """Return the area of a face's control net, sum over its cells."""
+    a, b = np.diff(net, axis=0)[:, :-1], np.diff(net, axis=1)[:-1]
+    return float(np.linalg.norm(np.cross(a, b), axis=-1).sum())
+
+
+def _same_points(one: Array, other: Array, tolerance: float) -> bool:
+    """Return whether each point of either set (k, 3) lies within the tolerance of one of the other set."""
+    ways = ((one, other), (other, one))
+    return all(float(cKDTree(b).query(a)[0].max()) <= tolerance for a, b in ways)
