@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray
-from ..display import Brief, Shown
+from ..display import Brief, Shown, above
+from .archive import is_of_patches, load_patches, save_patches
 from .interface import Face, Interface, face_label, face_layer, gap, knots_agree, orientations
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
 
@@ -85,6 +87,39 @@ class MultiPatch(Brief, Shown):
         labels, _ = shared_numbers([patch.shape for patch in given], found)
         return cls(_merged(given, labels), found)
 
+    @classmethod
+    def from_splinepy(cls, splines: Any) -> "MultiPatch":
+        """Make the body of a splinepy.Multipatch, or of a list of its splines, glued as by `from_patches`.
+
+        Raises TypeError for other objects, ValueError where the splines are no volumes or do not fit together.
+        """
+        return above("io.splinepy").body_from_splinepy(splines)
+
+    def to_splinepy(self) -> Any:
+        """Return the same body as a splinepy.Multipatch. Raises InputError where splinepy is missing."""
+        return above("io.splinepy").body_to_splinepy(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the patches and interfaces as volume.npz; atomic. One patch that is not glued is a volume there."""
+        if len(self) == 1 and not self.interfaces:
+            self.patches[0].save(path)
+        else:
+            save_patches(path, self.patches, self.interfaces)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "MultiPatch":
+        """Read volume.npz, of one patch or several.
+
+        Raises FileNotFoundError, or ValueError that names the defect of the file.
+        """
+        if not is_of_patches(path):
+            return cls((BSplineVolume.load(path),))
+        patches, interfaces = load_patches(path)
+        try:
+            return cls(patches, interfaces)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+
     @cached_property
     def outer(self) -> tuple[tuple[str, ...], ...]:
         """Return for each patch the names of the faces that are not glued: together they are the body's boundary."""
@@ -139,7 +174,7 @@ def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float)
     """Yield the pairs of faces with the same control points; raise ValueError for those that nearly match."""
     faces = [(i, name) for i in range(len(patches)) for name in FACE_NAMES]
     nets = [face_layer(patches[i].control_points, name) for i, name in faces]
-    has_area = [_area(net) > FLAT * size**2 for net in nets]
+    has_area = [net_area(net) > FLAT * size**2 for net in nets]
     middles = np.array([_corners(net).mean(axis=0) for net in nets])
     taken: dict[int, int] = {}
     for i, j in sorted(cKDTree(middles).query_pairs(2.0 * tolerance)):
@@ -167,7 +202,7 @@ def _corners(net: Array) -> Array:
     return net[:: len(net) - 1, :: net.shape[1] - 1].reshape(4, 3)
 
 
-def _area(net: Array) -> float:
+def net_area(net: Array) -> float:
     """Return the area of a face's control net, sum over its cells."""
     a, b = np.diff(net, axis=0)[:, :-1], np.diff(net, axis=1)[:-1]
     return float(np.linalg.norm(np.cross(a, b), axis=-1).sum())
