@@ -5,6 +5,7 @@ fold somewhere does not change it.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -61,4 +62,4 @@ def orientation(volume: BSplineVolume) -> int:
 
 def mirrored(volume: BSplineVolume) -> BSplineVolume:
     """Return the mirror image in x, whose det J is the negative of the volume's, exactly."""
-    return BSplineVolume(volume.degrees, volume.knots, volume.control_points * [-1.0, 1.0, 1.0])
+    return replace(volume, control_points=volume.control_points * [-1.0, 1.0, 1.0])
