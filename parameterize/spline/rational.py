@@ -38,7 +38,7 @@ def quotients(derivative: Callable[[Orders], Array], orders: Sequence[Orders]) -
         for taken in product(*(range(n + 1) for n in order)):
             if any(taken):
                 times = prod(map(comb, order, taken))
-                rest = quotient(tuple(n - k for n, k in zip(order, taken, strict=True)))  # type: ignore[arg-type]
+                rest = quotient(tuple(n - k for n, k in zip(order, taken, strict=True)))
                 found = found - times * parts(taken)[..., 3:] * rest
         return found / parts((0, 0, 0))[..., 3:]
 
