@@ -79,7 +79,7 @@ def test_a_study_shows_its_rates_and_notices_once(solution):
 
 def test_python_prints_the_shapes_of_arrays(solution):
     knots = "(array(9,), array(9,), array(9,))"
-    volume = f"BSplineVolume(degrees=(3, 3, 3), knots={knots}, control_points=array(5, 5, 5, 3))"
+    volume = f"BSplineVolume(degrees=(3, 3, 3), knots={knots}, control_points=array(5, 5, 5, 3), weights=None)"
     assert repr(solution.geometry) == volume
     assert repr(solution).startswith(
         f"Solution(degrees=(3, 3, 3), knots={knots}, coefficients=array(5, 5, 5), geometry"

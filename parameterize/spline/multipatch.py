@@ -1,7 +1,7 @@
 """Defines MultiPatch: spline volumes glued along whole faces, and the numbers of the control points that they share."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,8 @@ class MultiPatch(Brief, Shown):
     patches : tuple of BSplineVolume
         Of any degrees and knots.
     interfaces : tuple of Interface
-        Pairs of faces with equal degrees, knots and control points; a face is glued once at most.
+        Pairs of faces with equal degrees, knots, control points and, up to a factor, weights; a face is glued once at
+        most.
 
     Raises
     ------
@@ -68,15 +69,15 @@ class MultiPatch(Brief, Shown):
             if not knots_agree(self.patches, interface):
                 raise ValueError(f"interface {interface}: degrees or knots along the two faces differ")
             if gap(self.patches, interface) > 0.0:
-                raise ValueError(f"interface {interface}: the control points of the two faces differ")
+                raise ValueError(f"interface {interface}: the control points or weights of the two faces differ")
 
     @classmethod
     def from_patches(cls, patches: Sequence[BSplineVolume], tolerance: float = TOLERANCE) -> "MultiPatch":
         """Return the body of patches, glued where two faces have the same control points.
 
         tolerance: the largest distance of two control points that are taken for one, as a share of the body's size;
-        they become one, that of the patch that comes first. Raises ValueError where two faces have the same corners
-        and the same shape, but not the same degrees, knots and control points, and where three faces are the same.
+        they become one, that of the patch that comes first. Raises ValueError where two faces have the same control
+        points, but not the same degrees, knots and weights, and where three faces are the same.
         """
         given = tuple(patches)
         for patch in given:
@@ -165,9 +166,7 @@ def _merged(patches: Sequence[BSplineVolume], labels: Sequence[IntArray]) -> tup
     points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in patches])
     _, first = np.unique(every, return_index=True)
     chosen = points[first]
-    return tuple(
-        BSplineVolume(patch.degrees, patch.knots, chosen[label]) for patch, label in zip(patches, labels, strict=True)
-    )
+    return tuple(replace(patch, control_points=chosen[label]) for patch, label in zip(patches, labels, strict=True))
 
 
 def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float) -> Iterator[Interface]:
@@ -185,8 +184,8 @@ def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float)
         if way is None:
             if _same_points(nets[i].reshape(-1, 3), nets[j].reshape(-1, 3), tolerance):
                 raise ValueError(
-                    f"{face_label(*faces[i])} and {face_label(*faces[j])} are the same surface with other degrees or "
-                    "knots: give both faces the same ones"
+                    f"{face_label(*faces[i])} and {face_label(*faces[j])} have the same control points, but other "
+                    "degrees, knots or weights: give both faces the same ones"
                 )
             continue  # two surfaces over the same corners
         for one, other in ((i, j), (j, i)):

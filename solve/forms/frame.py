@@ -30,8 +30,8 @@ class UnitFrame:
     def of(cls, volume: BSplineVolume) -> "UnitFrame":
         """Return the frame of a spline volume.
 
-        The size of the volume follows exactly from the six faces (divergence theorem); the bounding box is that of
-        points on the faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
+        The size of the volume follows from the six faces (`enclosed_volume`); the bounding box is that of points on the
+        faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
         Raises ValueError where the volume encloses nothing.
         """
         rows = [divided_spans(knots, BOX_SAMPLES) for knots in volume.knots]
