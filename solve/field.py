@@ -12,6 +12,7 @@ from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
 from parameterize.quality.distances import nearest_on_boundary
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
@@ -142,9 +143,14 @@ class SplineField(Brief):
         values = values.transpose(0, *(1 + axis for axis in (*x.order, *single))).reshape(-1, *x.shape[1:])
         return values if self.coefficients.ndim == 4 else values[0]
 
-    def fits(self, volume: BSplineVolume) -> bool:
-        """Return whether the field may be a datum on a volume: its own volume is this volume, or it has none."""
+    def fits(self, volume: BSplineVolume | MultiPatch) -> bool:
+        """Return whether the field may be a datum on a volume: its own volume is this volume, or it has none.
+
+        On several patches it may not: it is a function on one of them.
+        """
         own = self.geometry
+        if isinstance(volume, MultiPatch):
+            return False
         if own is None or own is volume:
             return True
         parts = zip((*own.knots, own.control_points), (*volume.knots, volume.control_points), strict=True)

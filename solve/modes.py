@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -149,8 +149,8 @@ def modes(
     shift = _stiffness(volume, law) if is_free(law) else 0.0
     options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature)
     system = discretized(volume, law, options, shift)
-    system = replace(system, known=np.zeros_like(system.known))
-    rigid = RIGID.get(len(system.known), len(system.known)) if shift else 0
+    system = system.at_rest()
+    rigid = RIGID.get(len(system.right), len(system.right)) if shift else 0
     if n + rigid > len(system.load):
         raise ValueError(f"n {n}: the space has {len(system.load)} unknowns, fewer modes; raise refine or lower n")
     values, vectors, residuals, iterations = _lowest(system, n + rigid, tolerance, max_iterations)
