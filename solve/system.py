@@ -355,7 +355,8 @@ def _preconditioners(
         return tuple(block for block in systems[0].blocks if block is not None)
     found = []
     for component in range(len(systems[0].blocks)):
-        blocks = tuple(system.blocks[component] for system in systems)
+        blocks = [system.blocks[component] for system in systems]
+        is_open = all(block is not None and block.singular for block in blocks)
         coarse = Coarse.of(unknowns, [system.operators[component] for system in systems], interfaces)
-        found.append(GluedPreconditioner(unknowns, blocks, coarse, all(block is not None and block.singular for block in blocks)))
+        found.append(GluedPreconditioner(unknowns, tuple(block and block.held() for block in blocks), coarse, is_open))
     return tuple(found)
