@@ -66,7 +66,9 @@ def judge(
     solution. A large error estimate gives a notice only, because an estimate may be wrong.
     """
     points, ends = _samples(patches)
-    contradictory = list(dict.fromkeys(line for patch in patches for line in contradictions(patch.volume, patch.problem)))
+    contradictory = list(
+        dict.fromkeys(line for patch in patches for line in contradictions(patch.volume, patch.problem))
+    )
     empty = empty_formulas(problem, points, ends)
     rough, unresolved = [], []
     if estimate is not None and (estimate.l2_relative or 0.0) > LARGEST_ERROR:

@@ -259,6 +259,4 @@ class MultiPatchSolution(Brief, Shown):
 def _outermost(found: Sequence[Extremes]) -> Extremes:
     """Return the extremes of a body from those of its patches."""
     least, largest = min(found, key=lambda one: one.least), max(found, key=lambda one: one.largest)
-    return replace(
-        largest, least=least.least, least_at=least.least_at, least_parameters=least.least_parameters
-    )
+    return replace(largest, least=least.least, least_at=least.least_at, least_parameters=least.least_parameters)

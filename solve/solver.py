@@ -2,7 +2,7 @@
 
 import functools
 from dataclasses import replace
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -29,6 +29,10 @@ from .solution import MultiPatchSolution, Solution
 from .system import System, build
 
 
+@overload
+def solve_problem(body: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution: ...
+@overload
+def solve_problem(body: MultiPatch, problem: Poisson | Elasticity | Problem, **how: Any) -> MultiPatchSolution: ...
 def solve_problem(
     body: BSplineVolume | MultiPatch, problem: Poisson | Elasticity | Problem, **how: Any
 ) -> Solution | MultiPatchSolution:
@@ -100,6 +104,10 @@ def solve_problem(
     return solve_with(body, problem, SolveOptions.of(how))
 
 
+@overload
+def solve_with(body: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> Solution: ...
+@overload
+def solve_with(body: MultiPatch, problem: BoundaryValueProblem, options: SolveOptions) -> MultiPatchSolution: ...
 def solve_with(
     body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions
 ) -> Solution | MultiPatchSolution:
@@ -157,9 +165,11 @@ def prepared(
     """Check body and problem; return the problem placed in the body, and the problem on each patch."""
     placed, patches = _on_patches(body, problem, options)
     if all(part.stop <= part.start for patch in patches for part in patch.space.free):
-        raise ValueError(f"degree {patches[0].space.degrees} leaves no unknown inside the volume: raise refine or degree")
-    for degrees in {patch.volume.degrees for patch in patches}:
-        _warm_up(degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
+        raise ValueError(
+            f"degree {patches[0].space.degrees} leaves no unknown inside the volume: raise refine or degree"
+        )
+    for of_map in {patch.volume.degrees for patch in patches}:
+        _warm_up(of_map, options.degree, placed.form.components == 1 and placed.form.symmetric)
     return placed, [replace(patch, space=shared_space(patch.space, options.comm)) for patch in patches]
 
 
@@ -175,7 +185,9 @@ def _on_patches(
     placed, several = problem.on(body), isinstance(body, MultiPatch)
     outer = {face_label(i, face) for i, faces in enumerate(glued.outer) for face in faces if several}
     if unknown := sorted(problem.patch_faces - outer):
-        raise ValueError(f"{unknown[0]} is no outer face of the body; its faces are {', '.join(sorted(outer)) or 'u0 to w1'}")
+        raise ValueError(
+            f"{unknown[0]} is no outer face of the body; its faces are {', '.join(sorted(outer)) or 'u0 to w1'}"
+        )
     patches = []
     for i, (volume, faces) in enumerate(zip(glued.patches, glued.outer, strict=True)):
         own = placed.on_patch(i, faces) if several else placed

@@ -94,9 +94,7 @@ class System:
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """Return the mass matrix, the integrals of u . v."""
-        each = [
-            assemble(patch.volume, patch.space, Mass(), threads=patch.matrix.threads)[0] for patch in self.patches
-        ]
+        each = [assemble(patch.volume, patch.space, Mass(), threads=patch.matrix.threads)[0] for patch in self.patches]
         return self._linear(lambda x: self._product(x, each))
 
     @property

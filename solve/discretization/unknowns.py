@@ -33,7 +33,7 @@ class Unknowns(Protocol):
         """Return the coefficients (c, n_u, n_v, n_w) of each patch of a vector (c, ...), zero where they are fixed."""
 
     def collect(self, integrals: Sequence[Array]) -> Array:
-        """Return the vector (c, ...) of integrals (c, n_u, n_v, n_w) over each patch: copies of an unknown are added."""
+        """Return the vector (c, ...) of integrals (c, n_u, n_v, n_w) over each patch, copies of an unknown added."""
 
     def completed(self, known: Sequence[Array]) -> list[Array]:
         """Return all fixed coefficients of each patch from those that its own data fix, (c, n_u, n_v, n_w) each."""

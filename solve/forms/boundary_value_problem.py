@@ -172,7 +172,8 @@ class BoundaryValueProblem:
         prefix = f"p{patch}_"
         data = {role: datum for role, datum in self.data.items() if not role.startswith(("neumann ", "robin "))}
         given = {kind: self._given_on(kind) for kind in ("neumann", "robin")}
-        natural, robin = [], []
+        natural: list[str] = []
+        robin: list[str] = []
         for face in outer:
             kind, name = next(
                 ((kind, name) for name in (prefix + face, face) for kind in given if name in given[kind]), ("", "")

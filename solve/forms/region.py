@@ -168,8 +168,8 @@ class Region:
     def holds(self, x: Array, normal: Array, face: str = "") -> Mask:
         """Return the mask (...) of the points (3, ...) with outward unit normals (3, ...) where the condition holds.
 
-        face: the cube's face on whose image the points lie, if any: "u0", or "p2_u0" of patch 2 of several. Raises ExpressionError where X, Y, Z occur without
-        a frame, ValueError where the surface lacks a face or group.
+        face: the cube's face on whose image the points lie, if any: "u0", or "p2_u0" of patch 2 of several. Raises
+        ExpressionError where X, Y, Z occur without a frame, ValueError where the surface lacks a face or group.
         """
         x, normal = np.asarray(x), np.asarray(normal)
         jets = [Jet(row, (), ()) for row in x]

@@ -27,7 +27,8 @@ RANK = 1e-10  # of the largest eigenvalue of the coarse matrix: smaller ones bel
 class GluedPreconditioner:
     """Apply the preconditioner of one component of a law on several patches to vectors (m,).
 
-    blocks: the preconditioners of the patches, natural at interfaces; None for a patch without unknowns. singular: whether a constant is free.
+    blocks: the preconditioners of the patches, natural at interfaces; None for a patch without unknowns. singular:
+    whether a constant is free.
     """
 
     unknowns: Glued
@@ -71,7 +72,9 @@ class Coarse:
     def of(cls, unknowns: Glued, operators: Sequence[Operator], interfaces: Sequence[Interface]) -> "Coarse":
         """Return the coarse solve of the operators of one component on the patches."""
         numbers, count = vertex_numbers(len(operators), interfaces)
-        corners = [np.asarray(own[:: len(own) - 1, :: own.shape[1] - 1, :: own.shape[2] - 1]) for own in unknowns.numbers]
+        corners = [
+            np.asarray(own[:: len(own) - 1, :: own.shape[1] - 1, :: own.shape[2] - 1]) for own in unknowns.numbers
+        ]
         fixed = np.zeros(count, dtype=bool)
         for own, corner in zip(numbers, corners, strict=True):
             fixed[own] |= unknowns.fixed[corner]
@@ -83,7 +86,8 @@ class Coarse:
             flat = places.ravel()
             matrix[np.ix_(flat, flat)] += _galerkin(operator)
         hats = [_hats(operator.space) for operator in operators]
-        return cls(unknowns, hats, vertices, np.linalg.pinv(matrix[:-1, :-1], rcond=RANK, hermitian=True))
+        inverse: Array = np.linalg.pinv(matrix[:-1, :-1], rcond=RANK, hermitian=True)
+        return cls(unknowns, hats, vertices, inverse)
 
     def __call__(self, residual: Array) -> Array:
         """Return V (V^T A V)^+ V^T r of a residual r (m,)."""
