@@ -5,16 +5,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
-from parameterize.display import Brief, Shown, above
+from parameterize.display import Shown, above
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.errors import Errors
-from .field import SplineField
+from .field import MultiPatchField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Quantity
 from .quantities import Extremes, all_extremes, at_points, extremes, on_grid
@@ -208,7 +207,7 @@ class Solution(SplineField, Shown):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MultiPatchSolution(Brief, Shown):
+class MultiPatchSolution(MultiPatchField, Shown):
     """Hold the discrete solution on several patches: a spline of the parameters of each patch.
 
     Attributes
@@ -237,14 +236,10 @@ class MultiPatchSolution(Brief, Shown):
     report: SolveReport
     problem: BoundaryValueProblem
 
-    def probe(self, points: ArrayLike) -> Array:
-        """Return the values (m,) or (m, c) at points (m, 3) in space; NaN outside of the body."""
-        found = self.patches[0].probe(points)
-        for patch in self.patches[1:]:
-            missing = np.isnan(found.reshape(len(found), -1)).any(axis=1)
-            if missing.any():
-                found[missing] = patch.probe(np.atleast_2d(np.asarray(points, dtype=np.float64))[missing])
-        return found
+    @property
+    def field(self) -> MultiPatchField:
+        """Return the splines without the report, as a datum for another problem on the same body."""
+        return MultiPatchField(tuple(patch.field for patch in self.patches))
 
     def extremes(self, what: str | Quantity) -> Extremes:
         """Return the least and the largest value of a quantity of one number a point, and their places."""

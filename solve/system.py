@@ -25,7 +25,7 @@ from .discretization.on_regions import demand_area, demand_supports
 from .discretization.operator import FormOperator, MatrixFree, Operator, assemble
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .discretization.unknowns import Glued, Unknowns, unknowns_of
-from .field import SplineField
+from .field import MultiPatchField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
 from .linear.krylov import generalized_residuals
@@ -111,21 +111,15 @@ class System:
         """Return the same system with the value zero wherever values are given; its fields are zero there."""
         return replace(self, patches=tuple(patch.at_rest() for patch in self.patches))
 
-    def field(self, x: Array) -> SplineField:
-        """Return the spline of the free coefficients x (N,) and the fixed coefficients, on a volume.
+    def field(self, x: Array) -> SplineField | MultiPatchField:
+        """Return the spline of the free coefficients x (N,) and the fixed coefficients; of several patches one each.
 
-        Raises ValueError for another number of coefficients, and on several patches, which `fields` is for.
+        Raises ValueError for another number of coefficients.
         """
-        found = self.fields(x)
-        if len(found) > 1:
-            raise ValueError(f"the body has {len(found)} patches, each with its own spline: use fields")
-        return found[0]
-
-    def fields(self, x: Array) -> list[SplineField]:
-        """Return the splines of the patches. Raises ValueError for another number of coefficients."""
         if np.size(x) != self.right.size:
             raise ValueError(f"x must have {self.right.size} entries, the free coefficients, got {np.size(x)}")
-        return self._splines(self._filled(np.reshape(x, self.right.shape)))
+        found = self._splines(self._filled(np.reshape(x, self.right.shape)))
+        return MultiPatchField(tuple(found)) if isinstance(self.body, MultiPatch) else found[0]
 
     def _filled(self, free: Array) -> list[Array]:
         """Return all coefficients (c, n_u, n_v, n_w) of each patch, with the fixed coefficients."""

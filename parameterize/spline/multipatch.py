@@ -1,7 +1,7 @@
 """Defines MultiPatch: spline volumes glued along whole faces, and the numbers of the control points that they share."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -124,8 +124,9 @@ def shared_numbers(
         pairs.append(np.stack([first.ravel(), second.ravel()]))
     i, j = np.concatenate(pairs, axis=1)
     graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(starts[-1],) * 2)
-    _, groups = connected_components(graph, directed=False)
-    _, first_places, groups = np.unique(groups, return_index=True, return_inverse=True)
+    _, first_places, groups = np.unique(
+        connected_components(graph, directed=False)[1], return_index=True, return_inverse=True
+    )
     order: IntArray = np.empty(len(first_places), dtype=np.int64)
     order[np.argsort(first_places)] = np.arange(len(first_places))
     numbers = order[groups]
@@ -138,9 +139,7 @@ def _merged(patches: Sequence[BSplineVolume], labels: Sequence[IntArray]) -> tup
     points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in patches])
     _, first = np.unique(every, return_index=True)
     chosen = points[first]
-    return tuple(
-        BSplineVolume(patch.degrees, patch.knots, chosen[label]) for patch, label in zip(patches, labels, strict=True)
-    )
+    return tuple(replace(patch, control_points=chosen[label]) for patch, label in zip(patches, labels, strict=True))
 
 
 def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float) -> Iterator[Interface]:

@@ -14,9 +14,9 @@ from parameterize.arrays import Array
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from ..field import SplineField
+from ..field import MultiPatchField, SplineField
 from .condition import WITH_FACTOR, Condition
-from .data import Data, Datum, demand, finite, parse
+from .data import ByPatch, Data, Datum, PerPatch, demand, finite, parse
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
 from .jets import Jet, Numbers, coordinates, known
@@ -48,7 +48,7 @@ class BoundaryValueProblem:
 
     def _set(
         self,
-        given: Mapping[str, Data | None],
+        given: Mapping[str, PerPatch | None],
         neumann: Natural,
         robin: Robin,
         conditions: tuple[Condition, ...] = (),
@@ -109,14 +109,24 @@ class BoundaryValueProblem:
         if both := neumann.keys() & robin.keys():
             raise ValueError(f"face {min(both)} has both Neumann and Robin data; give only one")
 
-    def _parsed(self, given: Mapping[str, Data | None], counts: Mapping[str, int]) -> dict[str, Datum]:
+    def _parsed(self, given: Mapping[str, PerPatch | None], counts: Mapping[str, int]) -> dict[str, Datum]:
         """Return the data of the volume and of faces by role, without roles that have no data."""
-        data = {}
+        data: dict[str, Datum] = {}
         for role, entry in given.items():
             if entry is not None:
                 count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
                 face = role.split(":")[0].partition(" ")[2]
-                data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
+                name, of_coordinates = self.label(role), self.of_coordinates
+                if not isinstance(entry, Mapping):
+                    data[role] = parse(name, entry, count, face, of_coordinates=of_coordinates)
+                    continue
+                if wrong := [key for key in entry if not isinstance(key, int) or key < 0]:
+                    raise ValueError(f"{name}: {wrong[0]!r} is no number of a patch, as in {{0: ..., 1: ...}}")
+                each = {}
+                for patch, own in entry.items():  # kappa may be a number here and a tensor there
+                    of_patch = len(own) if role in counts and isinstance(own, list) else count
+                    each[patch] = parse(f"{name} of p{patch}", own, of_patch, face, of_coordinates=of_coordinates)
+                data[role] = ByPatch.of(name, each, face)
         return data
 
     def _check_derived(self, role: str) -> None:
@@ -150,7 +160,7 @@ class BoundaryValueProblem:
         The middle is that of the bounding box. Raises ValueError for a field of another volume.
         """
         for datum in self.data.values():
-            if not all(entry.fits(body) for entry in datum.entries if isinstance(entry, SplineField)):
+            if not all(entry.fits(body) for entry in datum.entries if isinstance(entry, SplineField | MultiPatchField)):
                 raise ValueError(
                     f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
                 )
@@ -170,7 +180,11 @@ class BoundaryValueProblem:
         """
         other = copy(self)
         prefix = f"p{patch}_"
-        data = {role: datum for role, datum in self.data.items() if not role.startswith(("neumann ", "robin "))}
+        data = {
+            role: datum.on_patch(patch)
+            for role, datum in self.data.items()
+            if not role.startswith(("neumann ", "robin "))
+        }
         given = {kind: self._given_on(kind) for kind in ("neumann", "robin")}
         natural: list[str] = []
         robin: list[str] = []
@@ -182,7 +196,7 @@ class BoundaryValueProblem:
                 (natural if kind == "neumann" else robin).append(face)
                 for ending in ("", ": alpha"):
                     if (role := f"{kind} {name}{ending}") in self.data:
-                        data[f"{kind} {face}{ending}"] = self.data[role]
+                        data[f"{kind} {face}{ending}"] = self.data[role].on_patch(patch)
         dirichlet = tuple(face for face in outer if face not in natural and face not in robin)
         if self.conditions:
             strong = {face for condition in self.conditions if condition.is_strong for face in condition.region.faces}

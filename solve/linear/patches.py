@@ -84,10 +84,10 @@ class Coarse:
         matrix = np.zeros((free + 1, free + 1))
         for operator, places in zip(operators, vertices, strict=True):
             flat = places.ravel()
-            matrix[np.ix_(flat, flat)] += _galerkin(operator)
+            np.add.at(matrix, np.ix_(flat, flat), _galerkin(operator))  # a patch glued to itself has a vertex twice
         hats = [_hats(operator.space) for operator in operators]
-        inverse: Array = np.linalg.pinv(matrix[:-1, :-1], rcond=RANK, hermitian=True)
-        return cls(unknowns, hats, vertices, inverse)
+        inverse = np.linalg.pinv(matrix[:-1, :-1], rcond=RANK, hermitian=True)
+        return cls(unknowns, hats, vertices, np.asarray(inverse, dtype=np.float64))
 
     def __call__(self, residual: Array) -> Array:
         """Return V (V^T A V)^+ V^T r of a residual r (m,)."""
