@@ -60,12 +60,12 @@ class MultiPatch(Brief, Shown):
             demand_volume(patch)
         seen: set[Face] = set()
         for interface in self.interfaces:
-            for patch, face in (interface.first, interface.second):
-                if face not in FACE_NAMES or not 0 <= patch < len(self.patches):
+            for number, face in (interface.first, interface.second):
+                if face not in FACE_NAMES or not 0 <= number < len(self.patches):
                     raise ValueError(f"interface {interface}: there is no such face")
-                if (patch, face) in seen:
-                    raise ValueError(f"{face_label(patch, face)} is glued twice")
-                seen.add((patch, face))
+                if (number, face) in seen:
+                    raise ValueError(f"{face_label(number, face)} is glued twice")
+                seen.add((number, face))
             if not knots_agree(self.patches, interface):
                 raise ValueError(f"interface {interface}: degrees or knots along the two faces differ")
             if gap(self.patches, interface) > 0.0:
@@ -134,6 +134,14 @@ class MultiPatch(Brief, Shown):
         return iter(self.patches)
 
 
+def as_multipatch(body: BSplineVolume | MultiPatch) -> MultiPatch:
+    """Return a body as several patches, a volume as one. Raises TypeError for another object."""
+    if isinstance(body, MultiPatch):
+        return body
+    demand_volume(body)
+    return MultiPatch((body,))
+
+
 def shared_numbers(
     shapes: Sequence[tuple[int, ...]], interfaces: Sequence[Interface]
 ) -> tuple[tuple[IntArray, ...], int]:
@@ -143,7 +151,7 @@ def shared_numbers(
     coefficients of the patches come.
     """
     sizes = [int(np.prod(shape)) for shape in shapes]
-    starts = np.cumsum([0, *sizes])
+    starts = [0, *np.cumsum(sizes).tolist()]
     rows = [np.arange(a, b).reshape(shape) for a, b, shape in zip(starts, starts[1:], shapes, strict=False)]
     pairs: list[Any] = [np.empty((2, 0), dtype=np.int64)]
     for interface in interfaces:
@@ -152,9 +160,10 @@ def shared_numbers(
         pairs.append(np.stack([first.ravel(), second.ravel()]))
     i, j = np.concatenate(pairs, axis=1)
     graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(starts[-1],) * 2)
-    _, groups = connected_components(graph, directed=False)
-    _, first_places, groups = np.unique(groups, return_index=True, return_inverse=True)
-    order = np.empty(len(first_places), dtype=np.int64)
+    _, first_places, groups = np.unique(
+        connected_components(graph, directed=False)[1], return_index=True, return_inverse=True
+    )
+    order: IntArray = np.empty(len(first_places), dtype=np.int64)
     order[np.argsort(first_places)] = np.arange(len(first_places))
     numbers = order[groups]
     return tuple(numbers[row] for row in rows), len(order)
@@ -210,4 +219,4 @@ def net_area(net: Array) -> float:
 def _same_points(one: Array, other: Array, tolerance: float) -> bool:
     """Return whether each point of either set (k, 3) lies within the tolerance of one of the other set."""
     ways = ((one, other), (other, one))
-    return all(float(cKDTree(b).query(a)[0].max()) <= tolerance for a, b in ways)
+    return all(float(np.max(cKDTree(b).query(a)[0])) <= tolerance for a, b in ways)
