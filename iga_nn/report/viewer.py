@@ -38,6 +38,7 @@ from ..figures.fields import (
     quantity_of,
     vectors_of,
 )
+from ..figures.palette import color_labels
 from ..figures.style import even_range, with_unit
 from ..figures.warp import factor_for, is_displacement, warp_of
 from ..options import NO_UNITS, Units
@@ -158,7 +159,7 @@ def _scene(volume: BSplineVolume, frames: Sequence[Frame], coarser: int) -> Scen
     points = points_of(volume)
     cloud = np.concatenate([where.reshape(-1, 3) for where in points.everywhere])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
-    octant, view = best_cut(patches_of(points.patches)[:6])
+    octant, view = best_cut(patches_of(volume, points.patches)[:6])
     count, many = (part.shape[1] for part in _thinned(points, coarser))
     whole = [replace(frames[0], fields=[*frames[0].fields, distortion_of(volume)]), *frames[1:]]
     bound = _bound(frames)
@@ -171,8 +172,8 @@ def _scene(volume: BSplineVolume, frames: Sequence[Frame], coarser: int) -> Scen
         "places": _both(points, coarser, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
         "axes": list(AXES),
         "spans": [breakpoints(row).tolist() for row in frames[0].knots or volume.knots],
-        "colors": list(evaluate.FACE_COLORS),
-        "labels": evaluate.face_labels(),
+        "colors": [color for color, _ in color_labels(volume)],
+        "labels": [label for _, label in color_labels(volume)],
         "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
         "fields": [_described(field, frames[0]) for field in whole[0].fields],
         "frames": [_values(frame, bound, coarser) for frame in whole],
@@ -239,7 +240,7 @@ def _thinned(samples: Samples, coarser: int) -> tuple[Array, Array]:
     """
     step = slice(None, None, coarser)
     faces = np.stack([patch[:: 2 * coarser, :: 2 * coarser] for patch in samples.patches[:6]])
-    return faces, samples.lattice[step, step, step]
+    return faces, samples.lattices[0][step, step, step]
 
 
 def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint16) -> str:
