@@ -98,6 +98,14 @@ class MultiPatch(Brief, Shown):
         return iter(self.patches)
 
 
+def as_multipatch(body: BSplineVolume | MultiPatch) -> MultiPatch:
+    """Return a body as several patches, a volume as one. Raises TypeError for another object."""
+    if isinstance(body, MultiPatch):
+        return body
+    demand_volume(body)
+    return MultiPatch((body,))
+
+
 def shared_numbers(
     shapes: Sequence[tuple[int, ...]], interfaces: Sequence[Interface]
 ) -> tuple[tuple[IntArray, ...], int]:
