@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.files import replacing
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
@@ -29,7 +29,6 @@ from ..options import PROBLEMS
 from ..report import document as reports
 from ..type_check import check_type
 from . import gismo, mfem, splinepy, view, vtk
-from .patches import as_several
 from .reading import ENDINGS, READERS, kind_of, read_body
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
@@ -111,7 +110,7 @@ def load_volume(path: str | Path) -> BSplineVolume | MultiPatch:
         if kind is None and source.suffix != ".npz":
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
         body = read_body(source, kind) if kind in READERS else _load_archive(source)
-    rows = [row for patch in as_several(body) for row in patch.knots]
+    rows = [row for patch in as_multipatch(body) for row in patch.knots]
     if min(float(np.diff(np.unique(row)).min()) for row in rows) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
     return body

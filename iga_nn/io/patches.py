@@ -8,7 +8,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.interface import Face, face_label, face_layer
 from parameterize.spline.multipatch import FLAT, MultiPatch, net_area
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import LARGEST, BSplineVolume
 
 log = logging.getLogger(__name__)
 
@@ -24,22 +24,22 @@ def count_of(degrees: Sequence[int], knots: Sequence[Array]) -> int:
 def patch_of(degrees: Sequence[int], knots: Sequence[Array], rows: Array, weights: Array | None) -> BSplineVolume:
     """Return the volume with these parts, its knots scaled to run from 0 to 1; the map stays.
 
-    rows: control points (n_u n_v n_w, 3), u fastest. weights: (n_u n_v n_w,), None where all are 1. Raises ValueError
-    where the parts do not fit together.
+    rows: control points (n_u n_v n_w, 3), u fastest. weights: (n_u n_v n_w,), None where all are 1; where they are
+    alike the volume is polynomial. Raises ValueError where the parts do not fit together.
     """
     if min(degrees) < 1:
         raise ValueError(f"has the degree {min(degrees)}; a degree is 1 or larger")
     counts = [len(row) - degree - 1 for row, degree in zip(knots, degrees, strict=True)]
     if min(counts) < 1 or len(rows) != count_of(degrees, knots):
         raise ValueError(f"has {len(rows)} control points; degrees and knots ask for {' x '.join(map(str, counts))}")
-    if not all(np.all(np.isfinite(row)) and row[-1] > row[0] for row in knots):
-        raise ValueError("knots must be finite and span an interval")
-    if weights is not None and not 0.0 < weights.max() <= (1.0 + WEIGHTS_ALIKE) * weights.min():  # refuses NaN, too
-        raise ValueError("is rational: its weights are not all equal and positive; only polynomial splines are taken")
+    if not all(np.all(np.abs(row) < LARGEST) and row[-1] - row[0] > 1.0 / LARGEST for row in knots):  # refuses NaN, too
+        raise ValueError(f"knots must be finite and span an interval of {1.0 / LARGEST:g} to {LARGEST:g}")
     k_u, k_v, k_w = ((row - row[0]) / (row[-1] - row[0]) for row in knots)
     p_u, p_v, p_w = (int(p) for p in degrees)
-    net = rows.reshape(*reversed(counts), 3).transpose(2, 1, 0, 3)
-    return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), np.ascontiguousarray(net))
+    net = np.ascontiguousarray(rows.reshape(*reversed(counts), 3).transpose(2, 1, 0, 3))
+    if weights is None or 0.0 < weights.max() <= (1.0 + WEIGHTS_ALIKE) * weights.min():  # polynomial
+        return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), net)
+    return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), net, weights.reshape(*reversed(counts)).transpose(2, 1, 0))
 
 
 def fastest_first(net: Array) -> Array:
@@ -62,11 +62,6 @@ def body_of(patches: Sequence[BSplineVolume], declared: Iterable[tuple[Face, Fac
     body = MultiPatch.from_patches(patches)
     _compare(body, [frozenset(pair) for pair in declared])
     return body if len(body) > 1 or body.interfaces else body.patches[0]
-
-
-def as_several(body: BSplineVolume | MultiPatch) -> MultiPatch:
-    """Return a body of one patch or several as several: writers see one kind."""
-    return body if isinstance(body, MultiPatch) else MultiPatch((body,))
 
 
 def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:

@@ -54,16 +54,14 @@ def cells_of_patches(body: MultiPatch) -> pyvista.UnstructuredGrid:
     grids = [exact_cells(patch, None) for patch in body]
     shapes = [tuple(1 + p * (len(np.unique(k)) - 1) for p, k in zip(v.degrees, v.knots, strict=True)) for v in body]
     labels, count = shared_numbers(shapes, body.interfaces)
-    points = np.empty((count, 3))
-    cells, sizes = [], []
-    for number, (grid, label) in enumerate(zip(grids, labels, strict=True)):
-        points[label.ravel()] = grid.points
+    points, weights, cells = np.empty((count, 3)), np.empty(count), []
+    for grid, label in zip(grids, labels, strict=True):
+        points[label.ravel()], weights[label.ravel()] = grid.points, grid.point_data["RationalWeights"]
         rows = grid.cells.reshape(grid.n_cells, -1)
         cells.append(np.column_stack([rows[:, :1], label.ravel()[rows[:, 1:]]]).ravel())
-        sizes.append(np.full(grid.n_cells, number))
     degrees = np.concatenate([grid.cell_data["HigherOrderDegrees"] for grid in grids])
-    joined = _grid(np.concatenate(cells), points, degrees)
-    joined.cell_data["patch"] = np.concatenate(sizes)
+    joined = _grid(np.concatenate(cells), points, weights, degrees)
+    joined.cell_data["patch"] = np.repeat(np.arange(len(grids)), [grid.n_cells for grid in grids])
     return joined
 
 
@@ -74,20 +72,20 @@ def exact_cells(volume: BSplineVolume, solution: SplineField | None) -> pyvista.
     points = _bernstein(volume.degrees, volume.knots, volume.control_points, breaks, degrees).reshape(-1, 3)
     cells = _cells([len(b) - 1 for b in breaks], degrees, orientation(volume) < 0)  # (s, nodes of a cell)
     counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
-    grid = _grid(counted.ravel(), points, np.tile(degrees, (len(cells), 1)).astype(np.float64))
+    grid = _grid(counted.ravel(), points, np.ones(len(points)), np.tile(degrees, (len(cells), 1)).astype(np.float64))
     if solution is not None:
         values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)
         grid.point_data["u"] = values.reshape(-1, *values.shape[3:])
     return grid
 
 
-def _grid(cells: IntArray, points: Array, degrees: Array) -> pyvista.UnstructuredGrid:
+def _grid(cells: IntArray, points: Array, weights: Array, degrees: Array) -> pyvista.UnstructuredGrid:
     """Return Bezier cells with their degrees (s, 3). cells: for each the number of its points, then the points."""
     import pyvista
 
     grid = pyvista.UnstructuredGrid(cells, np.full(len(degrees), BEZIER_HEXAHEDRON), points)
     grid.cell_data.set_array(degrees, "HigherOrderDegrees")
-    grid.point_data.set_array(np.ones(len(points)), "RationalWeights")
+    grid.point_data.set_array(weights, "RationalWeights")
     grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
     grid.GetPointData().SetActiveRationalWeights("RationalWeights")
     return grid
