@@ -97,10 +97,16 @@ def test_a_multipatch_chooses_among_the_geometries(in_folder):
     assert [str(interface) for interface in body.interfaces] == ["p0_u0 = p1_u1"]
 
 
+def test_geometries_without_ids_or_with_one_id_are_all_taken(in_folder):
+    """As in G+Smo's own cube.xml and cylinder.xml."""
+    for content in (cube(1) + cube(1, 1), (cube(1) + cube(1, 1)).replace(' id="1"', "")):
+        assert len(opened(f"<xml>{content}</xml>", in_folder).interfaces) == 1
+
+
 @pytest.mark.parametrize(
     ("rows", "says"),
     [
-        ("0 2 1 2 0 1 2 1 1 1", "interface p0_u1 = p1_u1: the file says that they are one"),
+        ("0 2 1 2 0 1 2 1 1 1", "interface p0_u1 = p1_u1: the file says that they are one, .* are 1 apart"),
         ("0 2 4 1 0 1 2 1 1 1", "an interface of its MultiPatch names no patch and side: 4 1"),
         ("0 2 1 x", "an interface of its MultiPatch must be whole numbers"),
     ],

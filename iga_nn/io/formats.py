@@ -88,8 +88,8 @@ def load_volume(path: str | Path) -> BSplineVolume | MultiPatch:
     Raises
     ------
     InputError
-        Where the file has no such format, is damaged or rational, where its patches do not fit together, and where
-        splinepy, which reads JSON, is missing.
+        Where the file has no such format or is damaged, where its patches do not fit together, and where splinepy,
+        which reads JSON, is missing.
 
     Examples
     --------

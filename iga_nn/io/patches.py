@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.interface import Face, face_label, face_layer
+from parameterize.spline.interface import Face, face_label, face_layer, gap, orientations
 from parameterize.spline.multipatch import FLAT, MultiPatch, net_area
 from parameterize.spline.volume import LARGEST, BSplineVolume
 
@@ -73,7 +73,9 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
         if any(patch >= len(body) for patch, _ in faces):
             raise ValueError(f"interface {names}: there are {len(body)} patches, counted from 0")
         if pair not in found and all(_has_area(body, face) for face in faces):
-            raise ValueError(f"interface {names}: the file says that they are one, but their control points differ")
+            apart = min(gap(body.patches, way) for way in orientations(faces[0], faces[-1]))
+            reason = f"are {apart:.3g} apart" if np.isfinite(apart) else "or weights do not fit together"
+            raise ValueError(f"interface {names}: the file says that they are one, but their control points {reason}")
     if declared and (more := found - set(declared)):
         names = ", ".join(" = ".join(face_label(*face) for face in sorted(pair)) for pair in more)
         log.warning("%s: glued, for their control points are the same, though the file does not list them", names)
