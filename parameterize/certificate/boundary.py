@@ -57,9 +57,14 @@ class BoundaryCheck:
 
 
 def check_boundary(volume: BSplineVolume, *, max_depth: int = 24) -> BoundaryCheck:
-    """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four."""
+    """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four.
+
+    Of a rational volume nothing is proved: the differences of its control points do not bound its derivatives.
+    """
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
+    if volume.weights is not None:
+        return BoundaryCheck(None, None, len(boundary_pieces(volume).nets))
     local = _local(volume)
     pieces = boundary_pieces(local)
     error = _rounding(local, max_depth)

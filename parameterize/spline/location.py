@@ -55,9 +55,9 @@ def _index(volume: BSplineVolume) -> "_Index":
 class _Index:
     """A volume prepared for the search.
 
-    starts (s, 3): the middles of the spans, with their images in the tree. nets (s, n_u, n_v, n_w, 3 or 4): their
-    Bezier control points, as in `bezier_nets`, and low and high (s, 3), the boxes of these. ends (s, 2, 3): the spans themselves. The cells of a
-    grid over the whole box list the spans whose boxes reach them: members[first[c] : first[c + 1]] of cell c.
+    starts (s, 3): the middles of the spans, with their images in the tree. nets: their Bezier control points, as
+    `bezier_nets` returns them, and low and high (s, 3), the boxes of these. ends (s, 2, 3): the spans themselves.
+    Cells of a grid over the whole box list the spans whose boxes reach them: members[first[c] : first[c + 1]] of c.
     """
 
     volume: BSplineVolume
