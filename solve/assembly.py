@@ -9,10 +9,11 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
-from .discretization.on_regions import demand_area, weak_faces
+from .discretization.on_regions import weak_faces
 from .discretization.operator import FormOperator, Operator, assemble
 from .discretization.quadrature import rule_of
 from .discretization.space import TrialSpace
+from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
@@ -75,17 +76,16 @@ def _on_regions(
 ) -> dict[str, WeakFace]:
     """Add the data on regions of the boundary to a load, and return the faces of the cube with terms, by name."""
     faces = weak_faces(volume, problem, space)
-    demand_area(volume, problem, space, faces)
     for face in faces:
         face.add_load(load)
     return {face.name: face for face in faces}
 
 
-def balanced(load: Array, space: TrialSpace) -> Array:
+def balanced(load: Array, unknowns: Unknowns, space: TrialSpace) -> Array:
     """Return the free coefficients' load (1, ...) minus its mean, for problems that leave the solution's constant open.
 
-    The basis functions sum to one, so the returned load is orthogonal to constants. Raises ValueError where the load's
-    sum, the integral of source and fluxes, is not nearly zero.
+    The basis functions sum to one, so the returned load is orthogonal to constants. space: for sums over all processes.
+    Raises ValueError where the load's sum, the integral of source and fluxes, is not nearly zero.
     """
     total, size = float(space.total(load.sum())), float(space.total(np.abs(load).sum()))
     if abs(total) > LARGEST_IMBALANCE * size:
@@ -93,4 +93,4 @@ def balanced(load: Array, space: TrialSpace) -> Array:
             f"incompatible Neumann data: source plus flux integrate to {total:.4g}, must be 0 where no Dirichlet face, "
             "no Robin face and no reaction fixes the solution"
         )
-    return load - total / space.dofs
+    return load - total / unknowns.count

@@ -1,6 +1,6 @@
 """Judges the numbers of a solve: notices on its data, its map, its mesh and its linear solver."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .discretization.errors import Errors
-from .discretization.operator import MatrixFree
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.space import TrialSpace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import in_scaled
 from .forms.parser import Expression, ExpressionError
-from .solution import Solution
+from .patch_system import PatchProblem, PatchSystem
+from .solution import MultiPatchSolution, Solution
 
 # Parameters per direction: the ends, and between them places without a pattern that a periodic formula could share.
 SAMPLES = np.concatenate([[0.0], np.sort(np.random.default_rng(0).uniform(0.0, 1.0, 7)), [1.0]])
@@ -48,14 +48,14 @@ class ConvergenceError(RuntimeError):
     1
     """
 
-    def __init__(self, message: str, solution: Solution | None = None) -> None:
+    def __init__(self, message: str, solution: Solution | MultiPatchSolution | None = None) -> None:
         super().__init__(message)
         self.solution = solution
 
 
 def judge(
-    volume: BSplineVolume,
     problem: BoundaryValueProblem,
+    patches: Sequence[PatchProblem],
     errors: Errors | None,
     estimate: Errors | None,
     unknowns: int,
@@ -65,9 +65,10 @@ def judge(
     The errors are not meaningful where a decisive formula does not vary, or where the mesh does not resolve the exact
     solution. A large error estimate gives a notice only, because an estimate may be wrong.
     """
-    points = Points.on(volume, SAMPLES, SAMPLES, SAMPLES)
-    ends = {name: np.take(points, -int(name[1]), 1 + AXES.index(name[0])) for name in FACE_NAMES}
-    contradictory = contradictions(volume, problem)
+    points, ends = _samples(patches)
+    contradictory = list(
+        dict.fromkeys(line for patch in patches for line in contradictions(patch.volume, patch.problem))
+    )
     empty = empty_formulas(problem, points, ends)
     rough, unresolved = [], []
     if estimate is not None and (estimate.l2_relative or 0.0) > LARGEST_ERROR:
@@ -79,6 +80,17 @@ def judge(
         unresolved.append(f"{described}: {share}{remedy}")
     meaningful = not unresolved and not any(role in DECISIVE for role, _ in empty)
     return [*rough, *contradictory, *(notice for _, notice in empty), *unresolved], meaningful
+
+
+def _samples(patches: Sequence[PatchProblem]) -> tuple[Array, dict[str, Array]]:
+    """Return points (3, ...) of all patches, and those of their faces: of "u0" of all patches, of "p2_u0" of one."""
+    every = [np.asarray(Points.on(patch.volume, SAMPLES, SAMPLES, SAMPLES)) for patch in patches]
+    ends: dict[str, Array] = {}
+    for name in FACE_NAMES:
+        parts = [np.take(points, -int(name[1]), 1 + AXES.index(name[0])) for points in every]
+        ends |= {patch.problem.prefix + name: part for patch, part in zip(patches, parts, strict=True)}
+        ends[name] = np.concatenate(parts, axis=1)
+    return np.concatenate(every, axis=1), ends
 
 
 def empty_formulas(
@@ -184,9 +196,7 @@ def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:
     return bool(np.abs(given - derived).max() <= AGREEMENT * size)
 
 
-def map_notices(
-    volume: BSplineVolume, matrix: MatrixFree, certified: str | None, weaknesses: Iterable[str]
-) -> list[str]:
+def map_notices(patches: Sequence[PatchSystem], certified: str | None, weaknesses: Iterable[str]) -> list[str]:
     """Return the notices on the map, and on a preconditioner that lacks a part.
 
     weaknesses: the weakness of the preconditioner of each component.
@@ -194,14 +204,17 @@ def map_notices(
     notices = []
     if certified not in (None, "certified"):
         notices.append(f"the map is {certified}, not certified: do not trust the solution")
-    if matrix.folded:
-        points = matrix.space.total(int(np.prod(matrix.rule.shape)))
-        wrong = "det J < 0" if orientation(volume) > 0 else "the map is left-handed, and det J > 0"
-        notices.append(f"{wrong} at {matrix.folded} of {points} Gauss points: solved with |det J| instead")
+    for patch in patches:
+        matrix = patch.matrix
+        if matrix.folded:
+            points = matrix.space.total(int(np.prod(matrix.rule.shape)))
+            wrong = "det J < 0" if orientation(patch.volume) > 0 else "the map is left-handed, and det J > 0"
+            where = f" of patch {patch.problem.prefix[:-1]}" if patch.problem.prefix else ""
+            notices.append(f"{wrong} at {matrix.folded} of {points} Gauss points{where}: solved with |det J| instead")
     return notices + [f"more iterations than usual: {text}" for text in dict.fromkeys(weaknesses) if text]
 
 
-def failure(volume: BSplineVolume, space: TrialSpace, result: LinearResult, caveat: str = "") -> str:
+def failure(patches: Sequence[PatchProblem], result: LinearResult, caveat: str = "") -> str:
     """Return in one line why the linear solver did not converge and where the map is worst; "" where it converged.
 
     caveat: the caveat of the law.
@@ -218,12 +231,14 @@ def failure(volume: BSplineVolume, space: TrialSpace, result: LinearResult, cave
     )
     if caveat:
         return f"{said}{caveat}, which takes many iterations: allow more of them, or try 0.45"
-    parameters, point, scaled = worst_place(volume, space)
+    worst = [(*worst_place(patch.volume, patch.space), patch.problem.prefix) for patch in patches]
+    parameters, point, scaled, prefix = min(worst, key=lambda place: place[2])
     cube, where = (
         ", ".join(f"{axis}={value:.4g}" for axis, value in zip(axes, place, strict=True))
         for axes, place in ((AXES, parameters), ("xyz", point))
     )
-    return f"{said}the map is worst at {cube} ({where}): scaled Jacobian {scaled:.2g}"
+    of_patch = f" of {prefix[:-1]}" if prefix else ""
+    return f"{said}the map is worst at {cube}{of_patch} ({where}): scaled Jacobian {scaled:.2g}"
 
 
 def worst_place(volume: BSplineVolume, space: TrialSpace) -> tuple[Array, Array, float]:

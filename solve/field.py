@@ -12,6 +12,7 @@ from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
 from parameterize.quality.distances import nearest_on_boundary
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
@@ -142,9 +143,11 @@ class SplineField(Brief):
         values = values.transpose(0, *(1 + axis for axis in (*x.order, *single))).reshape(-1, *x.shape[1:])
         return values if self.coefficients.ndim == 4 else values[0]
 
-    def fits(self, volume: BSplineVolume) -> bool:
-        """Return whether the field may be a datum on a volume: its own volume is this volume, or it has none."""
-        own = self.geometry
+    def fits(self, body: BSplineVolume | MultiPatch) -> bool:
+        """Return whether the field may be a datum on a body: its own volume is the body, or it has none."""
+        own, volume = self.geometry, body
+        if isinstance(volume, MultiPatch):
+            return False
         if own is None or own is volume:
             return True
         parts = zip((*own.knots, own.homogeneous), (*volume.knots, volume.homogeneous), strict=True)
@@ -167,3 +170,40 @@ class SplineField(Brief):
             return SplineField(degrees, knots, coefficients)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: {error}") from None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MultiPatchField(Brief):
+    """Evaluate a function on several patches.
+
+    Parameters
+    ----------
+    patches : tuple of SplineField
+        The function on each patch, with the patch as its volume.
+    """
+
+    patches: tuple[SplineField, ...]
+
+    def probe(self, points: ArrayLike) -> Array:
+        """Return the values (m,) or (m, c) at points (m, 3) in space, in the body's units; NaN outside of the body.
+
+        Raises ValueError for points that are not finite or of another shape.
+        """
+        found = self.patches[0].probe(points)
+        for patch in self.patches[1:]:
+            missing = np.isnan(found.reshape(len(found), -1)).any(axis=1)
+            if missing.any():
+                found[missing] = patch.probe(np.atleast_2d(np.asarray(points, dtype=np.float64))[missing])
+        return found
+
+    def at(self, x: Array) -> Array:
+        """Raise ValueError: points of the solver have the values of the field of their patch."""
+        raise ValueError("a field on several patches has values at points of a patch: use its `patches`, or probe")
+
+    def fits(self, body: BSplineVolume | MultiPatch) -> bool:
+        """Return whether the field may be a datum on a body: its own patches are those of the body."""
+        return (
+            isinstance(body, MultiPatch)
+            and len(body) == len(self.patches)
+            and all(field.fits(volume) for field, volume in zip(self.patches, body.patches, strict=True))
+        )

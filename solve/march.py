@@ -13,12 +13,12 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.display import Brief, above
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume, demand_volume
 from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data
 from .diagnostics import ConvergenceError
-from .discretization.operator import Operator, assemble
+from .discretization.operator import MatrixFree, Operator, assemble
 from .discretization.projection import projected
 from .discretization.quadrature import GaussRule
 from .discretization.space import TrialSpace, embedded
@@ -29,6 +29,7 @@ from .forms.frame import UnitFrame
 from .forms.mass import Mass
 from .linear.krylov import generalized_residuals
 from .options import IterationOptions, SolveOptions
+from .patch_system import PatchProblem
 from .solver import prepared
 from .system import System, build
 
@@ -155,9 +156,10 @@ def march(
         max_iterations=max_iterations,
     )
     at = problem if callable(problem) else lambda _: problem
-    placed, space = prepared(volume, at(first), options)
+    demand_volume(volume)
+    _, (patch,) = prepared(volume, at(first), options)
     with one_blas_thread():
-        data = _Data(volume, at, placed, space, options, callable(problem))
+        data = _Data(patch, at, options, callable(problem))
         path = _Path(data, scheme, capacity / dt, _started(data, start, first), first)
         times, fields, iterations = [first], [path.field], []
         for number in range(1, steps + 1):
@@ -186,15 +188,28 @@ def _check(dt: float, steps: int, scheme: str, capacity: float, every: int) -> N
 class _Data:
     """Evaluate a problem at any time, on one trial space.
 
-    placed: the problem of the first time, placed in the volume.
+    patch: the problem of the first time, placed in the volume.
     """
 
-    volume: BSplineVolume
+    patch: PatchProblem
     problem_at: Callable[[float], Any]
-    placed: BoundaryValueProblem
-    space: TrialSpace
     options: SolveOptions
     varies: bool
+
+    @property
+    def volume(self) -> BSplineVolume:
+        """Return the volume."""
+        return self.patch.volume
+
+    @property
+    def placed(self) -> BoundaryValueProblem:
+        """Return the problem of the first time, placed in the volume."""
+        return self.patch.problem
+
+    @property
+    def space(self) -> TrialSpace:
+        """Return the trial space."""
+        return self.patch.space
 
     def at(self, time: float) -> tuple[Array, Array]:
         """Return the load and the coefficients given on faces, (c, n_u, n_v, n_w) each.
@@ -216,7 +231,7 @@ class _Data:
 
     def system(self, shift: float) -> System:
         """Return the system of the law plus `shift` times the mass."""
-        return build(self.volume, self.placed, self.space, self.options, shift)
+        return build(self.volume, self.placed, [self.patch], self.options, shift)
 
     def mass(self, rule: GaussRule) -> Operator:
         """Return the mass matrix of all coefficients, by the quadrature rule of a system.
@@ -255,7 +270,12 @@ class _Path:
         self.time, self.last, self.load = time, start, data.at(time)[0]
         self.before: Array | None = None
         self.system = data.system(FACTORS[scheme] * rate)
-        self.mass = data.mass(self.system.matrix.rule)
+        self.mass = data.mass(self.matrix.rule)
+
+    @property
+    def matrix(self) -> MatrixFree:
+        """Return the matrix of the system that most steps solve."""
+        return self.system.patches[0].matrix
 
     @property
     def field(self) -> SplineField:
@@ -269,7 +289,7 @@ class _Path:
         load, known = self.data.at(time)
         system, right = self._equation(load)
         window = (slice(None), *self.data.space.window)
-        right = np.ascontiguousarray((right - system.matrix.apply(known))[window])
+        right = np.ascontiguousarray((right - system.patches[0].matrix.apply(known))[window])
         guess = self.last if self.before is None else 2.0 * self.last - self.before
         found = _solved(system, right, np.ascontiguousarray(guess[window]), self.data.options)
         if not found.converged:
@@ -287,7 +307,7 @@ class _Path:
         """Return the system of a step and its right-hand side, (c, n_u, n_v, n_w)."""
         mass = self.mass.apply
         if self.scheme == "trapezoidal":  # (A + s M) new = f_new + f + (s M - A) last, s = 2 / dt
-            shifted = self.system.matrix.apply(self.last)
+            shifted = self.matrix.apply(self.last)
             return self.system, load + self.load + 2.0 * FACTORS[self.scheme] * self.rate * mass(self.last) - shifted
         if self.before is None:
             return self.data.system(EULER * self.rate), load + EULER * self.rate * mass(self.last)
@@ -296,9 +316,5 @@ class _Path:
 
 def _solved(system: System, right: Array, guess: Array, options: IterationOptions) -> LinearResult:
     """Return the solution of a step's system from an initial guess; all arrays have the shape (c, m_u, m_v, m_w)."""
-
-    def precondition(residual: Array) -> Array:
-        return np.stack([block(part) for block, part in zip(system.blocks, residual, strict=True)])
-
     solver = conjugate_gradients if system.problem.form.symmetric else generalized_residuals
-    return solver(system.matrix.apply_free, right, precondition, options.tolerance, options.max_iterations, guess)
+    return solver(system.product, right, system.precondition, options.tolerance, options.max_iterations, guess)

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,11 @@ from parameterize.arrays import Array
 from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.display import Brief
 from parameterize.files import save_arrays
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 
 from .diagnostics import ConvergenceError
-from .field import SplineField
+from .field import MultiPatchField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .options import SolveOptions
 from .solver import discretized
@@ -38,7 +39,7 @@ class Modes(Brief):
     ----------
     frequencies : (n,) array
         omega / (2 pi) for K phi = omega^2 M phi: in Hz where the units are consistent and time is in seconds.
-    shapes : tuple of n SplineField
+    shapes : tuple of n SplineField, of several patches MultiPatchField
         phi with unit mass: the integral of density phi . phi is 1. The largest coefficient is positive.
     residuals : (n,) array
         Residuals `|K phi - omega^2 M phi| / |K phi|` of the free coefficients.
@@ -58,7 +59,7 @@ class Modes(Brief):
     """
 
     frequencies: Array
-    shapes: tuple[SplineField, ...]
+    shapes: tuple[Any, ...]  # SplineField, or MultiPatchField
     residuals: Array
     iterations: int
     rigid: int = 0
@@ -75,6 +76,8 @@ class Modes(Brief):
     def save(self, path: str | Path) -> None:
         """Write degrees, knots_u, knots_v, knots_w, coefficients (n, m_u, m_v, m_w, ..) and frequencies atomically."""
         first = self.shapes[0]
+        if isinstance(first, MultiPatchField):
+            raise ValueError("modes of several patches are not saved")
         rows = dict(zip(("knots_u", "knots_v", "knots_w"), first.knots, strict=True))
         coefficients = np.stack([shape.coefficients for shape in self.shapes])
         degrees = np.array(first.degrees)
@@ -86,7 +89,7 @@ class Modes(Brief):
 
 
 def modes(
-    volume: BSplineVolume,
+    body: BSplineVolume | MultiPatch,
     law: BoundaryValueProblem,
     density: float = 1.0,
     n: int = 6,
@@ -105,7 +108,7 @@ def modes(
 
     Parameters
     ----------
-    volume : BSplineVolume
+    body : BSplineVolume or MultiPatch
         The body.
     law : Elasticity, Poisson or Problem
         A symmetric law; only the data of held faces, and Robin's alpha, have an effect.
@@ -146,11 +149,11 @@ def modes(
         raise ValueError(f"{type(law.form).__name__} is not linear: it has modes about a state only, and no others")
     if not law.form.symmetric:
         raise ValueError(f"{type(law.form).__name__} is not symmetric: its modes need not be real, and are not sought")
-    shift = _stiffness(volume, law) if is_free(law) else 0.0
+    shift = _stiffness(body, law) if is_free(law) else 0.0
     options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature)
-    system = discretized(volume, law, options, shift)
-    system = replace(system, known=np.zeros_like(system.known))
-    rigid = RIGID.get(len(system.known), len(system.known)) if shift else 0
+    system = discretized(body, law, options, shift)
+    system = system.at_rest()
+    rigid = RIGID.get(len(system.right), len(system.right)) if shift else 0
     if n + rigid > len(system.load):
         raise ValueError(f"n {n}: the space has {len(system.load)} unknowns, fewer modes; raise refine or lower n")
     values, vectors, residuals, iterations = _lowest(system, n + rigid, tolerance, max_iterations)
@@ -183,11 +186,13 @@ def is_free(law: BoundaryValueProblem) -> bool:
     return on_faces and not law.form.has_reaction
 
 
-def _stiffness(volume: BSplineVolume, law: BoundaryValueProblem) -> float:
-    """Return the law's factor in the middle of a volume over the squared length, which estimates the eigenvalues."""
-    x = volume.grid([0.5], [0.5], [0.5]).reshape(3, 1)
-    length = np.ptp(volume.control_points.reshape(-1, 3), axis=0).max()
-    return float(law.on(volume).form.tensor(x)[0, 0] / length**2)
+def _stiffness(body: BSplineVolume | MultiPatch, law: BoundaryValueProblem) -> float:
+    """Return the law's factor in the middle of a patch over the squared length, which estimates the eigenvalues."""
+    glued, placed = as_multipatch(body), law.on(body)
+    own = placed.on_patch(0, glued.outer[0]) if isinstance(body, MultiPatch) else placed
+    x = glued.patches[0].grid([0.5], [0.5], [0.5]).reshape(3, 1)
+    length = np.ptp(np.concatenate([patch.control_points.reshape(-1, 3) for patch in glued]), axis=0).max()
+    return float(own.form.tensor(x)[0, 0] / length**2)
 
 
 def _lowest(system: System, n: int, tolerance: float, most: int) -> tuple[Array, Array, Array, int]:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import INDEFINITE, conjugate_gradients
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import BSplineVolume, demand_volume
 from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data
 from .diagnostics import ConvergenceError, judge
-from .discretization.errors import error_norms
+from .discretization.errors import Part, error_norms
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .field import SplineField
@@ -25,6 +25,7 @@ from .forms.problem import Problem
 from .linear.krylov import generalized_residuals
 from .linear.preconditioner import fast_diagonalization
 from .options import SolveOptions
+from .patch_system import PatchProblem
 from .solution import Solution, SolveReport
 from .solver import prepared
 
@@ -110,7 +111,9 @@ def newton(
         raise ValueError(f"load_steps must be a whole number, at least 1, got {load_steps!r:.80}")
     if weak := [c.role for c in problem.conditions if c.is_essential and not c.is_strong]:
         raise ValueError(f"{weak[0]}: newton holds all of u on whole faces of the cube only: write a region such as u0")
-    placed, space = prepared(volume, problem, options)
+    demand_volume(volume)
+    placed, (patch,) = prepared(volume, problem, options)
+    space = patch.space
     if len(placed.natural) == 6 and not placed.form.has_reaction:
         raise ValueError("newton: data of all six faces leave the solution open: give one face to boundary or robin")
     with one_blas_thread():
@@ -122,7 +125,7 @@ def newton(
         history: list[float] = []
         for step in range(1, load_steps + 1):
             full = balance.found(full, step / load_steps, history)
-        return _solution(volume, placed, space, full, balance, history, load_steps)
+        return _solution(patch, full, balance, history, load_steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,21 +254,13 @@ def _failed(history: list[float], why: str) -> str:
     )
 
 
-def _solution(
-    volume: BSplineVolume,
-    problem: Any,
-    space: TrialSpace,
-    full: Array,
-    balance: _Balance,
-    history: list[float],
-    more: int,
-) -> Solution:
+def _solution(patch: PatchProblem, full: Array, balance: _Balance, history: list[float], more: int) -> Solution:
     """Return the solution, with its errors where the exact solution is known."""
-    errors = None
+    volume, problem, space, errors = patch.volume, patch.problem, patch.space, None
     if problem.exact is not None:
-        errors = error_norms(volume, space, full, problem.exact_at, balance.forces.threads)
+        errors = error_norms([Part(volume, space, full, problem.exact_at)], balance.forces.threads)
     dofs = len(full) * space.dofs
-    doubtful, meaningful = judge(volume, problem, errors, None, dofs)
+    doubtful, meaningful = judge(problem, [patch], errors, None, dofs)
     report = SolveReport(
         elements=space.elements,
         dofs=dofs,

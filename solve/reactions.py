@@ -11,12 +11,13 @@ import numpy as np
 from parameterize.arrays import Array, in_brackets
 from parameterize.spline.volume import FACE_NAMES
 
-from .discretization.operator import MatrixFree
 from .discretization.space import TrialSpace
+from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.condition import WITH_FACTOR
+from .patch_system import PatchSystem
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Balance:
     @property
     def is_told(self) -> bool:
         """Return whether a report shows the balance: where it is one of forces, or where data are given on regions."""
-        return len(self.load) > 1 or not set(self.reactions) <= set(FACE_NAMES)
+        return len(self.load) > 1 or not all(role.endswith(FACE_NAMES) for role in self.reactions)
 
     def __str__(self) -> str:
         answers = [f"{role} answers {_shown(force)}" for role, force in self.reactions.items()]
@@ -72,21 +73,21 @@ def _shown(force: Sequence[float]) -> str:
     return in_brackets(force) if len(force) == 3 else ", ".join(f"{part:.6g}" for part in force)
 
 
-def balance(problem: BoundaryValueProblem, matrix: MatrixFree, coefficients: Array, loads: Array) -> Balance:
-    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w).
-
-    matrix: the matrix of the problem, with the terms on faces. loads: (c, n_u, n_v, n_w), the loads of the source and
-    of all conditions, before the part of the fixed coefficients is subtracted.
-    """
-    space, faces = matrix.space, [face for face in matrix.faces.values() if isinstance(face, WeakFace)]
-    residual = matrix.apply(coefficients) - loads
-    space.add(residual)
-    reactions = _of_faces(problem, space, residual)
-    weak, outside = _of_regions(problem, faces, coefficients)
-    lifted = sum(((face.weights * face.gamma * face.values).sum(axis=1) for face in faces), np.zeros(len(loads)))
-    own = loads.sum(axis=(1, 2, 3)) - lifted - outside
+def balance(
+    problem: BoundaryValueProblem, patches: Sequence[PatchSystem], unknowns: Unknowns, coefficients: Sequence[Array]
+) -> Balance:
+    """Return the balance of a solution's coefficients, (c, n_u, n_v, n_w) for each patch."""
+    space, components = patches[0].space, problem.form.components
+    residuals = [patch.matrix.apply(full) - patch.loads for patch, full in zip(patches, coefficients, strict=True)]
+    faces = [face for patch in patches for face in patch.weak]
+    reactions, own = _of_faces(patches, unknowns.on_fixed(residuals)), np.zeros(components)
+    supports = _supports(problem)
+    for patch, full in zip(patches, coefficients, strict=True):
+        outside = _add_regions(patch.problem, patch.weak, full, supports)
+        lifted = sum(((f.weights * f.gamma * f.values).sum(axis=1) for f in patch.weak), np.zeros(components))
+        own = own + patch.loads.sum(axis=(1, 2, 3)) - lifted - outside
     load = space.total(own)
-    reactions |= {role: space.total(force) for role, force in weak.items()}
+    reactions |= {role: space.total(force) for role, force in supports.items()}
     forces = [load, *reactions.values()]
     size = float(np.abs(forces).sum())
     imbalance = None
@@ -101,19 +102,20 @@ def balance(problem: BoundaryValueProblem, matrix: MatrixFree, coefficients: Arr
     return Balance(tuple(load.tolist()), as_tuples, areas, imbalance)
 
 
-def _of_faces(problem: BoundaryValueProblem, space: TrialSpace, residual: Array) -> dict[str, Array]:
-    """Return the reactions of the fixed coefficients, by the face of the cube or by the condition that names it."""
-    fixed = np.zeros(residual.shape[1:], dtype=bool)
+def _of_faces(patches: Sequence[PatchSystem], residuals: Sequence[Array]) -> dict[str, Array]:
+    """Return the reactions of the fixed coefficients, by the face of a patch or by the condition that names it."""
     found: dict[str, Array] = {}
-    for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
-        here = np.zeros_like(fixed)
-        if fixed.size and (axis > 0 or _has_end(space, name)):
-            here[tuple((-1 if name[1] == "1" else 0) if a == axis else slice(None) for a in range(3))] = True
-        here &= ~fixed
-        fixed |= here
-        force = space.total((residual * here)[:, space.own].sum(axis=(1, 2, 3)))
-        role = next((c.role for c in problem.conditions if c.is_strong and name in c.region.faces), name)
-        found[role] = found.get(role, 0.0) + force
+    for patch, residual in zip(patches, residuals, strict=True):
+        space, fixed = patch.space, np.zeros(residual.shape[1:], dtype=bool)
+        for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
+            here = np.zeros_like(fixed)
+            if fixed.size and (axis > 0 or _has_end(space, name)):
+                here[tuple((-1 if name[1] == "1" else 0) if a == axis else slice(None) for a in range(3))] = True
+            here &= ~fixed
+            fixed |= here
+            force = space.total((residual * here)[:, space.own].sum(axis=(1, 2, 3)))
+            role = patch.problem.strong_role(name) or patch.problem.prefix + name
+            found[role] = found.get(role, 0.0) + force
     return found
 
 
@@ -125,15 +127,19 @@ def _has_end(space: TrialSpace, name: str) -> bool:
     return bool(rows.stop == space.whole.shape[0] if name == "u1" else rows.start == 0)
 
 
-def _of_regions(
-    problem: BoundaryValueProblem, faces: list[WeakFace], coefficients: Array
-) -> tuple[dict[str, Array], Array]:
-    """Return the reactions of supports on regions, and the flux of an exchange into a body of u = 0."""
-    found = {
-        c.role: np.zeros(len(coefficients))
+def _supports(problem: BoundaryValueProblem) -> dict[str, Array]:
+    """Return zero for each support on a region, by its role."""
+    return {
+        c.role: np.zeros(problem.form.components)
         for c in problem.conditions
         if (c.is_essential and not c.is_strong) or c.kind in WITH_FACTOR
     }
+
+
+def _add_regions(
+    problem: BoundaryValueProblem, faces: Sequence[WeakFace], coefficients: Array, found: dict[str, Array]
+) -> Array:
+    """Add the reactions of supports on regions of a patch, and return the flux of an exchange into a body of u = 0."""
     outside = np.zeros(len(coefficients))
     for face in faces:
         taken = np.zeros(len(face.weights), dtype=bool)
@@ -151,4 +157,4 @@ def _of_regions(
                 weights = face.weights[chosen]
                 found[condition.role] += (weights * np.einsum("cdm,dm->cm", free, given - pull)).sum(axis=1)
                 outside += (weights * np.einsum("cdm,dm->cm", free, given)).sum(axis=1)
-    return found, outside
+    return outside

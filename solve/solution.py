@@ -1,7 +1,7 @@
 """Defines Solution, the spline that a solve returns, and SolveReport, its numbers."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
 from parameterize.display import Shown, above
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.errors import Errors
-from .field import SplineField
+from .field import MultiPatchField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Quantity
 from .quantities import Extremes, all_extremes, at_points, extremes, on_grid
@@ -203,3 +204,54 @@ class Solution(SplineField, Shown):
         here.
         """
         return above("figures.solution").plot_solution(self, what, file)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MultiPatchSolution(MultiPatchField, Shown):
+    """Hold the discrete solution on several patches: a spline of the parameters of each patch.
+
+    Attributes
+    ----------
+    patches : tuple of Solution
+        The solution on each patch, with the body's report.
+    geometry : MultiPatch
+        The maps.
+    report : SolveReport
+        Unknowns, errors, iterations and seconds of the body.
+    problem : Poisson, Elasticity or Problem
+        The problem that the splines solve.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
+    >>> rod = iga_nn.MultiPatch.from_patches(halves)
+    >>> solution = iga_nn.solve(rod, iga_nn.Poisson(exact="x*y*z"))
+    >>> solution.report.dofs, solution.probe([[1.5, 0.5, 0.5]]).round(6)
+    (112, array([0.375]))
+    """
+
+    patches: tuple[Solution, ...]
+    geometry: MultiPatch
+    report: SolveReport
+    problem: BoundaryValueProblem
+
+    @property
+    def field(self) -> MultiPatchField:
+        """Return the splines without the report, as a datum for another problem on the same body."""
+        return MultiPatchField(tuple(patch.field for patch in self.patches))
+
+    def extremes(self, what: str | Quantity) -> Extremes:
+        """Return the least and the largest value of a quantity of one number a point, and their places."""
+        return _outermost([patch.extremes(what) for patch in self.patches])
+
+    def all_extremes(self) -> dict[str, Extremes]:
+        """Return the extremes of a report, by name (`problem.form.reported`)."""
+        each = [patch.all_extremes() for patch in self.patches]
+        return {name: _outermost([found[name] for found in each]) for name in each[0]}
+
+
+def _outermost(found: Sequence[Extremes]) -> Extremes:
+    """Return the extremes of a body from those of its patches."""
+    least, largest = min(found, key=lambda one: one.least), max(found, key=lambda one: one.largest)
+    return replace(largest, least=least.least, least_at=least.least_at, least_parameters=least.least_parameters)

@@ -1,34 +1,47 @@
 """Solves any problem: checks it, discretizes it, and solves the linear system."""
 
 import functools
-from typing import Any
+from dataclasses import replace
+from typing import Any, overload
 
 import numpy as np
 
 from parameterize.compilation import compilation_told
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.volume import BSplineVolume, demand_volume
+from parameterize.spline.interface import face_label
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.volume import BSplineVolume
 
 from .assembly import assemble_data, balanced
+from .discretization.on_regions import demand_area
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.slab import shared_space
-from .discretization.space import TrialSpace, trial_space
+from .discretization.space import trial_space
+from .discretization.unknowns import unknowns_of
+from .discretization.weak import WeakFace
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import Problem
 from .options import SolveOptions, check_device
-from .solution import Solution
+from .patch_system import PatchProblem
+from .solution import MultiPatchSolution, Solution
 from .system import System, build
 
 
-def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution:
-    """Solve a problem on a volume.
+@overload
+def solve_problem(body: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution: ...
+@overload
+def solve_problem(body: MultiPatch, problem: Poisson | Elasticity | Problem, **how: Any) -> MultiPatchSolution: ...
+def solve_problem(
+    body: BSplineVolume | MultiPatch, problem: Poisson | Elasticity | Problem, **how: Any
+) -> Solution | MultiPatchSolution:
+    """Solve a problem on a volume, or on several patches.
 
     Parameters
     ----------
-    volume : BSplineVolume
-        The map.
+    body : BSplineVolume or MultiPatch
+        The map, or the maps.
     problem : Poisson, Elasticity or Problem
         The law and its data.
     **how
@@ -66,8 +79,8 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
 
     Returns
     -------
-    Solution
-        The spline u_h, its `field` and its `report`.
+    Solution or MultiPatchSolution
+        The spline u_h, its `field` and its `report`; of several patches a spline each.
 
     Raises
     ------
@@ -88,17 +101,23 @@ def solve_problem(volume: BSplineVolume, problem: Poisson | Elasticity | Problem
     >>> solution.report.dofs, solution.report.l2_relative < 1e-3
     (343, True)
     """
-    return solve_with(volume, problem, SolveOptions.of(how))
+    return solve_with(body, problem, SolveOptions.of(how))
 
 
-def solve_with(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> Solution:
+@overload
+def solve_with(body: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> Solution: ...
+@overload
+def solve_with(body: MultiPatch, problem: BoundaryValueProblem, options: SolveOptions) -> MultiPatchSolution: ...
+def solve_with(
+    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions
+) -> Solution | MultiPatchSolution:
     """Return the solution of `solve_problem` for options in one object."""
     check_device(options.device, problem)
-    return discretized(volume, problem, options).solve_with(options)
+    return discretized(body, problem, options).solve_with(options)
 
 
 def discretize(
-    volume: BSplineVolume,
+    body: BSplineVolume | MultiPatch,
     problem: Poisson | Elasticity | Problem,
     *,
     refine: int = 0,
@@ -111,7 +130,7 @@ def discretize(
 
     Parameters
     ----------
-    volume, problem, refine, degree, threads, quadrature, comm
+    body, problem, refine, degree, threads, quadrature, comm
         As in `iga_nn.solve`; the errors are the same, too.
 
     Returns
@@ -127,49 +146,80 @@ def discretize(
     ((125, 125), (125,))
     """
     options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature, comm=comm)
-    return discretized(volume, problem, options)
+    return discretized(body, problem, options)
 
 
 def discretized(
-    volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions, shift: float = 0.0
+    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions, shift: float = 0.0
 ) -> System:
     """Return the system of `discretize` with `shift` times the mass in its matrix; a shifted body needs no supports."""
-    placed, space = prepared(volume, problem, options)
+    placed, patches = prepared(body, problem, options)
     if shift == 0.0:
         problem.demand_held()
-    return build(volume, placed, space, options, shift)
+    return build(body, placed, patches, options, shift)
 
 
 def prepared(
-    volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions
-) -> tuple[BoundaryValueProblem, TrialSpace]:
-    """Check volume and problem; return the problem placed in the volume, and the trial space."""
-    demand_volume(volume)
+    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions
+) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
+    """Check body and problem; return the problem placed in the body, and the problem on each patch."""
+    placed, patches = _on_patches(body, problem, options)
+    if all(part.stop <= part.start for patch in patches for part in patch.space.free):
+        raise ValueError(
+            f"degree {patches[0].space.degrees} leaves no unknown inside the volume: raise refine or degree"
+        )
+    for of_map in {patch.volume.degrees for patch in patches}:
+        _warm_up(of_map, options.degree, placed.form.components == 1 and placed.form.symmetric)
+    return placed, [replace(patch, space=shared_space(patch.space, options.comm)) for patch in patches]
+
+
+def _on_patches(
+    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions
+) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
+    """Return the problem placed in the body, and the problem on each patch."""
+    glued = as_multipatch(body)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
-    placed, space = problem.on(volume), trial_space(volume, options.refine, options.degree, problem.dirichlet)
-    if any(part.stop <= part.start for part in space.free):
-        raise ValueError(f"degree {space.degrees} leaves no unknown inside the volume: raise refine or degree")
-    _warm_up(volume.degrees, options.degree, placed.form.components == 1 and placed.form.symmetric)
-    return placed, shared_space(space, options.comm)
+    if isinstance(body, MultiPatch) and options.comm is not None and options.comm.size > 1:
+        raise ValueError("a body of several patches is solved by one process: leave comm out")
+    placed, several = problem.on(body), isinstance(body, MultiPatch)
+    outer = {face_label(i, face) for i, faces in enumerate(glued.outer) for face in faces if several}
+    if unknown := sorted(problem.patch_faces - outer):
+        raise ValueError(
+            f"{unknown[0]} is no outer face of the body; its faces are {', '.join(sorted(outer)) or 'u0 to w1'}"
+        )
+    patches = []
+    for i, (volume, faces) in enumerate(zip(glued.patches, glued.outer, strict=True)):
+        own = placed.on_patch(i, faces) if several else placed
+        space = trial_space(volume, options.refine, options.degree, own.dirichlet, faces)
+        patches.append(PatchProblem(volume, own, space))
+    return placed, patches
 
 
-def check_problem(volume: BSplineVolume, problem: BoundaryValueProblem, comm: Any = None) -> None:
+def check_problem(body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, comm: Any = None) -> None:
     """Evaluate a problem's data at the points of the coarsest solve; finer levels use points between these.
 
     comm: a communicator of mpi4py whose processes share the work. Raises ExpressionError where the data are not finite
     or have the wrong sign, ValueError where they do not balance.
     """
     problem.demand_held()
-    problem, space = problem.on(volume), shared_space(trial_space(volume, dirichlet=problem.dirichlet), comm)
-    _, load, _ = assemble_data(volume, problem, space, SolveOptions(threads=1, quadrature="gauss"))
+    options = SolveOptions(threads=1, quadrature="gauss", comm=comm)
+    _, patches = _on_patches(body, problem, options)
+    patches = [replace(patch, space=shared_space(patch.space, comm)) for patch in patches]
+    loads, faces = [], []
+    for patch in patches:
+        matrix, load, _ = assemble_data(patch.volume, patch.problem, patch.space, options)
+        loads.append(load)
+        faces += [face for face in matrix.faces.values() if isinstance(face, WeakFace)]
+    demand_area(problem, faces, patches[0].space, [patch.volume for patch in patches])
     if problem.fixes_nothing and not problem.form.has_reaction:
-        space.add(load)
-        balanced(load[:, *space.window], space)
+        unknowns = unknowns_of([patch.space for patch in patches], as_multipatch(body).interfaces)
+        balanced(unknowns.collect(loads), unknowns, patches[0].space)
     if problem.exact is not None:
-        with space.agreed():
-            for _, _, x in map_planes(volume, gauss_rule(space)):
-                problem.exact_at(x)
+        for patch in patches:
+            with patch.space.agreed():
+                for _, _, x in map_planes(patch.volume, gauss_rule(patch.space)):
+                    patch.problem.exact_at(x)
 
 
 @functools.cache
@@ -183,4 +233,5 @@ def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool)
     cube = BSplineVolume(degrees, tuple(knots), np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1))  # type: ignore[arg-type]
     problem = Poisson(exact="x*x") if is_scalar else Elasticity(exact=("x*x", "y", "z"))
     with compilation_told():
-        build(cube, problem, trial_space(cube, 1, degree), SolveOptions(threads=1)).solve()
+        options = SolveOptions(refine=1, degree=degree, threads=1)
+        build(cube, *_on_patches(cube, problem, options), options).solve()

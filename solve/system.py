@@ -1,9 +1,9 @@
-"""Defines System: the linear system of a problem on a volume, for `solve` or for a loop of the user's own."""
+"""Defines System: the linear system of a problem on a body, for `solve` or for a loop of the user's own."""
 
 import functools
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,39 +12,47 @@ from scipy.sparse.linalg import LinearOperator
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
+from parameterize.spline.interface import Interface
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
 
-from .assembly import assemble_data, balanced
+from .assembly import balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
-from .discretization.errors import Errors, error_norms, missing_mean
+from .discretization.errors import Errors, Part, error_norms, missing_mean
 from .discretization.estimate import error_estimate
-from .discretization.on_regions import demand_supports
-from .discretization.operator import FormOperator, Operator, assemble, with_mass
+from .discretization.on_regions import demand_area, demand_supports
+from .discretization.operator import FormOperator, MatrixFree, Operator, assemble
 from .discretization.space import TrialSpace, embedded, longest_edge
-from .discretization.weak import WeakFace
-from .field import SplineField
+from .discretization.unknowns import Glued, Unknowns, unknowns_of
+from .field import MultiPatchField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
 from .linear.krylov import generalized_residuals
-from .linear.preconditioner import FastDiagonalization, fast_diagonalization
+from .linear.patches import Coarse, GluedPreconditioner
+from .linear.preconditioner import FastDiagonalization
 from .options import IterationOptions, SolveOptions, check_device
+from .patch_system import PatchProblem, PatchSystem
 from .reactions import balance
-from .solution import Solution, SolveReport
+from .solution import MultiPatchSolution, Solution, SolveReport
 
 LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
+CONTINUOUS = "the error is not estimated: across interfaces of patches the gradient jumps; compare two refinements"
 
 log = logging.getLogger(__name__)
+
+Preconditioner = FastDiagonalization | GluedPreconditioner
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """State a problem on a volume as a linear system A x = b of N free unknowns, in double precision, matrix-free.
+    """State a problem on a body as a linear system A x = b of N free unknowns, in double precision, matrix-free.
 
-    A vector (N,) holds the free coefficients in C order of (c, m_u, m_v, m_w): components, and functions a direction
-    without those that Dirichlet data fix; `operator`, `mass` and `preconditioner` are SciPy LinearOperators (N, N).
-    Where processes share the space, arrays hold a process's rows and vectors its own rows; all processes call each
-    method.
+    For a volume a vector (N,) holds the free coefficients in C order of (c, m_u, m_v, m_w): components, and functions a
+    direction without those that Dirichlet data fix. For several patches it holds, for each component, the free
+    coefficients of all patches, shared ones once. `operator`, `mass` and `preconditioner` are SciPy LinearOperators
+    (N, N). Where processes share the space, arrays hold a process's rows and vectors its own rows; all processes call
+    each method.
 
     Examples
     --------
@@ -57,31 +65,37 @@ class System:
     (0, (5, 5, 5))
     """
 
-    volume: BSplineVolume
+    body: BSplineVolume | MultiPatch
     problem: BoundaryValueProblem
-    space: TrialSpace
-    matrix: Operator | FormOperator  # A, its products with all coefficients included
-    known: Array  # (c, n_u, n_v, n_w): the coefficients that the Dirichlet data fix, zero elsewhere
-    blocks: tuple[FastDiagonalization, ...]  # a component each
-    right: Array  # b, (c, m_u, m_v, m_w): of the free coefficients
-    loads: Array  # (c, n_u, n_v, n_w): of all coefficients, before the known ones are subtracted
+    patches: tuple[PatchSystem, ...]
+    unknowns: Unknowns
+    blocks: tuple[Preconditioner, ...]  # a component each
+    right: Array  # b, (c, ...): of the free coefficients
     setup: float  # process seconds
+
+    @property
+    def space(self) -> TrialSpace:
+        """Return the space of the first patch, by which processes send messages."""
+        return self.patches[0].space
 
     @property
     def operator(self) -> LinearOperator:
         """Return A, with Robin's terms."""
-        return self._linear(self.matrix.apply_free)
+        return self._linear(self.product)
+
+    def product(self, x: Array) -> Array:
+        """Return A times the free coefficients (c, ...)."""
+        return self._product(x, [patch.matrix for patch in self.patches])
+
+    def _product(self, x: Array, matrices: Sequence[MatrixFree]) -> Array:
+        parts = zip(matrices, self.unknowns.spread(x), strict=True)
+        return self.unknowns.collect([matrix.apply(full) for matrix, full in parts])
 
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """Return the mass matrix, the integrals of u . v."""
-        single, _ = assemble(self.volume, self.space, Mass(), threads=self.matrix.threads)
-        return self._linear(single.apply_free)
-
-    @property
-    def weak(self) -> list[WeakFace]:
-        """Return the faces of the cube with terms of conditions on regions."""
-        return [face for face in self.matrix.faces.values() if isinstance(face, WeakFace)]
+        each = [assemble(patch.volume, patch.space, Mass(), threads=patch.matrix.threads)[0] for patch in self.patches]
+        return self._linear(lambda x: self._product(x, each))
 
     @property
     def load(self) -> Array:
@@ -91,41 +105,51 @@ class System:
     @property
     def preconditioner(self) -> LinearOperator:
         """Return an approximate inverse of A; it is symmetric, and positive unless the solution's constant is open."""
-        return self._linear(self._precondition)
+        return self._linear(self.precondition)
 
-    def field(self, x: Array) -> SplineField:
-        """Return the spline of the free coefficients x (N,) and the fixed coefficients.
+    def at_rest(self) -> "System":
+        """Return the same system with the value zero wherever values are given; its fields are zero there."""
+        return replace(self, patches=tuple(patch.at_rest() for patch in self.patches))
+
+    def field(self, x: Array) -> SplineField | MultiPatchField:
+        """Return the spline of the free coefficients x (N,) and the fixed coefficients; of several patches one each.
 
         Raises ValueError for another number of coefficients.
         """
         if np.size(x) != self.right.size:
             raise ValueError(f"x must have {self.right.size} entries, the free coefficients, got {np.size(x)}")
-        return self._spline(self._filled(np.reshape(x, self.right.shape)))
+        found = self._splines(self._filled(np.reshape(x, self.right.shape)))
+        return MultiPatchField(tuple(found)) if isinstance(self.body, MultiPatch) else found[0]
 
-    def _filled(self, free: Array) -> Array:
-        """Return all coefficients (c, n_u, n_v, n_w) from the free ones, with the fixed coefficients."""
-        full = self.known.copy()
-        full[:, *self.space.window] = free
-        self.space.fill(full)
-        return full
+    def _filled(self, free: Array) -> list[Array]:
+        """Return all coefficients (c, n_u, n_v, n_w) of each patch, with the fixed coefficients."""
+        found = []
+        for patch, full in zip(self.patches, self.unknowns.spread(free), strict=True):
+            full += patch.known
+            found.append(full)
+        return found
 
     def vector(self, field: SplineField) -> Array:
         """Return the free coefficients (N,) of a field in this space, or in a space that this one contains.
 
         Raises ValueError for any other field.
         """
-        full = embedded(field.coefficients, field.degrees, field.knots, self.space)
+        (patch,) = self.patches
+        full = embedded(field.coefficients, field.degrees, field.knots, patch.space)
         full = full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0)
-        return full[:, *self.space.window].ravel()
+        return full[:, *patch.space.window].ravel()
 
-    def _spline(self, full: Array) -> SplineField:
-        """Return the spline of coefficients (c, n_u, n_v, n_w), gathered from all processes."""
-        whole = self.space.gather(full[:, self.space.own])
-        coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
-        return SplineField(self.space.degrees, self.space.whole.knots, coefficients, self.volume)
+    def _splines(self, full: Sequence[Array]) -> list[SplineField]:
+        """Return the splines of coefficients (c, n_u, n_v, n_w), gathered from all processes."""
+        found = []
+        for patch, own in zip(self.patches, full, strict=True):
+            whole = patch.space.gather(own[:, patch.space.own])
+            coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
+            found.append(SplineField(patch.space.degrees, patch.space.whole.knots, coefficients, patch.volume))
+        return found
 
-    def _precondition(self, residual: Array) -> Array:
-        """Return the preconditioner times the free coefficients (c, m_u, m_v, m_w)."""
+    def precondition(self, residual: Array) -> Array:
+        """Return the preconditioner times the free coefficients (c, ...)."""
         return np.stack([block(part) for block, part in zip(self.blocks, residual, strict=True)])
 
     def _linear(self, apply: Callable[[Array], Array]) -> LinearOperator:
@@ -137,7 +161,7 @@ class System:
         adjoint = {"rmatvec": product} if self.problem.form.symmetric else {}
         return LinearOperator((size, size), matvec=product, dtype=np.float64, **adjoint)
 
-    def solve(self, **how: Any) -> Solution:
+    def solve(self, **how: Any) -> Solution | MultiPatchSolution:
         """Solve the system, and return the solution with its errors and notices.
 
         how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`. Raises
@@ -146,9 +170,11 @@ class System:
         """
         return self.solve_with(IterationOptions.of(how))
 
-    def solve_with(self, options: IterationOptions) -> Solution:
+    def solve_with(self, options: IterationOptions) -> Solution | MultiPatchSolution:
         """Return the solution of `solve` for options in one object."""
         check_device(options.device, self.problem)
+        if len(self.patches) > 1 and (options.device != "cpu" or options.start is not None):
+            raise ValueError("several patches are solved on device='cpu', and without a start")
         with one_blas_thread():
             solution = self._solve(options)
         for notice in solution.report.notices if self.space.rank == 0 else ():
@@ -157,34 +183,37 @@ class System:
             raise ConvergenceError(solution.report.notices[-1], solution)
         return solution
 
-    def _solve(self, options: IterationOptions) -> Solution:
-        volume, problem, space = self.volume, self.problem, self.space
-        dofs = len(self.known) * space.dofs
+    def _solve(self, options: IterationOptions) -> Solution | MultiPatchSolution:
+        problem, space = self.problem, self.space
+        dofs = len(self.right) * self.unknowns.count
         clock, sent = [time.process_time()], space.traffic()
         result = self._iterate(options)
-        failed = failure(volume, space, result, problem.form.caveat)
+        failed = failure(self.patches, result, problem.form.caveat)
         if failed and result.iterations == 0:  # there is the start alone
             raise ConvergenceError(failed)
         steps = result.iterations + (options.start is not None)  # products made
         traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in space.traffic().items() if steps}
         full = self._filled(result.x)
         if self.blocks[0].singular:
-            full += missing_mean(volume, space, full[0], problem)
+            mean = missing_mean(self._parts(full))
+            full = [part + mean for part in full]
         clock.append(time.process_time())
-        largest = max(space.shared(float(np.abs(full).max(initial=0.0))))
+        largest = max(float(size) for part in full for size in space.shared(np.abs(part).max(initial=0.0)))
         has_norm = largest <= LARGEST_VALUE
         errors, estimate = self._errors(full, result.x, options.estimate) if has_norm else (None, None)
         clock.append(time.process_time())
-        doubtful, meaningful = judge(volume, problem, errors, estimate if result.converged else None, dofs)
+        doubtful, meaningful = judge(problem, self.patches, errors, estimate if result.converged else None, dofs)
         if errors is None and problem.form.caveat:
             doubtful.append(f"the error is not estimated: {problem.form.caveat}; compare two refinements")
+        elif errors is None and len(self.patches) > 1:
+            doubtful.append(CONTINUOUS)
         if not has_norm:
             doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
-        of_map = map_notices(volume, self.matrix, options.certified, [block.weakness for block in self.blocks])
+        of_map = map_notices(self.patches, options.certified, [block.weakness for block in self.blocks])
         report = SolveReport(
-            elements=space.elements,
+            elements=sum(patch.space.elements for patch in self.patches),
             dofs=dofs,
-            h=longest_edge(volume, space),
+            h=max(longest_edge(patch.volume, patch.space) for patch in self.patches),
             iterations=result.iterations,
             converged=result.converged,
             residual=result.residuals[-1],
@@ -195,86 +224,131 @@ class System:
             meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,
-            balance=balance(problem, self.matrix, full, self.loads) if has_norm else None,
+            balance=balance(problem, self.patches, self.unknowns, full) if has_norm else None,
         )
-        field = self._spline(full)
-        return Solution(field.degrees, field.knots, field.coefficients, volume, report=report, problem=self.problem)
+        solutions = tuple(
+            Solution(field.degrees, field.knots, field.coefficients, patch.volume, report=report, problem=patch.problem)
+            for field, patch in zip(self._splines(full), self.patches, strict=True)
+        )
+        if isinstance(self.body, MultiPatch):
+            return MultiPatchSolution(solutions, self.body, report, problem)
+        return solutions[0]
 
-    def _errors(self, full: Array, free: Array, is_estimated: bool | None) -> tuple[Errors | None, Errors | None]:
+    def _parts(self, full: Sequence[Array]) -> list[Part]:
+        """Return coefficients (c, n_u, n_v, n_w) of each patch with the exact values, zero where none are known."""
+        exact = self.problem.exact is not None
+        return [
+            Part(patch.volume, patch.space, own, patch.problem.exact_at if exact else _nothing)
+            for patch, own in zip(self.patches, full, strict=True)
+        ]
+
+    def _errors(
+        self, full: Sequence[Array], free: Array, is_estimated: bool | None
+    ) -> tuple[Errors | None, Errors | None]:
         """Return the errors of a solution, None without an exact one, and their estimate, None unless it is wanted.
 
-        full: all coefficients. free: the free coefficients. is_estimated: whether to estimate; None for problems
-        without an exact solution only.
+        full: all coefficients of each patch. free: the free coefficients. is_estimated: whether to estimate; None for
+        problems without an exact solution only. On several patches there is no estimate.
         """
-        volume, problem, space = self.volume, self.problem, self.space
         errors = estimate = None
-        if problem.exact is not None:
-            errors = error_norms(volume, space, full, problem.exact_at, self.matrix.threads)
-        if is_estimated or (is_estimated is None and problem.exact is None):
-            estimate = error_estimate(volume, space, full, problem, self._energy(free))
+        if self.problem.exact is not None:
+            errors = error_norms(self._parts(full), self.patches[0].matrix.threads)
+        if len(self.patches) == 1 and (is_estimated or (is_estimated is None and self.problem.exact is None)):
+            (patch,) = self.patches
+            estimate = error_estimate(patch.volume, patch.space, full[0], patch.problem, self._energy(free))
         return errors, estimate
 
     def _energy(self, free: Array) -> float | None:
         """Return a(u_h, u_h) of free coefficients that solve the system; None where it is not the work of the loads."""
-        lifted = sum(int(np.count_nonzero(face.values)) for face in self.weak)
-        if not self.problem.form.symmetric or self.space.total(np.count_nonzero(self.known) + lifted):
+        given = sum(
+            np.count_nonzero(patch.known) + sum(int(np.count_nonzero(face.values)) for face in patch.weak)
+            for patch in self.patches
+        )
+        if not self.problem.form.symmetric or self.space.total(given):
             return None
         return float(self.space.total((self.right * free).sum()))
 
     def _iterate(self, options: IterationOptions) -> LinearResult:
         """Return the result of conjugate gradients, or of GMRES where the law is not symmetric."""
-        operator, limits = self.matrix, (options.tolerance, options.max_iterations)
+        limits = options.tolerance, options.max_iterations
         guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
-            assert isinstance(operator, Operator)
-            return solve_on_device(operator, self.blocks[0], self.right, *limits, options.device, guess)
+            operator, block = self.patches[0].matrix, self.blocks[0]
+            assert isinstance(operator, Operator) and isinstance(block, FastDiagonalization)
+            return solve_on_device(operator, block, self.right, *limits, options.device, guess)
         if self.problem.form.symmetric:
-            system = operator.apply_free, self.right, self._precondition
+            system = self.product, self.right, self.precondition
             return conjugate_gradients(*system, *limits, guess, self.space.total)
+        if isinstance(self.unknowns, Glued):
+            return generalized_residuals(self.product, self.right, self.precondition, *limits)
         # the vectors of GMRES are whole on every process, products and preconditioner are shared
         gather, own = self.space.gather, (slice(None), self.space.place)
         found = generalized_residuals(
-            lambda x: gather(operator.apply_free(x[own])),
+            lambda x: gather(self.product(x[own])),
             gather(self.right),
-            lambda x: gather(self._precondition(x[own])),
+            lambda x: gather(self.precondition(x[own])),
             *limits,
             None if guess is None else gather(guess),
         )
         return replace(found, x=found.x[own])
 
 
+def _nothing(x: Array) -> tuple[Array, None]:
+    """Return the value zero (1, ...) at points (3, ...)."""
+    return np.zeros((1, *x.shape[1:])), None
+
+
 def build(
-    volume: BSplineVolume,
+    body: BSplineVolume | MultiPatch,
     problem: BoundaryValueProblem,
-    space: TrialSpace,
+    patches: Sequence[PatchProblem],
     options: SolveOptions,
     shift: float = 0.0,
 ) -> System:
-    """Return the system of a problem on a trial space; the problem's data are placed in the volume (`problem.on`).
+    """Return the system of a problem on a body, whose data are placed in it (`problem.on`).
 
-    shift: the factor of the mass matrix in A, which is added to the law's matrix.
+    patches: the problem on each patch. shift: the factor of the mass matrix in A, which is added to the law's matrix.
     """
-    start = time.process_time()
+    start, interfaces = time.process_time(), as_multipatch(body).interfaces
     with one_blas_thread():
-        operator, load, known = assemble_data(volume, problem, space, options)
-        if shift == 0.0:
-            weak = [face for face in operator.faces.values() if isinstance(face, WeakFace)]
-            demand_supports(problem, space, weak, float(np.ptp(volume.control_points, axis=(0, 1, 2)).max()))
-        else:
-            operator = with_mass(volume, operator, problem.form, shift)
-        blocks = (operator,) if isinstance(operator, Operator) else map(operator.block, range(len(known)))
-        inverses = tuple(map(fast_diagonalization, blocks))
-        if isinstance(operator, FormOperator) and inverses[0].singular:
+        systems = tuple(PatchSystem.of(patch, options, shift) for patch in patches)
+        _demand_held(problem, systems, shift)
+        unknowns = unknowns_of([patch.space for patch in systems], interfaces)
+        known = unknowns.completed([system.known for system in systems])
+        systems = tuple(replace(system, known=own) for system, own in zip(systems, known, strict=True))
+        blocks = _preconditioners(unknowns, systems, interfaces)
+        if blocks[0].singular and isinstance(systems[0].matrix, FormOperator):
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
                 "solution open: give one face, or a region, a value or an exchange"
             )
-        loads = load.copy()
-        load -= operator.apply(known)
-        space.add(load)
-        right = np.ascontiguousarray(load[:, *space.window])
-        right = balanced(right, space) if inverses[0].singular else right
+        right = unknowns.collect([system.right for system in systems])
+        right = balanced(right, unknowns, systems[0].space) if blocks[0].singular else right
         setup = time.process_time() - start
-    return System(volume, problem, space, operator, known, inverses, right, loads, setup)
+    return System(body, problem, systems, unknowns, blocks, right, setup)
+
+
+def _demand_held(problem: BoundaryValueProblem, systems: Sequence[PatchSystem], shift: float) -> None:
+    """Raise ValueError where a region has no area, and where supports leave a body without a shift free to move."""
+    space, volumes = systems[0].space, [system.volume for system in systems]
+    faces = [face for system in systems for face in system.weak]
+    demand_area(problem, faces, space, volumes)
+    if shift == 0.0 and problem.conditions and not any(system.space.dirichlet for system in systems):
+        demand_supports(problem, faces, space, volumes)
+
+
+def _preconditioners(
+    unknowns: Unknowns, systems: Sequence[PatchSystem], interfaces: Sequence[Interface]
+) -> tuple[Preconditioner, ...]:
+    """Return the preconditioner of each component."""
+    if not isinstance(unknowns, Glued):
+        return tuple(block for block in systems[0].blocks if block is not None)
+    found = []
+    for component in range(len(systems[0].blocks)):
+        blocks = [system.blocks[component] for system in systems]
+        is_open = all(block is not None and block.singular for block in blocks)
+        coarse = Coarse.of(unknowns, [system.operators[component] for system in systems], interfaces)
+        found.append(GluedPreconditioner(unknowns, tuple(block and block.held() for block in blocks), coarse, is_open))
+    return tuple(found)

@@ -4,7 +4,7 @@ import pytest
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from solve import benchmark_volume
-from solve.discretization.errors import error_norms
+from solve.discretization.errors import Part, error_norms
 from solve.discretization.space import trial_space
 
 
@@ -22,7 +22,7 @@ def test_norms_of_a_linear_function_against_zero_by_hand():
         x = points[0]
         return 3.0 * x[None], np.stack([3.0 + 0 * x, 0 * x, 0 * x])[None]
 
-    errors = error_norms(volume, space, np.zeros((1, *space.shape)), exact)
+    errors = error_norms([Part(volume, space, np.zeros((1, *space.shape)), exact)])
     assert errors.l2 == pytest.approx(np.sqrt(96.0))
     assert errors.l2_relative == pytest.approx(1.0)
     assert errors.h1_seminorm == pytest.approx(np.sqrt(72.0))
@@ -32,12 +32,13 @@ def test_norms_of_a_linear_function_against_zero_by_hand():
 def test_a_spline_has_no_distance_from_itself():
     """y is a spline on the curved map, with gradient (0, 1, 0): pulls the physical gradient back through J."""
     volume = benchmark_volume(4)
-    errors = error_norms(
+    part = Part(
         volume,
         trial_space(volume),
         volume.control_points[None, ..., 1],
         lambda x: (x[1:2], np.stack([0 * x[0], 1 + 0 * x[0], 0 * x[0]])[None]),
     )
+    errors = error_norms([part])
     assert errors.l2 < 1e-14
     assert errors.h1_seminorm < 1e-12
 
@@ -45,7 +46,7 @@ def test_a_spline_has_no_distance_from_itself():
 def test_without_gradient_the_seminorm_is_unknown():
     volume = cube(1.0)
     space = trial_space(volume)
-    errors = error_norms(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1], None))
+    errors = error_norms([Part(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1], None))])
     assert errors.h1_seminorm is None
     assert errors.l2 == pytest.approx(np.sqrt(1.0 / 3.0))
 
@@ -53,5 +54,5 @@ def test_without_gradient_the_seminorm_is_unknown():
 def test_degree_plus_two_points_integrate_the_square_of_one_degree_more_exactly():
     volume = cube(1.0)
     space = trial_space(volume)
-    errors = error_norms(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1] ** 3, None))
+    errors = error_norms([Part(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1] ** 3, None))])
     assert errors.l2 == pytest.approx(np.sqrt(1.0 / 7.0), rel=1e-14)

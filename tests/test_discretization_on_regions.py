@@ -24,7 +24,7 @@ def test_the_matrix_is_symmetric_and_positive_on_any_region(text, problem):
     matrix = system.operator @ np.eye(len(system.load))
     assert np.abs(matrix - matrix.T).max() < 1e-12 * np.abs(matrix).max()
     assert np.linalg.eigvalsh(matrix)[0] > 0.0
-    diagonal = np.stack([system.matrix.diagonal()]) if problem == "poisson" else None
+    diagonal = np.stack([system.patches[0].matrix.diagonal()]) if problem == "poisson" else None
     if diagonal is not None:
         assert np.diag(matrix).reshape(system.right.shape) == pytest.approx(diagonal[:, *system.space.window])
 
@@ -32,7 +32,7 @@ def test_the_matrix_is_symmetric_and_positive_on_any_region(text, problem):
 def test_the_block_of_a_component_has_the_diagonal_of_the_matrix():
     system = discretize(COARSE, Elasticity(exact=BODY, roller="x + y < 0.3 or nz > 0.5", fix="z < 0"))
     matrix = (system.operator @ np.eye(len(system.load))).diagonal().reshape(system.right.shape)
-    blocks = [system.matrix.block(i).diagonal()[system.space.window] for i in range(3)]
+    blocks = [system.patches[0].matrix.block(i).diagonal()[system.space.window] for i in range(3)]
     assert matrix == pytest.approx(np.stack(blocks), rel=1e-8)
 
 
@@ -172,7 +172,7 @@ def test_a_region_of_the_cube_is_held_by_the_space_itself():
     strong = discretize(TWISTED, Poisson(exact=WAVE, value="u0 or w1"))
     assert strong.space.dirichlet == ("u0", "w1")
     weak = discretize(TWISTED, Poisson(exact=WAVE, value="u0 and x > -9"))
-    assert weak.space.dirichlet == () and [*weak.matrix.faces] == list(FACE_NAMES)
+    assert weak.space.dirichlet == () and [*weak.patches[0].matrix.faces] == list(FACE_NAMES)
 
 
 def test_modes_of_a_body_on_rollers_leave_its_free_motions_out():

@@ -7,6 +7,7 @@ from solve import Poisson, SolveReport, benchmark_volume, convergence, rates
 from solve.discretization.errors import Errors
 from solve.discretization.space import TrialSpace
 from solve.options import SolveOptions
+from solve.patch_system import PatchProblem
 from solve.system import build
 
 WAVE = Poisson(exact="exp(x+z)*sin(y)")
@@ -72,7 +73,9 @@ def test_a_map_that_is_less_smooth_caps_the_rate_of_a_smoother_space():
     kept = convergence(volume, WAVE, refine=(1, 2), degree=4)
     knots = [open_uniform_knots(n + 4, 4) for n in (8, 16)]
     smoother = [
-        build(volume, WAVE, TrialSpace((4, 4, 4), (k, k, k)), SolveOptions(threads=1)).solve(tolerance=1e-12).report
+        build(volume, WAVE, [PatchProblem(volume, WAVE, TrialSpace((4, 4, 4), (k, k, k)))], SolveOptions(threads=1))
+        .solve(tolerance=1e-12)
+        .report
         for k in knots
     ]
     assert kept[-1].rate_l2 > 4.9

@@ -32,7 +32,7 @@ from iga_nn.level_table import csv_text
 from iga_nn.report.document import versions
 from parameterize.files import save_text
 from solve import Elasticity, Poisson, Problem, benchmark_volume, solve_problem
-from solve.discretization.errors import error_norms
+from solve.discretization.errors import Part, error_norms
 from solve.discretization.space import trial_space
 
 EXACT = "exp(x+z)*sin(y)"  # of Poisson's equation, and each component of elasticity's displacement
@@ -95,7 +95,7 @@ def run_ours(case: Case) -> dict[str, Any]:
     wall = time.perf_counter() - start
     report = solution.report
     coefficients = solution.coefficients.reshape(*volume.shape, -1)
-    errors = error_norms(volume, trial_space(volume), np.moveaxis(coefficients, -1, 0), law.exact_at)
+    errors = error_norms([Part(volume, trial_space(volume), np.moveaxis(coefficients, -1, 0), law.exact_at)])
     return {
         "dofs": report.dofs,
         "setup": report.seconds["setup"],
@@ -110,7 +110,7 @@ def run_mfem(case: Case) -> dict[str, Any]:
     """MFEM on the map as it is exported, with boundary data projected in L2 on the boundary."""
     import mfem.ser as mfem  # type: ignore[import-not-found]
 
-    from iga_nn.io.splinepy import write_mfem
+    from iga_nn.io.mfem import write_mfem
 
     terms = _poisson_of_mfem() if case.law == "poisson" else _elasticity_of_mfem()
     with TemporaryDirectory() as folder:

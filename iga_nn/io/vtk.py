@@ -7,6 +7,10 @@ points (RationalWeights, all 1) are active attributes: readers take them for the
 Bernstein coefficients, too. Where a solution has a higher degree or more knots than the map, both are written in the
 higher degree on all spans, exactly. VTK's cells are right-handed: of a left-handed volume each has w reversed.
 
+The patches of a body are in one grid, not a block each: neighbours share the points of an interface, so that the
+surface is the body's and fields run on through it. The cell data `patch` is the number of a cell's patch, by which
+ParaView selects (Threshold) or colours.
+
 VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
 tessellations are right. For slicing and clipping there are the samples of `io.view`.
 """
@@ -21,9 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.spline.bernstein import elevation, extraction
 from parameterize.spline.bspline import apply_along, insert_knots, sparse_rows
+from parameterize.spline.multipatch import MultiPatch, shared_numbers
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve.field import SplineField
@@ -34,28 +39,57 @@ if TYPE_CHECKING:
 BEZIER_HEXAHEDRON = 79
 
 
-def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None = None, *_: object) -> None:
+def write_bezier(
+    path: Path, volume: BSplineVolume | MultiPatch, solution: SplineField | None = None, *_: object
+) -> None:
     """Write the exact cells; a solution becomes the point data `u`."""
-    save(path, exact_cells(volume, solution))
+    save(path, exact_cells(volume, solution) if isinstance(volume, BSplineVolume) else cells_of_patches(volume))
+
+
+def cells_of_patches(body: MultiPatch) -> pyvista.UnstructuredGrid:
+    """Return the cells of all patches, with the number of each cell's patch as the cell data `patch`.
+
+    Neighbours share the points of their interface, so that the surface of the grid is that of the body.
+    """
+    grids = [exact_cells(patch, None) for patch in body]
+    shapes = [tuple(1 + p * (len(np.unique(k)) - 1) for p, k in zip(v.degrees, v.knots, strict=True)) for v in body]
+    labels, count = shared_numbers(shapes, body.interfaces)
+    points = np.empty((count, 3))
+    cells, sizes = [], []
+    for number, (grid, label) in enumerate(zip(grids, labels, strict=True)):
+        points[label.ravel()] = grid.points
+        rows = grid.cells.reshape(grid.n_cells, -1)
+        cells.append(np.column_stack([rows[:, :1], label.ravel()[rows[:, 1:]]]).ravel())
+        sizes.append(np.full(grid.n_cells, number))
+    degrees = np.concatenate([grid.cell_data["HigherOrderDegrees"] for grid in grids])
+    joined = _grid(np.concatenate(cells), points, degrees)
+    joined.cell_data["patch"] = np.concatenate(sizes)
+    return joined
 
 
 def exact_cells(volume: BSplineVolume, solution: SplineField | None) -> pyvista.UnstructuredGrid:
     """Return the cells of a volume with the coefficients of a solution on it."""
-    import pyvista
-
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
     breaks, degrees = breaks_of(volume, solution), [max(s.degrees[a] for s in shown) for a in range(3)]
     points = _bernstein(volume.degrees, volume.knots, volume.control_points, breaks, degrees).reshape(-1, 3)
     cells = _cells([len(b) - 1 for b in breaks], degrees, orientation(volume) < 0)  # (s, nodes of a cell)
     counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
-    grid = pyvista.UnstructuredGrid(counted.ravel(), np.full(len(cells), BEZIER_HEXAHEDRON), points)
-    grid.cell_data.set_array(np.tile(degrees, (len(cells), 1)).astype(np.float64), "HigherOrderDegrees")
-    grid.point_data.set_array(np.ones(len(points)), "RationalWeights")
-    grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
-    grid.GetPointData().SetActiveRationalWeights("RationalWeights")
+    grid = _grid(counted.ravel(), points, np.tile(degrees, (len(cells), 1)).astype(np.float64))
     if solution is not None:
         values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)
         grid.point_data["u"] = values.reshape(-1, *values.shape[3:])
+    return grid
+
+
+def _grid(cells: IntArray, points: Array, degrees: Array) -> pyvista.UnstructuredGrid:
+    """Return Bezier cells with their degrees (s, 3). cells: for each the number of its points, then the points."""
+    import pyvista
+
+    grid = pyvista.UnstructuredGrid(cells, np.full(len(degrees), BEZIER_HEXAHEDRON), points)
+    grid.cell_data.set_array(degrees, "HigherOrderDegrees")
+    grid.point_data.set_array(np.ones(len(points)), "RationalWeights")
+    grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
+    grid.GetPointData().SetActiveRationalWeights("RationalWeights")
     return grid
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray
-from ..display import Brief, Shown
+from ..display import Brief, Shown, above
+from .archive import is_of_patches, load_patches, save_patches
 from .interface import Face, Interface, face_label, face_layer, gap, knots_agree, orientations
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
 
@@ -58,12 +60,12 @@ class MultiPatch(Brief, Shown):
             demand_volume(patch)
         seen: set[Face] = set()
         for interface in self.interfaces:
-            for patch, face in (interface.first, interface.second):
-                if face not in FACE_NAMES or not 0 <= patch < len(self.patches):
+            for number, face in (interface.first, interface.second):
+                if face not in FACE_NAMES or not 0 <= number < len(self.patches):
                     raise ValueError(f"interface {interface}: there is no such face")
-                if (patch, face) in seen:
-                    raise ValueError(f"{face_label(patch, face)} is glued twice")
-                seen.add((patch, face))
+                if (number, face) in seen:
+                    raise ValueError(f"{face_label(number, face)} is glued twice")
+                seen.add((number, face))
             if not knots_agree(self.patches, interface):
                 raise ValueError(f"interface {interface}: degrees or knots along the two faces differ")
             if gap(self.patches, interface) > 0.0:
@@ -86,6 +88,39 @@ class MultiPatch(Brief, Shown):
         labels, _ = shared_numbers([patch.shape for patch in given], found)
         return cls(_merged(given, labels), found)
 
+    @classmethod
+    def from_splinepy(cls, splines: Any) -> "MultiPatch":
+        """Make the body of a splinepy.Multipatch, or of a list of its splines, glued as by `from_patches`.
+
+        Raises TypeError for other objects, ValueError where the splines are no volumes or do not fit together.
+        """
+        return above("io.splinepy").body_from_splinepy(splines)
+
+    def to_splinepy(self) -> Any:
+        """Return the same body as a splinepy.Multipatch. Raises InputError where splinepy is missing."""
+        return above("io.splinepy").body_to_splinepy(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the patches and interfaces as volume.npz; atomic. One patch that is not glued is a volume there."""
+        if len(self) == 1 and not self.interfaces:
+            self.patches[0].save(path)
+        else:
+            save_patches(path, self.patches, self.interfaces)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "MultiPatch":
+        """Read volume.npz, of one patch or several.
+
+        Raises FileNotFoundError, or ValueError that names the defect of the file.
+        """
+        if not is_of_patches(path):
+            return cls((BSplineVolume.load(path),))
+        patches, interfaces = load_patches(path)
+        try:
+            return cls(patches, interfaces)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+
     @cached_property
     def outer(self) -> tuple[tuple[str, ...], ...]:
         """Return for each patch the names of the faces that are not glued: together they are the body's boundary."""
@@ -99,6 +134,14 @@ class MultiPatch(Brief, Shown):
         return iter(self.patches)
 
 
+def as_multipatch(body: BSplineVolume | MultiPatch) -> MultiPatch:
+    """Return a body as several patches, a volume as one. Raises TypeError for another object."""
+    if isinstance(body, MultiPatch):
+        return body
+    demand_volume(body)
+    return MultiPatch((body,))
+
+
 def shared_numbers(
     shapes: Sequence[tuple[int, ...]], interfaces: Sequence[Interface]
 ) -> tuple[tuple[IntArray, ...], int]:
@@ -108,7 +151,7 @@ def shared_numbers(
     coefficients of the patches come.
     """
     sizes = [int(np.prod(shape)) for shape in shapes]
-    starts = np.cumsum([0, *sizes])
+    starts = [0, *np.cumsum(sizes).tolist()]
     rows = [np.arange(a, b).reshape(shape) for a, b, shape in zip(starts, starts[1:], shapes, strict=False)]
     pairs: list[Any] = [np.empty((2, 0), dtype=np.int64)]
     for interface in interfaces:
@@ -117,9 +160,10 @@ def shared_numbers(
         pairs.append(np.stack([first.ravel(), second.ravel()]))
     i, j = np.concatenate(pairs, axis=1)
     graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(starts[-1],) * 2)
-    _, groups = connected_components(graph, directed=False)
-    _, first_places, groups = np.unique(groups, return_index=True, return_inverse=True)
-    order = np.empty(len(first_places), dtype=np.int64)
+    _, first_places, groups = np.unique(
+        connected_components(graph, directed=False)[1], return_index=True, return_inverse=True
+    )
+    order: IntArray = np.empty(len(first_places), dtype=np.int64)
     order[np.argsort(first_places)] = np.arange(len(first_places))
     numbers = order[groups]
     return tuple(numbers[row] for row in rows), len(order)
@@ -138,7 +182,7 @@ def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float)
     """Yield the pairs of faces with the same control points; raise ValueError for those that nearly match."""
     faces = [(i, name) for i in range(len(patches)) for name in FACE_NAMES]
     nets = [face_layer(patches[i].control_points, name) for i, name in faces]
-    has_area = [_area(net) > FLAT * size**2 for net in nets]
+    has_area = [net_area(net) > FLAT * size**2 for net in nets]
     middles = np.array([_corners(net).mean(axis=0) for net in nets])
     taken: dict[int, int] = {}
     for i, j in sorted(cKDTree(middles).query_pairs(2.0 * tolerance)):
@@ -166,7 +210,7 @@ def _corners(net: Array) -> Array:
     return net[:: len(net) - 1, :: net.shape[1] - 1].reshape(4, 3)
 
 
-def _area(net: Array) -> float:
+def net_area(net: Array) -> float:
     """Return the area of a face's control net, sum over its cells."""
     a, b = np.diff(net, axis=0)[:, :-1], np.diff(net, axis=1)[:-1]
     return float(np.linalg.norm(np.cross(a, b), axis=-1).sum())
@@ -175,4 +219,4 @@ def _area(net: Array) -> float:
 def _same_points(one: Array, other: Array, tolerance: float) -> bool:
     """Return whether each point of either set (k, 3) lies within the tolerance of one of the other set."""
     ways = ((one, other), (other, one))
-    return all(float(cKDTree(b).query(a)[0].max()) <= tolerance for a, b in ways)
+    return all(float(np.max(cKDTree(b).query(a)[0])) <= tolerance for a, b in ways)

@@ -1,7 +1,8 @@
 """Computes the errors of a solution against an exact solution."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,13 +10,28 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
-from ..forms.boundary_value_problem import BoundaryValueProblem
 from . import kernels
 from .quadrature import gauss_rule, geometry_planes
 from .space import TrialSpace
 
 PLANES = 16  # of points of u, in a piece of work
 POINTS = 2**16  # of a plane that are evaluated at once: they take dozens of arrays
+
+
+Exact = Callable[[Array], tuple[Array, Array | None]]
+
+
+class Part(NamedTuple):
+    """Hold a solution on one patch: coefficients (c, n_u, n_v, n_w) in a space, and the exact values.
+
+    exact: a function of points (3, ...) that returns u (c, ...) and grad u (c, 3, ...), or None in place of the
+    gradient.
+    """
+
+    volume: BSplineVolume
+    space: TrialSpace
+    coefficients: Array
+    exact: Exact
 
 
 @dataclass(frozen=True)
@@ -32,22 +48,29 @@ class Errors:
     h1_relative: float | None = None
 
 
-def error_norms(
-    volume: BSplineVolume,
-    space: TrialSpace,
-    coefficients: Array,
-    exact: Callable[[Array], tuple[Array, Array | None]],
-    threads: int = 1,
-) -> Errors:
-    """Return error norms over the physical domain, over all components (c, n_u, n_v, n_w) together.
+def error_norms(parts: Sequence[Part], threads: int = 1) -> Errors:
+    """Return error norms over the physical domain, over all patches and components together.
 
-    exact: a function of points (3, ...) that returns u (c, ...) and grad u (c, 3, ...), or None in place of the
-    gradient. The integrals use degree + 2 Gauss points a span and direction.
+    The integrals use degree + 2 Gauss points a span and direction.
     """
+    sums, has_gradient = np.zeros(4), True
+    for part in parts:
+        squares, known = _squares(*part, threads)
+        sums += part.space.total(squares)
+        has_gradient &= all(part.space.shared(known))
+    l2, norm, seminorm, slope = np.sqrt(sums).tolist()
+    if not has_gradient:
+        return Errors(l2, ratio(l2, norm))
+    return Errors(l2, ratio(l2, norm), seminorm, ratio(seminorm, slope))
+
+
+def _squares(
+    volume: BSplineVolume, space: TrialSpace, coefficients: Array, exact: Exact, threads: int
+) -> tuple[Array, bool]:
+    """Return the integrals of (u - u_h)^2, u^2, |grad u - grad u_h|^2, |grad u|^2, and whether the last are known."""
     whole, splines = gauss_rule(space, [p + 2 for p in space.degrees]), np.ascontiguousarray(coefficients)
     strips = [(rule, rule.tabulate(space.degrees, space.knots)) for rule in whole.strips(POINTS)]
-    # of (u - u_h)^2, u^2, |grad u - grad u_h|^2, |grad u|^2, plane by plane: the same for any number of threads
-    sums = np.zeros((whole.shape[0], 4))
+    sums = np.zeros((whole.shape[0], 4))  # plane by plane: the same for any number of threads
     has_gradient = []
 
     def integrate(points: range) -> None:
@@ -69,10 +92,7 @@ def error_norms(
     planes = range(whole.shape[0])
     with space.agreed():
         in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
-    l2, norm, seminorm, slope = np.sqrt(space.total(sums.sum(axis=0))).tolist()
-    if not all(space.shared(all(has_gradient))):
-        return Errors(l2, ratio(l2, norm))
-    return Errors(l2, ratio(l2, norm), seminorm, ratio(seminorm, slope))
+    return sums.sum(axis=0), all(has_gradient)
 
 
 def ratio(error: float, size: float) -> float | None:
@@ -80,16 +100,18 @@ def ratio(error: float, size: float) -> float | None:
     return error / size if size > 0.0 else None
 
 
-def missing_mean(volume: BSplineVolume, space: TrialSpace, coefficients: Array, problem: BoundaryValueProblem) -> float:
-    """Return the constant to add to a solution (n_u, n_v, n_w) for the mean of `exact`, or mean zero without it."""
-    rule = gauss_rule(space)
-    tables, spline = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients)
-    plane = np.empty((4, *rule.plane_shape))
+def missing_mean(parts: Sequence[Part]) -> float:
+    """Return the constant to add to a solution of one component for the mean of the exact values."""
     lack = size = 0.0
-    with space.agreed():
-        for q, _, measure, x in geometry_planes(volume, rule):
-            kernels.evaluate_plane(spline, q, tables, plane)
-            wanted = 0.0 if problem.exact is None else problem.exact_at(x)[0][0]
-            lack += float(((wanted - plane[0]) * np.abs(measure)).sum())
-            size += float(np.abs(measure).sum())
-    return float(space.total(lack) / space.total(size))
+    for volume, space, coefficients, exact in parts:
+        rule = gauss_rule(space)
+        tables, spline = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients[0])
+        plane = np.empty((4, *rule.plane_shape))
+        here = of_one = 0.0
+        with space.agreed():
+            for q, _, measure, x in geometry_planes(volume, rule):
+                kernels.evaluate_plane(spline, q, tables, plane)
+                here += float(((exact(x)[0][0] - plane[0]) * np.abs(measure)).sum())
+                of_one += float(np.abs(measure).sum())
+        lack, size = lack + space.total(here), size + space.total(of_one)
+    return float(lack / size)

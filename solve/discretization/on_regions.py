@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,8 @@ from .boundary import has_face
 from .space import TrialSpace
 from .surface_rule import SurfaceRule, surface_rule
 from .weak import WeakFace
+
+Patches = Sequence[BSplineVolume]
 
 MOST = 60  # conditions: a bit of a code each
 MARGIN = 2.0  # gamma over the least that keeps the form coercive
@@ -48,28 +50,35 @@ def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: Tria
     return found
 
 
-def demand_area(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, faces: list[WeakFace]) -> None:
-    """Raise ValueError where a region has no area on the boundary."""
+def demand_area(problem: BoundaryValueProblem, faces: Sequence[WeakFace], space: TrialSpace, volumes: Patches) -> None:
+    """Raise ValueError where a region has no area on the boundary.
+
+    faces: those of all patches with terms of conditions. space: any of the patches', for sums over all processes.
+    """
     for i, condition in enumerate(problem.conditions):
         if not condition.is_strong and space.total(sum(face.weights[face.holds(i)].sum() for face in faces)) == 0.0:
-            points = volume.control_points.reshape(-1, 3)
+            points = np.concatenate([volume.control_points.reshape(-1, 3) for volume in volumes])
             low, high = (in_brackets(ends.tolist()) for ends in (points.min(axis=0), points.max(axis=0)))
             raise ValueError(
                 f"{condition.role}: no part of the boundary lies there; the body lies between {low} and {high}"
             )
 
 
-def demand_supports(problem: BoundaryValueProblem, space: TrialSpace, faces: list[WeakFace], size: float) -> None:
+def demand_supports(
+    problem: BoundaryValueProblem, faces: Sequence[WeakFace], space: TrialSpace, volumes: Patches
+) -> None:
     """Raise ValueError where the supports leave a motion free that the law does not resist (`Form.free_motions`).
 
-    size: the size of the body, a length.
+    Arguments as in `demand_area`; for a body that no Dirichlet data hold.
     """
     holding = [face.weights * (np.einsum("ccm->m", face.projector) + (face.factor > 0.0)) for face in faces]
     area = space.total(sum(float(weights.sum()) for weights in holding))
-    if space.dirichlet or not problem.form.free_motions(np.zeros((3, 1))).size:
+    if not problem.form.free_motions(np.zeros((3, 1))).size:
         return
     if area == 0.0:
         raise ValueError("no support holds the body: give fix, roller, symmetry or spring")
+    points = np.concatenate([volume.control_points.reshape(-1, 3) for volume in volumes])
+    size = float(np.ptp(points, axis=0).max())
     middle = space.total(sum(face.x @ weights for face, weights in zip(faces, holding, strict=True))) / area
     gram = 0.0
     for face in faces:
@@ -94,7 +103,7 @@ def _coder(problem: BoundaryValueProblem, name: str) -> Callable[[Array, Array],
     def codes(x: Array, normal: Array) -> Any:
         found = np.full(x.shape[1:], rest, dtype=np.int64)
         for i, condition in enumerate(problem.conditions, 1):
-            found |= condition.region.holds(x, normal, name).astype(np.int64) << i
+            found |= condition.region.holds(x, normal, problem.prefix + name).astype(np.int64) << i
         return found
 
     return codes

@@ -24,7 +24,8 @@ MOST_DEGREE = 8
 class TrialSpace:
     """Describe scalar trivariate splines on the unit cube, of three degrees on three open knot vectors on [0, 1].
 
-    dirichlet: names of the cube's faces on which boundary data fix the coefficients.
+    dirichlet: names of the cube's faces on which boundary data fix the coefficients. outer: names of the faces on the
+    body's boundary; the others are glued to faces of patches.
 
     The operators ask a space for the rows of their process, which are functions of u, and for sums over all processes.
     A single process has all rows and sends nothing; `Slab` is the space of a process that has some of the rows.
@@ -33,6 +34,7 @@ class TrialSpace:
     degrees: tuple[int, int, int]
     knots: Knots
     dirichlet: Collection[str] = FACE_NAMES
+    outer: Collection[str] = FACE_NAMES
 
     @property
     def whole(self) -> "TrialSpace":
@@ -169,7 +171,11 @@ def _is_only_continuous(knots: Array, degree: int) -> bool:
 
 
 def trial_space(
-    volume: BSplineVolume, refine: int = 0, degree: int | None = None, dirichlet: Collection[str] = FACE_NAMES
+    volume: BSplineVolume,
+    refine: int = 0,
+    degree: int | None = None,
+    dirichlet: Collection[str] = FACE_NAMES,
+    outer: Collection[str] = FACE_NAMES,
 ) -> TrialSpace:
     """Return the trial space of a volume: every span halved `refine` times, in a degree, by default the map's degree.
 
@@ -194,7 +200,7 @@ def trial_space(
     rows = list(map(same_smoothness, volume.knots, volume.degrees, degrees))
     for _ in range(refine):
         rows = list(map(halved, rows))
-    return TrialSpace(degrees, (rows[0], rows[1], rows[2]), dirichlet)
+    return TrialSpace(degrees, (rows[0], rows[1], rows[2]), dirichlet, outer)
 
 
 def embedded(coefficients: Array, degrees: tuple[int, int, int], knots: Knots, space: TrialSpace) -> Array:

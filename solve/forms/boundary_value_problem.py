@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Collection, Mapping
 from copy import copy
 from dataclasses import replace
 from typing import ClassVar, Self
@@ -10,16 +11,19 @@ from typing import ClassVar, Self
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from ..field import SplineField
+from ..field import MultiPatchField, SplineField
 from .condition import WITH_FACTOR, Condition
-from .data import Data, Datum, demand, finite, parse
+from .data import ByPatch, Data, Datum, PerPatch, demand, finite, parse
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
 from .jets import Jet, Numbers, coordinates, known
 from .parser import Expression
 from .region import Part
+
+PATCH_FACE = re.compile(r"p(\d+)_([uvw][01])")  # the face of one patch of several, as in "p2_u0"
 
 Natural = Mapping[str, Data | None]
 Robin = Mapping[str, tuple[Data, Data | None]]
@@ -39,11 +43,12 @@ class BoundaryValueProblem:
     natural: tuple[str, ...]  # faces on which the flux through them is given
     dirichlet: tuple[str, ...]  # faces on which u itself is given
     conditions: tuple[Condition, ...]  # on regions of the boundary; where there are any, all else of it is free
+    prefix: str = ""  # of the names of faces, "p2_" for patch 2 of several
     data: Mapping[str, Datum]  # by role
 
     def _set(
         self,
-        given: Mapping[str, Data | None],
+        given: Mapping[str, PerPatch | None],
         neumann: Natural,
         robin: Robin,
         conditions: tuple[Condition, ...] = (),
@@ -97,21 +102,31 @@ class BoundaryValueProblem:
             if not isinstance(faces, Mapping):
                 raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
             for face in faces:
-                if face not in FACE_NAMES:
+                if face not in FACE_NAMES and not PATCH_FACE.fullmatch(str(face)):
                     raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
         if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
             raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
         if both := neumann.keys() & robin.keys():
             raise ValueError(f"face {min(both)} has both Neumann and Robin data; give only one")
 
-    def _parsed(self, given: Mapping[str, Data | None], counts: Mapping[str, int]) -> dict[str, Datum]:
+    def _parsed(self, given: Mapping[str, PerPatch | None], counts: Mapping[str, int]) -> dict[str, Datum]:
         """Return the data of the volume and of faces by role, without roles that have no data."""
-        data = {}
+        data: dict[str, Datum] = {}
         for role, entry in given.items():
             if entry is not None:
                 count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
                 face = role.split(":")[0].partition(" ")[2]
-                data[role] = parse(self.label(role), entry, count, face, of_coordinates=self.of_coordinates)
+                name, of_coordinates = self.label(role), self.of_coordinates
+                if not isinstance(entry, Mapping):
+                    data[role] = parse(name, entry, count, face, of_coordinates=of_coordinates)
+                    continue
+                if wrong := [key for key in entry if not isinstance(key, int) or key < 0]:
+                    raise ValueError(f"{name}: {wrong[0]!r} is no number of a patch, as in {{0: ..., 1: ...}}")
+                each = {}
+                for patch, own in entry.items():  # kappa may be a number here and a tensor there
+                    of_patch = len(own) if role in counts and isinstance(own, list) else count
+                    each[patch] = parse(f"{name} of p{patch}", own, of_patch, face, of_coordinates=of_coordinates)
+                data[role] = ByPatch.of(name, each, face)
         return data
 
     def _check_derived(self, role: str) -> None:
@@ -139,17 +154,72 @@ class BoundaryValueProblem:
         """Return the data that are formulas: role, datum, and each formula of the datum."""
         return [(role, datum, entry) for role, datum in self.data.items() for entry in datum.formulas]
 
-    def on(self, volume: BSplineVolume) -> Self:
-        """Return the same problem with X, Y, Z measured in a volume, which has size 1 in X, Y, Z and its middle at 0.
+    def on(self, body: BSplineVolume | MultiPatch) -> Self:
+        """Return the same problem with X, Y, Z measured in a body, which has size 1 in X, Y, Z and its middle at 0.
 
         The middle is that of the bounding box. Raises ValueError for a field of another volume.
         """
         for datum in self.data.values():
-            if not all(entry.fits(volume) for entry in datum.entries if isinstance(entry, SplineField)):
+            if not all(entry.fits(body) for entry in datum.entries if isinstance(entry, SplineField | MultiPatchField)):
                 raise ValueError(
                     f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
                 )
-        return self.placed(UnitFrame.of(volume)) if self.is_scaled else self
+        return self.placed(UnitFrame.of(body)) if self.is_scaled else self
+
+    @property
+    def patch_faces(self) -> set[str]:
+        """Return the faces of single patches, as "p2_u0", that data or regions name."""
+        on_faces = {role.split(":")[0].partition(" ")[2] for role in self.data if role.startswith(("neumann", "robin"))}
+        in_regions = {name for condition in self.conditions for name in condition.region.patch_faces}
+        return {name for name in (*on_faces, *self.natural) if PATCH_FACE.fullmatch(name)} | in_regions
+
+    def on_patch(self, patch: int, outer: Collection[str]) -> Self:
+        """Return the problem of one patch of several, with data on the patch's outer faces alone.
+
+        Data of "p2_u0" belong to a face of patch 2, data of "u0" to this face of every patch that has no own data.
+        """
+        other = copy(self)
+        prefix = f"p{patch}_"
+        data = {
+            role: datum.on_patch(patch)
+            for role, datum in self.data.items()
+            if not role.startswith(("neumann ", "robin "))
+        }
+        given = {kind: self._given_on(kind) for kind in ("neumann", "robin")}
+        natural: list[str] = []
+        robin: list[str] = []
+        for face in outer:
+            kind, name = next(
+                ((kind, name) for name in (prefix + face, face) for kind in given if name in given[kind]), ("", "")
+            )
+            if kind:
+                (natural if kind == "neumann" else robin).append(face)
+                for ending in ("", ": alpha"):
+                    if (role := f"{kind} {name}{ending}") in self.data:
+                        data[f"{kind} {face}{ending}"] = self.data[role].on_patch(patch)
+        dirichlet = tuple(face for face in outer if face not in natural and face not in robin)
+        if self.conditions:
+            strong = {face for condition in self.conditions if condition.is_strong for face in condition.region.faces}
+            dirichlet = tuple(face for face in outer if not strong.isdisjoint((face, prefix + face)))
+        for name, value in (
+            ("prefix", prefix),
+            ("data", data),
+            ("natural", tuple(natural)),
+            ("dirichlet", dirichlet),
+        ):
+            object.__setattr__(other, name, value)
+        return other
+
+    def _given_on(self, kind: str) -> set[str]:
+        """Return the names of faces with data of a kind, "neumann" or "robin"."""
+        if kind == "neumann":
+            return set(self.natural)
+        return {role.removeprefix("robin ").removesuffix(": alpha") for role in self.data if role.endswith(": alpha")}
+
+    def strong_role(self, face: str) -> str | None:
+        """Return the role of the condition that holds all of u on a face, None where none does."""
+        names = {face, self.prefix + face}
+        return next((c.role for c in self.conditions if c.is_strong and not names.isdisjoint(c.region.faces)), None)
 
     def demand_held(self) -> None:
         """Raise ValueError where the data alone show that nothing fixes the solution."""
@@ -228,10 +298,9 @@ class BoundaryValueProblem:
 
         face: the face on which the points lie, where regions give a face its own values.
         """
-        of_face = [c.role for c in self.conditions if c.is_strong and face in c.region.faces]
-        for role in (*of_face[:1], "boundary", "exact"):
+        for role in (self.strong_role(face), "boundary", "exact"):
             if role in self.data:
-                return self.data[role](x)
+                return self.data[role](x)  # type: ignore[index]
         return np.zeros((self.form.components, *x.shape[1:]))
 
     def on_face(self, face: str, x: Array, normal: Array) -> tuple[Array | None, Array]:

@@ -1,7 +1,7 @@
 """Evaluates data of a problem: formulas in x, y, z and X, Y, Z, functions or fields, checked at every point."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from parameterize.arrays import Array
 
-from ..field import SplineField
+from ..field import MultiPatchField, SplineField
 from .frame import UnitFrame
 from .parser import Expression, ExpressionError
 
@@ -20,9 +20,10 @@ WORDS = {2: "two", 3: "three"}
 NOT_SMOOTH = "a function, a field or a choice (where, min, max), whose derivatives are unknown"
 USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
-Scalar = str | float | SplineField | Callable[..., ArrayLike]
+Scalar = str | float | SplineField | MultiPatchField | Callable[..., ArrayLike]
 Data = Scalar | Sequence[Scalar]  # a sequence has one entry a component
-Entry = Expression | SplineField | Callable[[Array], ArrayLike]
+PerPatch = Data | Mapping[int, Data]  # a datum of the body, or one of each patch
+Entry = Expression | SplineField | MultiPatchField | Callable[[Array], ArrayLike]
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,11 @@ class Datum:
         """Return the same datum with X, Y, Z measured in a frame."""
         return replace(self, entries=tuple(e.placed(frame) if isinstance(e, Expression) else e for e in self.entries))
 
+    def on_patch(self, patch: int) -> "Datum":
+        """Return the datum on one patch of several, where fields are those of the patch."""
+        own = (entry.patches[patch] if isinstance(entry, MultiPatchField) else entry for entry in self.entries)
+        return replace(self, entries=tuple(own))
+
     def __call__(self, x: Array) -> Array:
         """Return values (c, ...) at points (3, ...).
 
@@ -64,7 +70,9 @@ class Datum:
             if isinstance(entry, Expression):
                 found = entry(*np.asarray(x))
             else:
-                found = np.asarray(entry.at(x) if isinstance(entry, SplineField) else self._called(entry, x))
+                found = np.asarray(
+                    entry.at(x) if isinstance(entry, SplineField | MultiPatchField) else self._called(entry, x)
+                )
                 if found.dtype.kind not in "iuf":
                     raise ValueError(f"{self.name} must return real numbers, got {found.dtype}")
             found = found[0] if found.shape == (1, *each) else found  # one component, written as (c, ...)
@@ -84,6 +92,33 @@ class Datum:
             raise ValueError(f"{self.name} fails: {type(error).__name__}: {error}") from error
 
 
+@dataclass(frozen=True)
+class ByPatch(Datum):
+    """Hold a datum that is another one on each patch, such as the material; `entries` are those of all patches."""
+
+    patches: Mapping[int, Datum] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, name: str, patches: Mapping[int, Datum], face: str = "") -> "ByPatch":
+        """Return the datum from the data of the patches."""
+        return cls(name, tuple(entry for datum in patches.values() for entry in datum.entries), 1, face, patches)
+
+    def placed(self, frame: UnitFrame) -> "ByPatch":
+        """Return the same datum with X, Y, Z measured in a frame."""
+        placed = {patch: datum.placed(frame) for patch, datum in self.patches.items()}
+        return self.of(self.name, placed, self.face)
+
+    def on_patch(self, patch: int) -> Datum:
+        """Return the datum of a patch. Raises ValueError for a patch without one."""
+        if patch not in self.patches:
+            raise ValueError(f"{self.name} has no entry for patch {patch}: give one a patch")
+        return self.patches[patch].on_patch(patch)
+
+    def __call__(self, x: Array) -> Array:
+        """Raise ValueError: points alone do not say on which patch they lie."""
+        raise ValueError(f"{self.name} is given by patch, which needs a body of several patches")
+
+
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:
     """Return a user's datum of c components as a Datum; a number is the formula of that constant.
 
@@ -99,9 +134,9 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
         raise ValueError(f"{name} must have {count} entries, one a component, got {data!r}")
     for entry in entries:
         wanted = () if len(entries) == components else (components,)
-        if isinstance(entry, SplineField) and entry.coefficients.shape[3:] != wanted:
+        if isinstance(entry, SplineField | MultiPatchField) and _shape(entry) != wanted:
             raise ValueError(f"{name}: the field must have {components if wanted else 1} component(s) here")
-        if not isinstance(entry, str) and not callable(entry):
+        if not isinstance(entry, str | MultiPatchField) and not callable(entry):
             of = "x, y, z" if of_coordinates else "points x"
             raise ValueError(f"{name} must be a number, a formula, a function of {of} or a field, got {entry!r:.80}")
     try:
@@ -109,8 +144,16 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
     except ExpressionError as error:
         raise ExpressionError(f"{name}: {error}") from None
     if of_coordinates:
-        parsed = [e if isinstance(e, Expression | SplineField) else partial(_of_coordinates, e) for e in parsed]
+        parsed = [
+            e if isinstance(e, Expression | SplineField | MultiPatchField) else partial(_of_coordinates, e)
+            for e in parsed
+        ]
     return Datum(name, tuple(parsed), components, face)
+
+
+def _shape(field: SplineField | MultiPatchField) -> tuple[int, ...]:
+    """Return the shape of a field's values: (), or (c,) with c components."""
+    return (field if isinstance(field, SplineField) else field.patches[0]).coefficients.shape[3:]
 
 
 def _of_coordinates(function: Callable[[Array, Array, Array], ArrayLike], x: Array) -> ArrayLike:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from numbers import Real
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -45,9 +45,9 @@ class Elasticity(LawWithData):
         sigma n, n the outward unit normal; None: from `exact`. A solve leaves one face at least to displacement;
         `iga_nn.modes` takes a free body, too.
     young : float
-        E > 0.
+        E > 0. On several patches also a dictionary, a number a patch.
     poisson_ratio : float
-        -1 < nu < 1/2. `lame` converts from lambda and mu.
+        -1 < nu < 1/2. `lame` converts from lambda and mu. On several patches also a dictionary, a number a patch.
     fix : regions, or dict of region to three entries or None, optional
         Displacement on regions of the boundary (`Region`, or its text), zero for regions alone; an entry that is None
         leaves that component free. Where a region is given, the rest of the boundary is free, or has the traction of
@@ -82,8 +82,8 @@ class Elasticity(LawWithData):
     force: Data | None = None
     displacement: Data | None = None
     traction: Natural = field(default_factory=dict)
-    young: float = 1.0
-    poisson_ratio: float = 0.3
+    young: float | Mapping[int, float] = 1.0
+    poisson_ratio: float | Mapping[int, float] = 0.3
     _: KW_ONLY
     fix: GivenRegions | None = None
     roller: GivenRegions | None = None
@@ -97,12 +97,12 @@ class Elasticity(LawWithData):
     labels = {"source": "force", "boundary": "displacement", "neumann": "traction"}  # noqa: RUF012
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.young, Real) and SMALLEST <= self.young <= LARGEST):
-            raise ValueError(
-                f"young must be a positive number from {SMALLEST:g} to {LARGEST:g}, got {self.young!r:.80}"
-            )
-        if not (isinstance(self.poisson_ratio, Real) and -1.0 < self.poisson_ratio < 0.5):
-            raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {self.poisson_ratio!r:.80}")
+        for young in _values(self.young):
+            if not (isinstance(young, Real) and SMALLEST <= young <= LARGEST):
+                raise ValueError(f"young must be a positive number from {SMALLEST:g} to {LARGEST:g}, got {young!r:.80}")
+        for ratio in _values(self.poisson_ratio):
+            if not (isinstance(ratio, Real) and -1.0 < ratio < 0.5):
+                raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {ratio!r:.80}")
         on_regions = conditions_of(3, self.exact, **{kind: getattr(self, kind) for kind in ON_REGIONS})
         is_loaded = self.displacement is not None or bool(self.traction) or bool(on_regions)
         force = NONE if self.force is None and self.exact is None and is_loaded else self.force
@@ -124,9 +124,20 @@ class Elasticity(LawWithData):
 
     @property
     def constants(self) -> tuple[float, float]:
-        """Return Lame's constants lambda and mu."""
-        nu = self.poisson_ratio
-        return self.young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.young / (2.0 * (1.0 + nu))
+        """Return Lame's constants lambda and mu; where they are given by patch, those of the first patch."""
+        young, nu = _values(self.young)[0], _values(self.poisson_ratio)[0]
+        return young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), young / (2.0 * (1.0 + nu))
+
+    def on_patch(self, patch: int, outer: Collection[str]) -> Self:
+        """Return the problem of one patch of several, with the material of the patch."""
+        other = super().on_patch(patch, outer)
+        for name in ("young", "poisson_ratio"):
+            given = getattr(self, name)
+            if isinstance(given, Mapping):
+                if patch not in given:
+                    raise ValueError(f"{name} has no entry for patch {patch}: give one a patch")
+                object.__setattr__(other, name, given[patch])
+        return other
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the stress sigma (3, 3, ...)."""
@@ -141,7 +152,7 @@ class Elasticity(LawWithData):
     @property
     def caveat(self) -> str:
         """Return why a nearly incompressible body is hard to solve and its error not estimated; "" for other bodies."""
-        nu = self.poisson_ratio
+        nu = max(_values(self.poisson_ratio))
         return (
             f"Poisson's ratio {nu:g} is near 1/2, where a body hardly changes its volume" if nu > NEARLY_RIGID else ""
         )
@@ -178,6 +189,11 @@ class Elasticity(LawWithData):
         """Return mu (k . k), the factor of shear waves, which is the least factor, for wave vectors k (3, ...)."""
         found: Array = self.constants[1] * (wave * wave).sum(axis=0)
         return found
+
+
+def _values(material: float | Mapping[int, float]) -> list[float]:
+    """Return a number of the material as a list, or the numbers of the patches."""
+    return list(material.values()) if isinstance(material, Mapping) else [material]
 
 
 def von_mises(stress: Array) -> Array:

@@ -1,6 +1,6 @@
 """Defines UnitFrame: the scaled coordinates X, Y, Z, in which a formula means the same in millimetres and in metres."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.spline.bspline import divided_spans
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import FACES, enclosed_volume, face_vectors, orientation
 from parameterize.spline.volume import BSplineVolume
 
@@ -27,18 +28,18 @@ class UnitFrame:
     length: float
 
     @classmethod
-    def of(cls, volume: BSplineVolume) -> "UnitFrame":
-        """Return the frame of a spline volume.
+    def of(cls, body: BSplineVolume | MultiPatch) -> "UnitFrame":
+        """Return the frame of a body.
 
         The size of the volume follows from the six faces (`enclosed_volume`); the bounding box is that of points on the
         faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
         Raises ValueError where the volume encloses nothing.
         """
-        rows = [divided_spans(knots, BOX_SAMPLES) for knots in volume.knots]
-        samples = (face_vectors(volume, rows, *face)[0] for face in FACES)
-        ends = np.array([(points.min(axis=(1, 2)), points.max(axis=(1, 2))) for points in samples])  # (6, 2, 3)
+        patches = as_multipatch(body).patches
+        samples = (points for volume in patches for points in _face_samples(volume))
+        ends = np.array([(points.min(axis=(1, 2)), points.max(axis=(1, 2))) for points in samples])  # (f, 2, 3)
         middle = (ends[:, 0].min(axis=0) + ends[:, 1].max(axis=0)) / 2.0
-        enclosed = abs(enclosed_volume(volume, middle))
+        enclosed = sum(abs(enclosed_volume(volume, middle)) for volume in patches)
         if enclosed == 0.0:
             raise ValueError("X, Y, Z have no scale here: the volume encloses nothing; check it with `iga-nn check`")
         x, y, z = middle.tolist()
@@ -51,6 +52,13 @@ class UnitFrame:
     def as_dict(self) -> dict[str, Any]:
         """Return the frame for report.json."""
         return {"center": list(self.center), "length": self.length}
+
+
+def _face_samples(volume: BSplineVolume) -> Iterator[Array]:
+    """Yield points (3, k, l) of each face of a volume."""
+    rows = [divided_spans(knots, BOX_SAMPLES) for knots in volume.knots]
+    for face in FACES:
+        yield face_vectors(volume, rows, *face)[0]
 
 
 def face_geometry(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Points, Array]:

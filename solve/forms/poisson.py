@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from parameterize.arrays import Array
 
-from ..field import SplineField
+from ..field import MultiPatchField, SplineField
 from .boundary_value_problem import Natural, Robin
 from .condition import GivenRegions, conditions_of
-from .data import NOT_SMOOTH, Data, Datum, Scalar, demand, demand_definite, demand_size
+from .data import NOT_SMOOTH, Data, Datum, PerPatch, demand, demand_definite, demand_size
 from .jets import PAIRS, SYMMETRIC, Jet
 from .problem import LawWithData
 
@@ -41,9 +41,9 @@ class Poisson(LawWithData):
         Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
     kappa : one, six or nine entries, or three rows of three, optional
         A scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz, as nine by rows, or as three rows: lists
-        or a 3 x 3 array; default 1. Positive definite.
+        or a 3 x 3 array; default 1. Positive definite. On several patches also a dictionary, an entry a patch.
     reaction : entry, optional
-        c, not negative; default 0.
+        c, not negative; default 0. On several patches also a dictionary, an entry a patch.
     neumann : dict of face name to entry or None
         kappa grad u . n on the faces "u0", "u1", "v0", "v1", "w0", "w1", n the outward unit normal; None: from `exact`.
     robin : dict of face name to (entry, entry or None)
@@ -77,8 +77,8 @@ class Poisson(LawWithData):
     exact: Data | None = None
     source: Data | None = None
     boundary: Data | None = None
-    kappa: Data | None = None
-    reaction: Scalar | None = None
+    kappa: PerPatch | None = None
+    reaction: PerPatch | None = None
     neumann: Natural = field(default_factory=dict)
     robin: Robin = field(default_factory=dict)
     value: GivenRegions | None = None
@@ -126,7 +126,8 @@ class Poisson(LawWithData):
         """Return why the derivatives of kappa, or the values of c on jets, are unknown; "" where they are known."""
         if "kappa" in self.data and not self.data["kappa"].is_formula:
             return f"kappa is {NOT_SMOOTH}"
-        return "reaction is a field" if isinstance(self.reaction, SplineField) else ""
+        fields = [] if not self.has_reaction else self.data["reaction"].entries
+        return "reaction is a field" if any(isinstance(e, SplineField | MultiPatchField) for e in fields) else ""
 
     def tensor(self, x: Array, component: int = 0) -> Array:
         """Return kappa (6, ...). Raises ExpressionError where it is not positive definite."""
@@ -145,11 +146,13 @@ class Poisson(LawWithData):
         return found
 
 
-def _six(kappa: Data | None) -> Data | None:
-    """Return the six entries of a symmetric tensor from its nine entries, or from three rows of three.
+def _six(kappa: Any) -> Any:
+    """Return the six entries of a symmetric tensor from its nine entries, or from three rows of three; of each patch.
 
     Raises ValueError for any other number of entries.
     """
+    if isinstance(kappa, Mapping):
+        return {patch: _six(own) for patch, own in kappa.items()}
     kappa = kappa.tolist() if isinstance(kappa, np.ndarray) else kappa
     if kappa is None or not isinstance(kappa, Sequence) or isinstance(kappa, str):
         return kappa

@@ -21,6 +21,7 @@ from .parser import SCALED, VARIABLES, Decider, ExpressionError, Translator, sca
 
 NORMAL = ("nx", "ny", "nz")
 CALL = re.compile(r"\b(face|box)\s*\(([^()]*)\)")
+PATCH_FACE = re.compile(r"\bp\d+_[uvw][01]\b")
 GROUP = re.compile(r"""group:("[^"]*"|'[^']*'|[^\s()]+)""")
 ANGLE = 30.0  # degrees between neighbouring triangles beyond which an edge is sharp
 
@@ -56,7 +57,8 @@ class Region:
     text : str
         A condition in x, y, z or X, Y, Z (scaled to volume 1 about the middle) and in the outward unit normal nx, ny,
         nz, such as "nz > 0.99 and abs(x) < 2": comparisons, and, or, not, and the functions of formulas. Also
-        conditions: u0, u1, v0, v1, w0, w1, the images of the cube's faces; box(x0, y0, z0, x1, y1, z1);
+        conditions: u0, u1, v0, v1, w0, w1, the images of the cube's faces, and p2_u0 that of patch 2 of several;
+        box(x0, y0, z0, x1, y1, z1);
         group:NAME, a group of the input mesh; and face(x, y, z), the part of the surface around the place nearest to
         that point, up to edges that bend by more than 30 degrees, or by a fourth number in degrees.
     surface : Part, optional
@@ -94,6 +96,7 @@ class Region:
 
         text = GROUP.sub(lambda found: mark("group", found[1].strip("'\"")), self.text)
         text = CALL.sub(lambda found: mark(found[1], found[2]), text)
+        text = PATCH_FACE.sub(lambda found: mark("patch", found[0]), text)
         names = [f"_mark{i}" if i >= len(FACE_NAMES) else name for i, name in enumerate(marks)]
         try:
             translator = Translator(text, (*VARIABLES, *NORMAL), names)
@@ -136,7 +139,12 @@ class Region:
     def faces(self) -> tuple[str, ...]:
         """Return the names of the cube's faces that make up the region; empty where the text contains anything else."""
         words = re.split(r"\s+or\s+", self.text.strip())
-        return tuple(words) if all(word in FACE_NAMES for word in words) else ()
+        return tuple(words) if all(word in FACE_NAMES or PATCH_FACE.fullmatch(word) for word in words) else ()
+
+    @property
+    def patch_faces(self) -> tuple[str, ...]:
+        """Return the faces of single patches of several that occur in the condition, as "p2_u0"."""
+        return tuple(entry.removeprefix("patch ") for entry in self._marks if entry.startswith("patch "))
 
     def placed(self, frame: UnitFrame | None = None, surface: Part | None = None) -> Region:
         """Return the same region with X, Y, Z measured in a frame, and with a surface where it has none."""
@@ -160,8 +168,8 @@ class Region:
     def holds(self, x: Array, normal: Array, face: str = "") -> Mask:
         """Return the mask (...) of the points (3, ...) with outward unit normals (3, ...) where the condition holds.
 
-        face: the cube's face on whose image the points lie, if any. Raises ExpressionError where X, Y, Z occur without
-        a frame, ValueError where the surface lacks a face or group.
+        face: the cube's face on whose image the points lie, if any: "u0", or "p2_u0" of patch 2 of several. Raises
+        ExpressionError where X, Y, Z occur without a frame, ValueError where the surface lacks a face or group.
         """
         x, normal = np.asarray(x), np.asarray(normal)
         jets = [Jet(row, (), ()) for row in x]
@@ -174,17 +182,19 @@ class Region:
             normal = np.moveaxis(self.surface.normals[nearest], -1, 0)
         values: list[Any] = [*jets, *of_frame, *(Jet(row, (), ()) for row in normal)]
         shape = x.shape[1:]
-        values += [np.full(shape, name == face) for name in FACE_NAMES]
-        values += [self._marked(entry, x, nearest) for entry in self._marks[len(FACE_NAMES) :]]
+        values += [np.full(shape, face.endswith(name)) for name in FACE_NAMES]
+        values += [self._marked(entry, x, nearest, face) for entry in self._marks[len(FACE_NAMES) :]]
         with np.errstate(all="ignore"):
             return np.broadcast_to(np.asarray(self._decide(values), dtype=bool), shape)
 
-    def _marked(self, entry: str, x: Array, nearest: IntArray | None) -> Mask:
-        """Return the mask (...) of the points that lie in a box, a group or a face of the part.
+    def _marked(self, entry: str, x: Array, nearest: IntArray | None, face: str) -> Mask:
+        """Return the mask (...) of the points that lie on a patch's face, in a box, or in a group or face of the part.
 
         nearest: (...), the nearest triangle of the part for each point.
         """
         kind, argument = entry.split(" ", 1)
+        if kind == "patch":
+            return np.full(x.shape[1:], face == argument)
         if kind == "box":
             low, high = np.sort(np.reshape(_numbers(argument), (2, 3)), axis=0)
             sides = (slice(None), *[None] * (x.ndim - 1))
@@ -223,7 +233,7 @@ def _numbers(argument: str) -> list[float]:
 def _check_mark(entry: str) -> None:
     """Raise ExpressionError for a box or a face without its numbers."""
     kind, argument = entry.split(" ", 1)
-    if kind == "group":
+    if kind in ("group", "patch"):
         return
     counts = {"box": ((6,), "box(x0, y0, z0, x1, y1, z1)"), "face": ((3, 4), "face(x, y, z)")}[kind]
     try:
@@ -238,6 +248,6 @@ def _readable(message: str, marks: Sequence[str]) -> str:
     """Return a message with the user's text in place of the marks."""
     for i in range(len(marks) - 1, len(FACE_NAMES) - 1, -1):
         kind, argument = marks[i].split(" ", 1)
-        shown = f"group:{argument}" if kind == "group" else f"{kind}({argument})"
+        shown = {"group": f"group:{argument}", "patch": argument}.get(kind, f"{kind}({argument})")
         message = message.replace(f", _mark{i}", "").replace(f"_mark{i}", shown)
     return message

@@ -1,0 +1,189 @@
+"""Numbers the unknowns of a body: the coefficients of all patches that boundary data leave free, shared ones once.
+
+A vector of unknowns is spread to the coefficients of the patches, and integrals over the patches are collected to a
+vector: with Q the matrix of the first, the matrix of a body is A = Q^T (matrices of the patches) Q.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from parameterize.arrays import Array, IntArray, Mask
+from parameterize.spline.interface import Interface
+from parameterize.spline.multipatch import shared_numbers
+
+from .space import TrialSpace
+
+
+class Unknowns(Protocol):
+    """Describe the unknowns of a body; a vector has one row of them for each component."""
+
+    @property
+    def count(self) -> int:
+        """Return the number of coefficients of one component, fixed ones included, shared ones once."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Return the shape of one component of a vector."""
+
+    def spread(self, x: Array) -> list[Array]:
+        """Return the coefficients (c, n_u, n_v, n_w) of each patch of a vector (c, ...), zero where they are fixed."""
+
+    def collect(self, integrals: Sequence[Array]) -> Array:
+        """Return the vector (c, ...) of integrals (c, n_u, n_v, n_w) over each patch, copies of an unknown added."""
+
+    def completed(self, known: Sequence[Array]) -> list[Array]:
+        """Return all fixed coefficients of each patch from those that its own data fix, (c, n_u, n_v, n_w) each."""
+
+    def on_fixed(self, integrals: Sequence[Array]) -> list[Array]:
+        """Return integrals (c, n_u, n_v, n_w) over each patch, those of a fixed coefficient summed over all patches.
+
+        The sum stands in the first patch whose data fix the coefficient, the other patches have zero.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Number the unknowns of one patch, or of the slab of a process: a box of its coefficients."""
+
+    space: TrialSpace
+
+    @property
+    def count(self) -> int:
+        """Return the number of coefficients of one component, fixed ones included."""
+        return self.space.dofs
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Return the number of free coefficients of this process in each direction."""
+        return tuple(part.stop - part.start for part in self.space.window)
+
+    def spread(self, x: Array) -> list[Array]:
+        """Return the coefficients (.., n_u, n_v, n_w) of a vector (.., m_u, m_v, m_w), zero where they are fixed."""
+        full = np.zeros((*x.shape[:-3], *self.space.shape))
+        full[..., *self.space.window] = x
+        self.space.fill(full)
+        return [full]
+
+    def collect(self, integrals: Sequence[Array]) -> Array:
+        """Return the vector (.., m_u, m_v, m_w) of integrals (.., n_u, n_v, n_w), whose copies on slabs are added."""
+        (result,) = integrals
+        self.space.add(result)
+        return np.ascontiguousarray(result[..., *self.space.window])
+
+    def completed(self, known: Sequence[Array]) -> list[Array]:
+        """Return the known coefficients."""
+        return list(known)
+
+    def on_fixed(self, integrals: Sequence[Array]) -> list[Array]:
+        """Return the integrals, with the parts of other processes."""
+        (result,) = integrals
+        self.space.add(result)
+        return [result]
+
+
+@dataclass(frozen=True, eq=False)
+class Glued:
+    """Number the unknowns of patches that are glued along faces.
+
+    spaces: those of the patches. numbers: for each patch the number (n_u, n_v, n_w) of each coefficient in the body.
+    count: how many numbers there are. fixed: (count,), whether boundary data fix a coefficient: where it lies on a
+    Dirichlet face of some patch.
+    """
+
+    spaces: tuple[TrialSpace, ...]
+    numbers: tuple[IntArray, ...]
+    count: int
+    fixed: Mask
+
+    @classmethod
+    def of(cls, spaces: Sequence[TrialSpace], interfaces: Sequence[Interface]) -> "Glued":
+        """Return the unknowns of patches with the given spaces and interfaces."""
+        numbers, count = shared_numbers([space.shape for space in spaces], interfaces)
+        fixed = np.zeros(count, dtype=bool)
+        for space, own in zip(spaces, numbers, strict=True):
+            inner = np.zeros(own.shape, dtype=bool)
+            inner[space.free] = True
+            fixed[own[~inner]] = True
+        return cls(tuple(spaces), numbers, count, fixed)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Return the number of free coefficients."""
+        return (int(self.count - self.fixed.sum()),)
+
+    @cached_property
+    def places(self) -> list[IntArray]:
+        """Return for each patch the place (n_u, n_v, n_w) of each coefficient in a vector; its length where fixed."""
+        order = np.where(self.fixed, self.shape[0], np.cumsum(~self.fixed) - 1)
+        return [order[own] for own in self.numbers]
+
+    @cached_property
+    def copies(self) -> Array:
+        """Return the number (m,) of coefficients that each unknown stands for."""
+        return self._sums([np.ones((1, *space.shape)) for space in self.spaces], self.places, self.shape[0] + 1)[0, :-1]
+
+    def spread(self, x: Array) -> list[Array]:
+        """Return the coefficients (c, n_u, n_v, n_w) of each patch of a vector (c, m), zero where they are fixed."""
+        padded = np.concatenate([x, np.zeros((len(x), 1))], axis=1)
+        return [padded[:, own] for own in self.places]
+
+    def collect(self, integrals: Sequence[Array]) -> Array:
+        """Return the vector (c, m) of integrals (c, n_u, n_v, n_w) over each patch, copies added."""
+        return np.ascontiguousarray(self._sums(integrals, self.places, self.shape[0] + 1)[:, :-1])
+
+    @staticmethod
+    def _sums(parts: Sequence[Array], rows: Sequence[IntArray], length: int) -> Array:
+        every = np.concatenate([row.ravel() for row in rows])
+        return np.stack(
+            [
+                np.bincount(every, np.concatenate([part[c].ravel() for part in parts]), length)
+                for c in range(len(parts[0]))
+            ]
+        )
+
+    @cached_property
+    def owned(self) -> list[Mask]:
+        """Return for each patch the mask (n_u, n_v, n_w) of the coefficients that its data are the first to fix."""
+        taken, found = np.zeros(self.count, dtype=bool), []
+        for space, own in zip(self.spaces, self.numbers, strict=True):
+            given = ~taken[own]
+            given[space.free] = False
+            places = np.flatnonzero(given)
+            first = places[np.unique(own.flat[places], return_index=True)[1]]  # a patch may be glued to itself
+            mask = np.zeros(own.size, dtype=bool)
+            mask[first] = True
+            taken[own.flat[first]] = True
+            found.append(mask.reshape(own.shape))
+        return found
+
+    def completed(self, known: Sequence[Array]) -> list[Array]:
+        """Return the fixed coefficients (c, n_u, n_v, n_w) of each patch, zero elsewhere.
+
+        A coefficient has the value of the first patch whose data fix it: other patches may touch a Dirichlet face along
+        an edge only.
+        """
+        every = np.zeros((len(known[0]), self.count))
+        for own, is_owned, values in zip(self.numbers, self.owned, known, strict=True):
+            every[:, own[is_owned]] = values[:, is_owned]
+        return [every[:, own] for own in self.numbers]
+
+    def on_fixed(self, integrals: Sequence[Array]) -> list[Array]:
+        """Return integrals of fixed coefficients, summed over all patches, in the first patch whose data fix them."""
+        total = self._sums(integrals, self.numbers, self.count)
+        return [total[:, own] * is_owned for own, is_owned in zip(self.numbers, self.owned, strict=True)]
+
+
+def unknowns_of(spaces: Sequence[TrialSpace], interfaces: Sequence[Interface]) -> Window | Glued:
+    """Return the unknowns of a body with the given spaces of its patches."""
+    if len(spaces) == 1 and not interfaces:
+        return Window(spaces[0])
+    return Glued.of(spaces, interfaces)
+
+
+def vertex_numbers(count: int, interfaces: Sequence[Interface]) -> tuple[tuple[IntArray, ...], int]:
+    """Return for each of `count` patches the numbers (2, 2, 2) of its vertices, and how many vertices a body has."""
+    return shared_numbers([(2, 2, 2)] * count, interfaces)

@@ -1,0 +1,127 @@
+"""Preconditions several patches: the preconditioners of the patches, averaged, and trilinear functions of the vertices.
+
+M = Q^+ (preconditioner of each patch, natural at interfaces) Q^+T + V (V^T A V)^+ V^T. The first part is a sum of
+overlapping subspaces; the second, Galerkin's matrix on the functions that are trilinear on each patch, moves patches
+that no boundary data hold as a whole (Toselli, Widlund, Domain Decomposition Methods, 2005, sections 2.2 and 5).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from parameterize.arrays import Array, IntArray
+from parameterize.spline.bspline import greville
+from parameterize.spline.interface import Interface
+from parameterize.spline.volume import FACE_NAMES
+
+from ..discretization.operator import Operator
+from ..discretization.space import TrialSpace
+from ..discretization.unknowns import Glued, vertex_numbers
+from .preconditioner import FastDiagonalization
+
+RANK = 1e-10  # of the largest eigenvalue of the coarse matrix: smaller ones belong to motions that nothing resists
+
+
+@dataclass(frozen=True, eq=False)
+class GluedPreconditioner:
+    """Apply the preconditioner of one component of a law on several patches to vectors (m,).
+
+    blocks: the preconditioners of the patches, natural at interfaces; None for a patch without unknowns. singular:
+    whether a constant is free.
+    """
+
+    unknowns: Glued
+    blocks: tuple[FastDiagonalization | None, ...]
+    coarse: "Coarse"
+    singular: bool = False
+
+    def __call__(self, residual: Array) -> Array:
+        """Return the preconditioned residual (m,)."""
+        weighted = (residual / self.unknowns.copies)[None]
+        parts = []
+        for block, full in zip(self.blocks, self.unknowns.spread(weighted), strict=True):
+            found = np.zeros_like(full)
+            if block is not None:
+                window = block.space.window
+                found[:, *window] = block(np.ascontiguousarray(full[:, *window]))
+            parts.append(found)
+        result = self.unknowns.collect(parts)[0] / self.unknowns.copies + self.coarse(residual)
+        return result - result.mean() if self.singular else result
+
+    @property
+    def weakness(self) -> str:
+        """Return the first part that a block had to leave out."""
+        return next((block.weakness for block in self.blocks if block and block.weakness), "")
+
+
+@dataclass(frozen=True, eq=False)
+class Coarse:
+    """Solve on the functions that are trilinear on each patch, given by their values at the free vertices.
+
+    hats: for each patch the values of its vertices' functions along the three directions, (n, 2) each. inverse: (v, v),
+    of Galerkin's matrix. vertices: for each patch the places (2, 2, 2) of its vertices, v where they are fixed.
+    """
+
+    unknowns: Glued
+    hats: Sequence[tuple[Array, Array, Array]]
+    vertices: Sequence[IntArray]
+    inverse: Array
+
+    @classmethod
+    def of(cls, unknowns: Glued, operators: Sequence[Operator], interfaces: Sequence[Interface]) -> "Coarse":
+        """Return the coarse solve of the operators of one component on the patches."""
+        numbers, count = vertex_numbers(len(operators), interfaces)
+        corners = [
+            np.asarray(own[:: len(own) - 1, :: own.shape[1] - 1, :: own.shape[2] - 1]) for own in unknowns.numbers
+        ]
+        fixed = np.zeros(count, dtype=bool)
+        for own, corner in zip(numbers, corners, strict=True):
+            fixed[own] |= unknowns.fixed[corner]
+        free = count - int(fixed.sum())
+        order = np.where(fixed, free, np.cumsum(~fixed) - 1)
+        vertices = [order[own] for own in numbers]
+        matrix = np.zeros((free + 1, free + 1))
+        for operator, places in zip(operators, vertices, strict=True):
+            flat = places.ravel()
+            np.add.at(matrix, np.ix_(flat, flat), _galerkin(operator))  # a patch glued to itself has a vertex twice
+        hats = [_hats(operator.space) for operator in operators]
+        inverse = np.linalg.pinv(matrix[:-1, :-1], rcond=RANK, hermitian=True)
+        return cls(unknowns, hats, vertices, np.asarray(inverse, dtype=np.float64))
+
+    def __call__(self, residual: Array) -> Array:
+        """Return V (V^T A V)^+ V^T r of a residual r (m,)."""
+        if not len(self.inverse):
+            return np.zeros_like(residual)
+        coarse = np.zeros(len(self.inverse) + 1)
+        shares = self.unknowns.spread((residual / self.unknowns.copies)[None])
+        for (u, v, w), places, share in zip(self.hats, self.vertices, shares, strict=True):
+            np.add.at(coarse, places, np.einsum("ijk,ia,jb,kc->abc", share[0], u, v, w, optimize=True))
+        values = np.append(self.inverse @ coarse[:-1], 0.0)
+        parts = [
+            np.einsum("abc,ia,jb,kc->ijk", values[places], u, v, w, optimize=True)[None]
+            for (u, v, w), places in zip(self.hats, self.vertices, strict=True)
+        ]
+        return self.unknowns.collect(parts)[0] / self.unknowns.copies
+
+
+def _hats(space: TrialSpace) -> tuple[Array, Array, Array]:
+    """Return the coefficients (n, 2) of 1 - t and t in each direction of a space."""
+    rows = (greville(knots, degree) for knots, degree in zip(space.knots, space.degrees, strict=True))
+    u, v, w = (np.stack([1.0 - row, row], axis=1) for row in rows)
+    return u, v, w
+
+
+def _galerkin(operator: Operator) -> Array:
+    """Return the matrix (8, 8) of an operator on the trilinear functions of a patch.
+
+    The terms of faces are lumped: a quarter of their factor belongs to each vertex of the face.
+    """
+    ends = np.array([0.0, 0.0, 1.0, 1.0])
+    small = replace(operator, space=TrialSpace((1, 1, 1), (ends, ends, ends), ()), faces={})
+    matrix = np.stack([small.apply(unit.reshape(2, 2, 2)).ravel() for unit in np.eye(8)])
+    for name, face in operator.faces.items():
+        axis, side = divmod(FACE_NAMES.index(name), 2)
+        on_face = np.take(np.arange(8).reshape(2, 2, 2), side, axis=axis).ravel()
+        matrix[on_face, on_face] += 0.25 * face.stiffness(operator.component)
+    return matrix
