@@ -17,7 +17,7 @@ from ..arrays import Array, IntArray, Mask
 from ..display import Shown
 from ..spline.bernstein import split
 from ..spline.orientation import mirrored, orientation
-from ..spline.volume import BSplineVolume, demand_volume
+from ..spline.volume import BSplineVolume
 from .determinant import CHUNK, DeterminantForm, corners_of
 from .rational_determinant import RationalDeterminantForm
 
@@ -74,38 +74,11 @@ class Certificate(Shown):
         return CLAIMS[self.orientation]
 
 
-def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
+def certify_patch(volume: BSplineVolume, max_depth: int) -> Certificate:
     """Decide whether det J has one sign on the whole cube, cutting doubtful spans at most `max_depth` times in eight.
 
-    Parameters
-    ----------
-    volume : BSplineVolume
-        The map.
-    max_depth : int
-        0 or more; each cut makes the bounds on the pieces closer.
-
-    Returns
-    -------
-    Certificate
-
-    Raises
-    ------
-    TypeError
-        For an object that is not a BSplineVolume.
-    ValueError
-        For a negative depth, or where derivatives overflow.
-
-    Examples
-    --------
-    >>> import iga_nn
-    >>> from solve import benchmark_volume
-    >>> certificate = iga_nn.certify(benchmark_volume(4))
-    >>> certificate.verdict, certificate.lower_bound > 0, certificate.witness
-    ('certified', True, None)
+    Raises ValueError where derivatives overflow.
     """
-    demand_volume(volume)
-    if max_depth < 0:
-        raise ValueError(f"max_depth must be non-negative, got {max_depth}")
     left_handed = orientation(volume) < 0
     if left_handed:
         volume = mirrored(volume)
