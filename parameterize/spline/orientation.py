@@ -51,14 +51,28 @@ def enclosed_volume(volume: BSplineVolume, middle: Array) -> float:
     It is exact up to rounding, of a rational volume as far as `exact_points` says. middle: a point (3,) near the body,
     about which the integrals are taken.
     """
-    rules = list(map(gauss_points, volume.knots, exact_points(volume)))
-    rows = [points.ravel() for points, _ in rules]
+    rules = exact_rules(volume)
     total = 0.0
     for axis, side in FACES:
-        x, area = face_vectors(volume, rows, axis, side)
-        b, c = (rules[a][1].ravel() for a in range(3) if a != axis)
-        total += float(b @ ((np.moveaxis(x, 0, -1) - middle) * np.moveaxis(area, 0, -1)).sum(axis=-1) @ c / 3.0)
+        total += face_flux(volume, rules, axis, side, middle)
     return total
+
+
+def exact_rules(volume: BSplineVolume) -> list[tuple[Array, Array]]:
+    """Return points and weights of each direction, with the numbers of `exact_points`."""
+    return list(map(gauss_points, volume.knots, exact_points(volume)))
+
+
+def face_flux(
+    volume: BSplineVolume, rules: Sequence[tuple[Array, Array]], axis: int, side: int, middle: Array
+) -> float:
+    """Return the integral of (x - middle) . n / 3 over a face: together the six faces' are the volume.
+
+    rules: from `exact_rules`. n points outward on a right-handed volume, inward on a left-handed one.
+    """
+    x, area = face_vectors(volume, [points.ravel() for points, _ in rules], axis, side)
+    b, c = (rules[a][1].ravel() for a in range(3) if a != axis)
+    return float(b @ ((np.moveaxis(x, 0, -1) - middle) * np.moveaxis(area, 0, -1)).sum(axis=-1) @ c / 3.0)
 
 
 def orientation(volume: BSplineVolume) -> int:
