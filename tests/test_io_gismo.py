@@ -119,6 +119,27 @@ def test_interfaces_that_are_none_are_refused(rows, says, in_folder):
         opened(f"<xml>{cube(0)}{cube(1, 1)}{chosen}</xml>", in_folder)
 
 
+def test_faces_that_a_file_calls_one_though_they_are_apart(in_folder):
+    """The message has the distance, and a tolerance that makes them one: the first patch stays as it is."""
+    chosen = (
+        '<MultiPatch parDim="3"><patches type="id_range">0 1</patches><interfaces>0 2 1 1</interfaces></MultiPatch>'
+    )
+    text = f"<xml>{cube(0)}{cube(1, 1.001)}{chosen}</xml>"
+    with pytest.raises(iga_nn.InputError, match=r"are 0\.001 apart, 5\.0e-04 of .*tolerance=5\.5e-04\) makes them one"):
+        opened(text, in_folder)
+    body = iga_nn.load_volume("file.xml", tolerance=5.5e-4)
+    assert [str(interface) for interface in body.interfaces] == ["p0_u1 = p1_u0"]
+    assert np.array_equal(body.patches[1].control_points[0], body.patches[0].control_points[-1])
+    assert body.patches[1].control_points[0, 0, 0, 0] == 1.0 and body.patches[1].control_points[1, 0, 0, 0] == 2.001
+
+
+@pytest.mark.parametrize("tolerance", [-1.0, 1.0, float("nan"), "wide"])
+def test_tolerances_that_are_none_are_refused(tolerance, in_folder):
+    (in_folder / "file.xml").write_text(f"<xml>{cube(0)}</xml>")
+    with pytest.raises(iga_nn.InputError, match=r"^tolerance"):
+        iga_nn.load_volume("file.xml", tolerance=tolerance)
+
+
 def test_an_interface_that_is_not_listed_is_told(in_folder, caplog):
     chosen = (
         '<MultiPatch parDim="3"><patches type="id_range">0 2</patches><interfaces>0 2 1 1</interfaces></MultiPatch>'

@@ -7,12 +7,13 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.spline.interface import Face, face_label, face_layer, gap, orientations
-from parameterize.spline.multipatch import FLAT, MultiPatch, net_area
+from parameterize.spline.multipatch import FLAT, TOLERANCE, MultiPatch, net_area
 from parameterize.spline.volume import LARGEST, BSplineVolume
 
 log = logging.getLogger(__name__)
 
 WEIGHTS_ALIKE = 1e-12  # relative
+CLOSE = 0.01  # of the body's size: faces that are declared one and nearer than this were rounded or fitted apart
 
 
 def count_of(degrees: Sequence[int], knots: Sequence[Array]) -> int:
@@ -52,14 +53,16 @@ def as_text(rows: Array) -> str:
     return "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
 
 
-def body_of(patches: Sequence[BSplineVolume], declared: Iterable[tuple[Face, Face]] = ()) -> BSplineVolume | MultiPatch:
+def body_of(
+    patches: Sequence[BSplineVolume], declared: Iterable[tuple[Face, Face]] = (), tolerance: float = TOLERANCE
+) -> BSplineVolume | MultiPatch:
     """Return one volume, or the patches with the interfaces that their control points show.
 
-    declared: pairs of faces that the file says are glued. Raises ValueError where one of them has two surfaces, and
-    where the patches do not fit together (`MultiPatch.from_patches`). Interfaces that the file does not name, though it
-    names others, are glued with a notice.
+    declared: pairs of faces that the file says are glued. tolerance: as in `MultiPatch.from_patches`. Raises ValueError
+    where the two faces of a pair are apart, and where the patches do not fit together. Interfaces that the file does
+    not name, though it names others, are glued with a notice.
     """
-    body = MultiPatch.from_patches(patches)
+    body = MultiPatch.from_patches(patches, tolerance)
     _compare(body, [frozenset(pair) for pair in declared])
     return body if len(body) > 1 or body.interfaces else body.patches[0]
 
@@ -74,7 +77,11 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
             raise ValueError(f"interface {names}: there are {len(body)} patches, counted from 0")
         if pair not in found and all(_has_area(body, face) for face in faces):
             apart = min(gap(body.patches, way) for way in orientations(faces[0], faces[-1]))
-            reason = f"are {apart:.3g} apart" if np.isfinite(apart) else "or weights do not fit together"
+            reason = "or weights do not fit together"
+            if np.isfinite(apart):
+                share = apart / _size(body)
+                close = f"; load_volume(path, tolerance={1.1 * share:.1e}) makes them one" if share < CLOSE else ""
+                reason = f"are {apart:.3g} apart, {share:.1e} of the body's size{close}"
             raise ValueError(f"interface {names}: the file says that they are one, but their control points {reason}")
     if declared and (more := found - set(declared)):
         names = ", ".join(" = ".join(face_label(*face) for face in sorted(pair)) for pair in more)
@@ -84,5 +91,9 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
 def _has_area(body: MultiPatch, face: Face) -> bool:
     """Return whether a face is a surface, and not shrunk to an edge or a point, where nothing is glued."""
     net = face_layer(body.patches[face[0]].control_points, face[1])
-    size = max(float(np.ptp(patch.control_points, axis=(0, 1, 2)).max()) for patch in body)
-    return net_area(net) > FLAT * size**2
+    return net_area(net) > FLAT * _size(body) ** 2
+
+
+def _size(body: MultiPatch) -> float:
+    points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in body])
+    return float(np.ptp(points, axis=0).max())
