@@ -7,7 +7,7 @@ point are searched for.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numba
@@ -114,8 +114,7 @@ def _local(body: MultiPatch) -> MultiPatch:
     moved = [patch.control_points - (low + high) / 2.0 for patch in body]
     exponent = int(np.frexp(max(np.abs(points).max() for points in moved))[1])
     patches = (
-        BSplineVolume(patch.degrees, patch.knots, np.ldexp(points, -exponent))
-        for patch, points in zip(body, moved, strict=True)
+        replace(patch, control_points=np.ldexp(points, -exponent)) for patch, points in zip(body, moved, strict=True)
     )
     return MultiPatch(tuple(patches), body.interfaces)
 
@@ -127,9 +126,15 @@ def _rounding(local: MultiPatch, max_depth: int) -> float:
     largest coordinate: 6 p + 2 a direction for the extraction (bernstein.py), 2 p + 2 for the elevation, p + 1 a
     halving, and 1 for the move to the origin. All that underflows is below 2**-1000, and the largest coordinate at
     least 1/2.
+
+    Homogeneous components begin with one rounding more, and their quotient has the errors of both, and one more. The
+    vectors that bound the derivatives of a rational piece, products with weights of at most 1, are off by 10 times as
+    much where a difference is off by 2: five times the bound leaves them the room that differences have.
     """
     degree = max(max(patch.degrees) for patch in local)
     roundings = 2 * (8 * degree + 4 + max_depth * (degree + 1)) + 8 + 1
+    if any(patch.weights is not None for patch in local):
+        roundings = 5 * (2 * (roundings + 1) + 1)
     return 1.01 * roundings * 2.0**-53 * max(float(np.abs(patch.control_points).max()) for patch in local)
 
 

@@ -4,7 +4,8 @@ For a left-handed volume, whose det J is negative on the whole, the mirror image
 
 The Bernstein coefficients of det J bound it on every span, those at its corners are values (docs/method.md, section 6;
 Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys. 233, 2013, section
-3). "Positive" and "negative" mean by more than a bound of all rounding errors (determinant.py).
+3). Of a rational volume det J times a positive polynomial takes its place (rational_determinant.py). "Positive" and
+"negative" mean by more than a bound of all rounding errors (determinant.py).
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from ..spline.bernstein import split
 from ..spline.orientation import mirrored, orientation
 from ..spline.volume import BSplineVolume
 from .determinant import CHUNK, DeterminantForm, corners_of
+from .rational_determinant import RationalDeterminantForm
 
 CLAIMS = {"right-handed": "det J > 0", "left-handed": "det J < 0"}
 
@@ -35,7 +37,8 @@ class Certificate(Shown):
         "certified" (det J > 0 on the whole cube), "folded" (det J < 0 at `witness`), or "undecided". Of a left-handed
         volume -det J takes the place of det J.
     lower_bound : float
-        Proved lower bound of det J over the cube, divided by the magnitude of its mean.
+        Proved lower bound of det J over the cube, divided by the magnitude of its mean. Of a rational volume that of
+        det J W^4, W the sum w_i N_i over the largest weight: a lower one where it is positive.
     mean_det : float
         Integral of det J over the cube, which is the signed volume, in the volume's own units; negative if left-handed.
     witness : three float or None
@@ -79,7 +82,7 @@ def certify_patch(volume: BSplineVolume, max_depth: int) -> Certificate:
     left_handed = orientation(volume) < 0
     if left_handed:
         volume = mirrored(volume)
-    form = DeterminantForm(volume)
+    form = DeterminantForm(volume) if volume.weights is None else RationalDeterminantForm(volume)
     bounds, corners, means = form.survey()
     search = _Search(form, max_depth, float(corners.min()))
     doubtful = np.flatnonzero(~(bounds > search.target))  # span numbers, flat

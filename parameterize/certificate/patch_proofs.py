@@ -6,7 +6,9 @@
   a positive definite symmetric part, so that <x - y, F(x) - F(y)> > 0 on a convex domain.
 
 A control net bounds its piece, and its differences bound the derivatives, so each proof looks at finitely many numbers,
-with room for their rounding errors. Pieces may also be joined through interfaces of patches (gluing.py).
+with room for their rounding errors. With positive weights a control net bounds its piece, too; what bounds the
+derivatives of a rational piece is in `_rational_differences`. Pieces may also be joined through interfaces of patches
+(gluing.py).
 """
 
 from dataclasses import dataclass
@@ -21,6 +23,7 @@ from ..spline.bernstein import elevation, extraction, halving
 from ..spline.bspline import breakpoints
 from ..spline.interface import axis_side
 from ..spline.multipatch import MultiPatch
+from ..spline.rational import projected
 from ..spline.volume import BSplineVolume
 from .gluing import SharedPoints
 
@@ -45,7 +48,7 @@ class Pieces:
 
     patches: (n,) the number of the patch. axes: (n,) the parameter that is constant. low: (n, 3) the lower corner in
     the cube, counted in edges of pieces. nets: (n, q + 1, q + 1, 3) Bezier control points, along the two other
-    parameters in their order.
+    parameters in their order; homogeneous, (.., 4), where a patch of the body is rational.
     """
 
     depth: int
@@ -70,19 +73,26 @@ class Pieces:
 def boundary_pieces(body: MultiPatch) -> Pieces:
     """Return all spans of the faces that are not glued, raised to the largest degree. Raises ValueError for none."""
     degree = max(max(patch.degrees) for patch in body)
+    is_rational = any(patch.weights is not None for patch in body)
+    nets = [patch.homogeneous if is_rational else patch.control_points for patch in body]
     faces = [(k, *axis_side(name)) for k, names in enumerate(body.outer) for name in names]
     if not faces:
         raise ValueError("every face is glued: a body has a boundary")
-    parts = [_face_pieces(body.patches[k], axis, side, degree) for k, axis, side in faces]
-    patches = np.repeat([k for k, _, _ in faces], [len(nets) for _, _, nets in parts])
+    parts = [_face_pieces(body.patches[k], nets[k], axis, side, degree) for k, axis, side in faces]
+    patches = np.repeat([k for k, _, _ in faces], [len(found) for _, _, found in parts])
     return Pieces(0, SharedPoints(body), patches, *(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _face_pieces(volume: BSplineVolume, axis: int, side: int, degree: int) -> tuple[IntArray, IntArray, Array]:
-    """Return constant axes (n,), low corners (n, 3) and nets (n, q + 1, q + 1, 3) of one face's spans."""
-    net = volume.face(axis, side)  # (n_a, n_b, 3)
+def _face_pieces(
+    volume: BSplineVolume, control: Array, axis: int, side: int, degree: int
+) -> tuple[IntArray, IntArray, Array]:
+    """Return constant axes (n,), low corners (n, 3) and nets (n, q + 1, q + 1, c) of one face's spans.
+
+    control: (n_u, n_v, n_w, c), control points of the volume, or homogeneous ones.
+    """
+    net = np.take(control, -1 if side else 0, axis=axis)  # (n_a, n_b, c)
     a, b = VARYING_AXES[axis]
-    for direction, position in ((a, 0), (b, 2)):  # (s_a, q + 1, n_b, 3), then (s_a, q + 1, s_b, q + 1, 3)
+    for direction, position in ((a, 0), (b, 2)):  # (s_a, q + 1, n_b, c), then (s_a, q + 1, s_b, q + 1, c)
         own = volume.degrees[direction]
         first, weights = extraction(volume.knots[direction], own)
         local = np.take(net, first[:, None] + np.arange(own + 1), axis=position)
@@ -92,7 +102,7 @@ def _face_pieces(volume: BSplineVolume, axis: int, side: int, degree: int) -> tu
     place = np.indices(net.shape[0:3:2]).reshape(2, -1).T  # (n, 2)
     low = np.full((len(place), 3), side * (len(breakpoints(volume.knots[axis])) - 1))
     low[:, [a, b]] = place
-    nets = net.transpose(0, 2, 1, 3, 4).reshape(-1, degree + 1, degree + 1, 3)
+    nets = net.transpose(0, 2, 1, 3, 4).reshape(-1, degree + 1, degree + 1, control.shape[3])
     return np.full(len(place), axis), low, nets
 
 
@@ -105,7 +115,7 @@ def halved(pieces: Pieces, pairs: IntArray) -> tuple[Pieces, IntArray]:
     patches, axes = np.repeat(pieces.patches[used], 4), np.repeat(pieces.axes[used], 4)
     low = np.repeat(2 * pieces.low[used], 4, axis=0)
     low[np.arange(len(low))[:, None], VARYING_AXES[axes]] += np.tile(list(np.ndindex(2, 2)), (len(used), 1))
-    finer = Pieces(pieces.depth + 1, pieces.shared, patches, axes, low, nets.reshape(-1, q + 1, q + 1, 3))
+    finer = Pieces(pieces.depth + 1, pieces.shared, patches, axes, low, nets.reshape(-1, *pieces.nets.shape[1:]))
     four = 4 * compact.reshape(-1, 1, 2)
     alone = four[:, 0, 0] == four[:, 0, 1]
     own, others = np.argwhere(np.tri(4, dtype=bool)), np.argwhere(np.ones((4, 4), dtype=bool))
@@ -141,8 +151,9 @@ def _joints(names: IntArray, first: IntArray, second: IntArray) -> IntArray:
 
 
 def as_rows(nets: Array) -> Array:
-    """Return nets (n, i, j, 3) as rows of points (n, i * j, 3)."""
-    return nets.reshape(len(nets), nets.shape[1] * nets.shape[2], 3)
+    """Return nets (n, i, j, 3), or homogeneous ones (n, i, j, 4), as rows of points (n, i * j, 3)."""
+    points = projected(nets)[0] if nets.shape[3] == 4 else nets
+    return points.reshape(len(nets), nets.shape[1] * nets.shape[2], 3)
 
 
 def is_proved(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
@@ -219,7 +230,27 @@ def _corner_last(nets: Array, corners: IntArray) -> Array:
 
 def _differences(nets: Array, axis: int) -> Array:
     """Return control vectors (n, k, 3) of the derivative, up to the degree as a factor."""
+    if nets.shape[3] == 4:
+        return _rational_differences(np.moveaxis(nets, axis, 1))
     return as_rows(np.diff(nets, axis=axis))
+
+
+def _rational_differences(nets: Array) -> Array:
+    """Return vectors (n, k, 3) whose convex hull holds the derivative of F times a positive number at each point.
+
+    nets: homogeneous, (n, i, j, 4); the derivative is that along i. Of F = A / W, W^2 F_s = A_s W - A W_s is, up to the
+    degree as a factor, the sum over all i, j, k, l of B_ij C_kl, positive polynomials that sum to 1, times
+    w_(i+1)j w_kl (P_(i+1)j - P_kl) - w_ij w_kl (P_ij - P_kl). The number is the same for both derivatives, so that a
+    positive definite symmetric part stays one. Weights are scaled: the largest of each net is 1.
+    """
+    points, weights = projected(nets)
+    weights = weights / weights.max(axis=(1, 2), keepdims=True)
+    ahead, behind = (
+        (weights[:, part, :, None, None] * weights[:, None, None])[..., None]
+        * (points[:, part, :, None, None] - points[:, None, None])
+        for part in (slice(1, None), slice(None, -1))
+    )  # (n, q, q + 1, q + 1, q + 1, 3)
+    return np.asarray(ahead - behind).reshape(len(nets), int(np.prod(ahead.shape[1:5])), 3)
 
 
 def _monotone(across: Array, along: Array, across_error: Array | float, along_error: float) -> Mask:

@@ -11,10 +11,19 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Mask
 from ..display import Brief, Shown, above
 from .archive import is_of_patches, load_patches, save_patches
-from .interface import Face, Interface, face_label, face_layer, gap, knots_agree, orientations
+from .interface import (
+    WEIGHT_TOLERANCE,
+    Face,
+    Interface,
+    face_label,
+    face_layer,
+    gap,
+    knots_agree,
+    orientations,
+)
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
 
 TOLERANCE = 1e-6  # of the body's size: distance of two control points that are taken for one
@@ -170,12 +179,23 @@ def shared_numbers(
 
 
 def _merged(patches: Sequence[BSplineVolume], labels: Sequence[IntArray]) -> tuple[BSplineVolume, ...]:
-    """Return the patches with one control point for each label, the first that has it."""
+    """Return the patches with one control point for each label, the first that has it.
+
+    Its weight goes with it, except to patches whose weights there are other ones by a factor.
+    """
     every = np.concatenate([label.ravel() for label in labels])
     points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in patches])
     _, first = np.unique(every, return_index=True)
-    chosen = points[first]
-    return tuple(replace(patch, control_points=chosen[label]) for patch, label in zip(patches, labels, strict=True))
+    own = [np.ones(patch.shape) if patch.weights is None else patch.weights for patch in patches]
+    chosen, weights = points[first], np.concatenate([row.ravel() for row in own])[first]
+    return tuple(
+        replace(patch, control_points=chosen[label], weights=np.where(_alike(weights[label], row), weights[label], row))
+        for patch, label, row in zip(patches, labels, own, strict=True)
+    )
+
+
+def _alike(one: Array, other: Array) -> Mask:
+    return np.abs(one - other) <= WEIGHT_TOLERANCE * other
 
 
 def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float) -> Iterator[Interface]:

@@ -44,3 +44,21 @@ def bent_bar(seed: int = 0) -> BSplineVolume:
     rows = [np.linspace(0.0, 1.0, n) for n in shape]
     points = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1) + 0.03 * random.standard_normal((*shape, 3))
     return BSplineVolume(degrees, knots, points, random.uniform(0.5, 2.0, shape))
+
+
+def coil(quarters: int, rise: float, inner: float = 1.0, outer: float = 2.0, height: float = 1.0) -> BSplineVolume:
+    """Return a rod around z of some quarters of a turn, exact circles seen along z, that rises by `rise` a turn.
+
+    u runs along the radius, v along the angle, continuous at the quarters' ends, w along z.
+    """
+    steps = np.arange(2 * quarters + 1)
+    odd = steps % 2 == 1
+    weights = np.where(odd, np.sqrt(0.5), 1.0)
+    points = np.zeros((2, len(steps), 2, 3))
+    circle = np.stack([np.cos(steps * np.pi / 4), np.sin(steps * np.pi / 4)], axis=-1) / weights[:, None]
+    for i, radius in enumerate((inner, outer)):
+        points[i, ..., :2] = radius * circle[:, None]
+    points[..., 2] = rise * steps[:, None] / 8.0 + np.array([0.0, height])
+    knots = np.concatenate([[0.0], np.repeat(np.linspace(0.0, 1.0, quarters + 1), 2), [1.0]])
+    net = np.broadcast_to(weights[:, None], points.shape[:3])
+    return BSplineVolume((1, 2, 1), (LINEAR, knots, LINEAR), points, net)
