@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
-from .problem import ElasticityOptions, Formula, PoissonOptions
+from .problem import ElasticityOptions, Formula, PoissonOptions, modulus
 from .space import check_level, check_space
 
 if TYPE_CHECKING:
@@ -54,13 +54,13 @@ class ElasticityStudyOptions(StudyOptions):
         exact: the displacement, a vector: three formulas in x, y, z or X, Y, Z (scaled to volume 1 about the middle),
             separated by semicolons, in quotes: "x*y;0;sin(z)".
         traction: faces with the traction of that displacement; all other faces have the displacement itself.
-        young: Young's modulus E.
-        poisson_ratio: Poisson's ratio nu.
+        young: Young's modulus E; of several patches also one for each: "p0: 210, p1: 70".
+        poisson_ratio: Poisson's ratio nu, as young.
     """
 
     traction: tuple[str, ...] = ()
-    young: float = 1.0
-    poisson_ratio: float = 0.3
+    young: float | str = 1.0
+    poisson_ratio: float | str = 0.3
 
     command: ClassVar[str] = "study elasticity"
 
@@ -80,8 +80,8 @@ class ModesOptions(Checked):
     """Hold the options of the vibrations of an elastic body: its material, its supports and the number of modes.
 
     Attributes:
-        young: Young's modulus E.
-        poisson_ratio: Poisson's ratio nu.
+        young: Young's modulus E; of several patches also one for each: "p0: 210, p1: 70".
+        poisson_ratio: Poisson's ratio nu, as young.
         density: mass per volume, in units that agree with those of E and of the volume.
         number: number of modes, from the lowest frequency on.
         fix: regions of the boundary that are held, as in `run elasticity`: "nz < -0.9", "face(x, y, z)", group:NAME,
@@ -91,8 +91,8 @@ class ModesOptions(Checked):
         degree: degree of the trial space; the degree of the map by default.
     """
 
-    young: float = 1.0
-    poisson_ratio: float = 0.3
+    young: float | str = 1.0
+    poisson_ratio: float | str = 0.3
     density: float = 1.0
     number: int = 6
     fix: tuple[str, ...] = ()
@@ -111,7 +111,8 @@ class ModesOptions(Checked):
         held = {"fix": self.fix or None, "roller": self.roller or None}
         with input_errors():
             check_modes(self.density, self.number)
-            return Elasticity(traction=free, young=self.young, poisson_ratio=self.poisson_ratio, **held)
+            young, ratio = modulus("--young", self.young), modulus("--poisson-ratio", self.poisson_ratio)
+            return Elasticity(traction=free, young=young, poisson_ratio=ratio, **held)
 
 
 def _range(text: str) -> list[int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
@@ -94,7 +94,8 @@ class PoissonOptions(ProblemOptions):
             neither f nor g is given. A formula that starts with a minus is written --exact=-x.
         source: f, a formula.
         boundary: g, the values of u, a formula.
-        kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz.
+        kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz; of several patches
+            also an entry for each: "p0: 1, p1: 2+x".
         reaction: c, a formula.
         neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for the flux of the exact solution.
         robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
@@ -141,7 +142,7 @@ class PoissonOptions(ProblemOptions):
                 exact=self.exact,
                 source=self.source,
                 boundary=self.boundary,
-                kappa=None if self.kappa is None else self.kappa.split(","),
+                kappa=None if self.kappa is None else texts.by_patch("--kappa", self.kappa, _entries),
                 reaction=self.reaction,
                 neumann=texts.faces("neumann", self.neumann),
                 robin=robin,
@@ -149,6 +150,10 @@ class PoissonOptions(ProblemOptions):
                 inflow=texts.on_regions("flux", self.flux, str),
                 exchange=texts.on_regions("exchange", self.exchange, texts.pair),
             )
+
+
+def _entries(text: str) -> list[str]:
+    return text.split(",")
 
 
 @dataclass(frozen=True)
@@ -166,8 +171,8 @@ class ElasticityOptions(ProblemOptions):
         displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
         traction: faces where a traction is given, each as "FACE=VECTOR", FACE=0 for a face that is free, or FACE for
             the traction of the exact solution.
-        young: Young's modulus E.
-        poisson_ratio: Poisson's ratio nu.
+        young: Young's modulus E; of several patches also one for each: "p0: 210, p1: 70".
+        poisson_ratio: Poisson's ratio nu, as young.
         fix: regions of the boundary that are held, each as REGION, or "REGION=VECTOR" for a given displacement; an
             entry of the vector that is left out is free: "x < 1=0;;". A region is a condition on position and outward
             normal, "nz > 0.9 and x < 2", a face of the part, "face(x, y, z)", a group of the mesh, group:NAME, a
@@ -189,8 +194,8 @@ class ElasticityOptions(ProblemOptions):
     body_force: Formula | None = None
     displacement: Formula | None = None
     traction: tuple[str, ...] = ()
-    young: float = 1.0
-    poisson_ratio: float = 0.3
+    young: float | str = 1.0
+    poisson_ratio: float | str = 0.3
     fix: tuple[str, ...] = ()
     roller: tuple[str, ...] = ()
     symmetry: tuple[str, ...] = ()
@@ -228,8 +233,8 @@ class ElasticityOptions(ProblemOptions):
                 force=texts.vector("--body-force", self.body_force),
                 displacement=texts.vector("--displacement", self.displacement),
                 traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
-                young=self.young,
-                poisson_ratio=self.poisson_ratio,
+                young=modulus("--young", self.young),
+                poisson_ratio=modulus("--poisson-ratio", self.poisson_ratio),
                 fix=texts.on_regions("fix", self.fix, texts.parts),
                 roller=texts.on_regions("roller", self.roller, str),
                 symmetry=texts.on_regions("symmetry", self.symmetry, str),
@@ -239,6 +244,11 @@ class ElasticityOptions(ProblemOptions):
             )
             body.demand_held()
             return body
+
+
+def modulus(flag: str, given: float | str) -> Any:
+    """Return a number of a material, or the numbers of each patch. Raises InputError."""
+    return given if not isinstance(given, str) else texts.by_patch(flag, given, partial(texts.number, flag))
 
 
 PROBLEMS: dict[str, type[ProblemOptions]] = {kind.section: kind for kind in (PoissonOptions, ElasticityOptions)}

@@ -1,4 +1,4 @@
-"""Reads the texts in which an option states data: FACE=TEXT, REGION=DATA, vectors."""
+"""Reads the texts in which an option states data: FACE=TEXT, REGION=DATA, vectors, data by patch."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from ..errors import InputError
 
 _EQUALS = re.compile("(?<![<>=])=(?!=)")
+_PATCH = re.compile(r"(?:^|,)\s*p(\d+)\s*:")
 _QUOTED = re.compile("\"[^\"]*\"|'[^']*'")
 
 
@@ -64,3 +65,25 @@ def vector(flag: str, text: str | None) -> list[str] | None:
         form = "write three formulas with semicolons between them, such as '0;0;-1', or 0 for none"
         raise InputError(f"{flag} {text!r:.80}: {form}")
     return entries
+
+
+def by_patch(flag: str, text: str, read: Callable[[str], Any]) -> Any:
+    """Return what `read` makes of a text, or, of a text such as "p0: 1, p1: 2+x", of each patch's own by its number.
+
+    Raises InputError for a patch with two entries, and for text before the first patch.
+    """
+    before, *rest = _PATCH.split(text)
+    if not rest:
+        return read(text)
+    numbers, own = list(map(int, rest[::2])), rest[1::2]
+    if before.strip() or len(set(numbers)) < len(numbers):
+        raise InputError(f"{flag} {text!r:.80}: write one entry a patch, such as 'p0: 1, p1: 2'")
+    return {number: read(entry.strip()) for number, entry in zip(numbers, own, strict=True)}
+
+
+def number(flag: str, text: str) -> float:
+    """Return the number of a text. Raises InputError for another text."""
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{flag} {text!r:.80}: give a number, or one a patch, such as 'p0: 1, p1: 2'") from None

@@ -47,15 +47,24 @@ def _poisson(section: Report) -> list[Row]:
 
 def _elasticity(section: Report) -> list[Row]:
     young, ratio = section.get("young", 1.0), section.get("poisson_ratio", 0.3)
-    first, shear = young * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)), young / (2.0 * (1.0 + ratio))
     faces, given = _faces(section.get("traction", ())), _derived(section)
     return [
         ("equation", "−∇·σ = f,  σ = λ (∇·u) I + μ (∇u + ∇uᵀ)"),
-        ("material", f"Young's modulus E = {young:g}, Poisson's ratio ν = {ratio:g}; λ = {first:.6g}, μ = {shear:.6g}"),
+        ("material", _material(young, ratio)),
         ("force f per volume", _text(section.get("body_force", given))),
         _rest(section, "displacement u", "displacement", "traction σ n", faces),
         *((f"traction σ n on {face}", data or FROM_EXACT) for face, data in faces),
     ]
+
+
+def _material(young: float | str, ratio: float | str) -> str:
+    """Return the material of a body; of patches with their own the texts that state them."""
+    said = (f"{value:g}" if isinstance(value, float | int) else value for value in (young, ratio))
+    words = "Young's modulus E = {}, Poisson's ratio ν = {}".format(*said)
+    if isinstance(young, str) or isinstance(ratio, str):
+        return words
+    first, shear = young * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)), young / (2.0 * (1.0 + ratio))
+    return f"{words}; λ = {first:.6g}, μ = {shear:.6g}"
 
 
 def _derived(section: Report) -> str:
