@@ -523,3 +523,70 @@ def test_the_titles_of_bars_have_the_units_that_are_given():
         solve.benchmark_volume(1), solve.solve_problem(solve.benchmark_volume(1), body), units=Units("mm", "MPa")
     )
     assert [field["title"] for field in scene["fields"]][:2] == ["von Mises stress [MPa]", "|u| [mm]"]
+
+
+@pytest.fixture(scope="module")
+def rod():
+    """Three cubes along x, and u = x on them."""
+    cubes = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (a + u, v, w), 4) for a in range(3)]
+    body = iga_nn.MultiPatch.from_patches(cubes)
+    return body, solve.solve_problem(body, solve.Poisson(exact="x"))
+
+
+def test_a_body_of_several_patches_is_one_view(chromium, rod, tmp_path):
+    """Glued faces are not drawn; sections of space go through all patches, and values are read on each."""
+    scene = scene_of(*rod)
+    assert [tuple(place) for place in scene["outer"]].count((1, 0)) == 0 and len(scene["outer"]) == 14
+    assert scene["axes"] == [] and [label for _, label in scene["legend"]] == ["p0", "p1", "p2"]
+    seen = {}
+
+    async def work(browser):
+        tab = await opened(browser, written(tmp_path, scene))
+        await tab.value(typed("views", "+z"))
+        for share in (0.2, 0.5, 0.8):
+            await tab.value(clicked(share, 0.5))
+            seen[share] = await tab.value(READ)
+        await tab.value(typed("views", "+x"))
+        await tab.value(choice("x"))
+        for share in (0.25, 0.75):
+            await tab.value(moved("at", share))
+            await tab.value(clicked(0.5, 0.5))
+            seen[f"x {share}"] = await tab.value(READ)
+        await tab.value(choice("faces"))
+        await tab.value(choice("surface"))
+        swatches = await tab.value("[...document.querySelectorAll('.swatch')].map((one) => one.innerText.trim())")
+        return swatches, (await tab.value(PARTS))["box"], tab.complaints
+
+    swatches, box, complaints = in_browser(chromium, tmp_path, work)
+    assert complaints == [] and swatches == ["p0", "p1", "p2"] and box[2] > box[0]
+    for share, patch in ((0.2, "p0"), (0.5, "p1"), (0.8, "p2"), ("x 0.25", "p0"), ("x 0.75", "p2")):
+        x = numbers(seen[share]["x, y, z"])[0]
+        assert seen[share]["patch"] == patch and float(seen[share]["u"]) == pytest.approx(x, abs=1e-3)
+    assert numbers(seen["x 0.25"]["x, y, z"])[0] == pytest.approx(0.75, abs=1e-3)
+    assert "Face p2_w1" in seen[0.8]
+
+
+def test_a_body_cut_open_shows_what_lies_behind(chromium, rod, tmp_path):
+    """With the octants in front left out, the middle of the picture is a section: it has no face."""
+    scene = scene_of(*rod)
+    assert scene["cut"]["planes"] and all(
+        1 <= row[-1] <= 15 for row in (*scene["cut"]["planes"], *scene["cut"]["faces"])
+    )
+
+    async def work(browser):
+        tab = await opened(browser, written(tmp_path, scene))
+        whole = (await tab.value(PARTS))["colors"]
+        await tab.value(choice("cut"))
+        return whole, (await tab.value(PARTS))["colors"], tab.complaints
+
+    whole, cut, complaints = in_browser(chromium, tmp_path, work)
+    assert complaints == [] and 0.3 * sum(whole.values()) < sum(cut.values()) < sum(whole.values())
+
+
+def test_modes_of_a_body_are_frames(rod):
+    body, _ = rod
+    held = solve.Elasticity(fix="p0_u0", load={"p2_u1": (0, 0, 1)})
+    bent = solve.solve_problem(body, held)
+    frames = scene_of_frames(body, [Frame.of("mode 1", bent), Frame.of("mode 2", bent)], oscillates=True)
+    assert [frame["label"] for frame in frames["frames"]] == ["mode 1", "mode 2"] and frames["warp"] > 0.0
+    assert len(frames["spans"]) == 3
