@@ -39,7 +39,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "Surface": "parameterize.surface.surface",
     "System": "solve",
     "WorkerOptions": "iga_nn.options",
-    "certify": "parameterize.certificate.jacobian",
+    "certify": "parameterize.certificate.body",
     "convergence": "solve",
     "discretize": "solve",
     "export": "iga_nn.io.formats",

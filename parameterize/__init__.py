@@ -29,6 +29,7 @@ from typing import Any
 
 _HOME = {  # type checkers read __init__.pyi
     "BSplineVolume": "spline.volume",
+    "BodyCertificate": "certificate.body",
     "BoundaryMap": "cube.boundary_map",
     "Certificate": "certificate.jacobian",
     "Config": "config",
@@ -36,7 +37,7 @@ _HOME = {  # type checkers read __init__.pyi
     "Parameterization": "run",
     "QualityReport": "quality.quality",
     "Surface": "surface.surface",
-    "certify": "certificate.jacobian",
+    "certify": "certificate.body",
     "load_surface": "surface.surface",
     "measure": "quality.quality",
     "parameterize": "run",

@@ -1,5 +1,6 @@
+from .certificate.body import BodyCertificate as BodyCertificate
+from .certificate.body import certify as certify
 from .certificate.jacobian import Certificate as Certificate
-from .certificate.jacobian import certify as certify
 from .config import Config as Config
 from .config import preset as preset
 from .cube.boundary_map import BoundaryMap as BoundaryMap

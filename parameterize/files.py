@@ -59,15 +59,23 @@ def unfinished(target: Path) -> list[Path]:
     return list(target.parent.glob(f".{escape(target.stem)}.*.part{escape(target.suffix)}"))
 
 
+def array_names(path: str | Path) -> list[str]:
+    """Return the names of the arrays of an .npz. Raises FileNotFoundError, or ValueError for another file."""
+    source = _existing(path)
+    try:
+        with zipfile.ZipFile(source) as archive:
+            return [name.removesuffix(".npy") for name in archive.namelist()]
+    except Exception as error:  # of a damaged archive
+        raise _unreadable(source, error) from None
+
+
 def load_arrays(path: str | Path, names: tuple[str, ...], extra: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
     """Read the named arrays of an .npz, those of `extra` where it has them, and no others.
 
     Raises FileNotFoundError, or ValueError for anything that is not such a file: not an archive, a missing array,
     pickled content, a header that does not match the data behind it, or more than 512 MiB once unpacked.
     """
-    source = Path(path)
-    if not source.exists():
-        raise FileNotFoundError(f"{source}: no such file")
+    source = _existing(path)
     try:
         with zipfile.ZipFile(source) as archive, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numpy warns of headers by Python 2, also where they are only damaged
@@ -78,7 +86,7 @@ def load_arrays(path: str | Path, names: tuple[str, ...], extra: tuple[str, ...]
             refused = missing or unpacked > MAX_UNPACKED_BYTES
             arrays = {} if refused else {name: _read_array(archive, held[name]) for name in wanted}
     except Exception as error:  # of a damaged archive: zipfile, its decompressors and numpy raise a dozen kinds
-        raise ValueError(f"{source}: not a readable .npz archive ({str(error) or type(error).__name__})") from None
+        raise _unreadable(source, error) from None
     if missing:
         arrays_held = sorted(name for name, entry in held.items() if entry.filename.endswith(".npy"))
         remedy = f"it holds {', '.join(arrays_held):.100}" if arrays_held else "unpack what is in it first"
@@ -86,6 +94,16 @@ def load_arrays(path: str | Path, names: tuple[str, ...], extra: tuple[str, ...]
     if refused:
         raise ValueError(f"{source}: unpacks to {unpacked} bytes, more than {MAX_UNPACKED_BYTES}")
     return arrays
+
+
+def _existing(path: str | Path) -> Path:
+    if not Path(path).exists():
+        raise FileNotFoundError(f"{path}: no such file")
+    return Path(path)
+
+
+def _unreadable(source: Path, error: Exception) -> ValueError:
+    return ValueError(f"{source}: not a readable .npz archive ({str(error) or type(error).__name__})")
 
 
 def _read_array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:

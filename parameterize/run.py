@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray
 from .attempts import attempts
+from .certificate.body import certify
 from .certificate.boundary import check_boundary
-from .certificate.jacobian import Certificate, certify
+from .certificate.jacobian import Certificate
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map

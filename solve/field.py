@@ -150,7 +150,7 @@ class SplineField(Brief):
             return False
         if own is None or own is volume:
             return True
-        parts = zip((*own.knots, own.control_points), (*volume.knots, volume.control_points), strict=True)
+        parts = zip((*own.knots, own.homogeneous), (*volume.knots, volume.homogeneous), strict=True)
         return own.degrees == volume.degrees and all(np.array_equal(*pair) for pair in parts)
 
     def save(self, path: str | Path) -> None:

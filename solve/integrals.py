@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.bspline import gauss_points
-from parameterize.spline.orientation import FACES
+from parameterize.spline.bspline import breakpoints, gauss_points
+from parameterize.spline.orientation import FACES, exact_points
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .discretization.space import TrialSpace, same_smoothness
@@ -112,8 +112,10 @@ def _volume_of(body: BSplineVolume | Solution) -> BSplineVolume:
 
 def _counts(body: BSplineVolume | Solution) -> list[int]:
     """Return the numbers of Gauss points a span and direction: exact for a volume; of a solution, as for errors."""
-    degrees = zip(_volume_of(body).degrees, body.degrees, strict=True)
-    return [max((3 * of_map + 1) // 2, own + 2) for of_map, own in degrees]
+    volume = _volume_of(body)
+    spans = ([len(breakpoints(row)) - 1 for row in spline.knots] for spline in (body, volume))
+    parts = [own // of_map for own, of_map in zip(*spans, strict=True)]
+    return [max(of_map, own + 2) for of_map, own in zip(exact_points(volume, parts), body.degrees, strict=True)]
 
 
 def _over_body(body: BSplineVolume | Solution, what: str | Integrand | None) -> Array:

@@ -57,6 +57,14 @@ def test_a_certificate_and_a_quality_say_what_is_proved():
     assert f"{arap.unit_volume.mean:.4g}, {arap.unit_volume.max:.4g}" in cells(quality)
 
 
+def test_a_certificate_of_several_patches_lists_its_defects():
+    good = iga_nn.MultiPatch((benchmark_volume(2), benchmark_volume(3)))
+    shown = iga_nn.certify(good)._repr_html_()
+    assert "2 patches: certified" in shown and "<ul>" not in shown
+    folded = iga_nn.certify(iga_nn.MultiPatch((benchmark_volume(2), benchmark_volume(4, amplitude=0.4))))
+    assert "2 patches: folded" in folded._repr_html_() and "<li>p1: folded at (" in folded._repr_html_()
+
+
 def test_a_solution_shows_relative_errors_before_absolute_ones(solution):
     titles, numbers = np.reshape(cells(solution._repr_html_()), (2, -1)).tolist()
     named = dict(zip(titles, numbers, strict=True))
@@ -79,7 +87,7 @@ def test_a_study_shows_its_rates_and_notices_once(solution):
 
 def test_python_prints_the_shapes_of_arrays(solution):
     knots = "(array(9,), array(9,), array(9,))"
-    volume = f"BSplineVolume(degrees=(3, 3, 3), knots={knots}, control_points=array(5, 5, 5, 3))"
+    volume = f"BSplineVolume(degrees=(3, 3, 3), knots={knots}, control_points=array(5, 5, 5, 3), weights=None)"
     assert repr(solution.geometry) == volume
     assert repr(solution).startswith(
         f"Solution(degrees=(3, 3, 3), knots={knots}, coefficients=array(5, 5, 5), geometry"

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from volumes import spans_at
 
-from iga_nn.io.splinepy import write_mfem, write_mfem_field
+from iga_nn.io.mfem import write_mfem, write_mfem_field
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Poisson, benchmark_volume, solve_problem
 
 mfem = pytest.importorskip("mfem.ser")
-pytest.importorskip("splinepy")
 
 POINTS = np.random.default_rng(0).random((200, 3))
 

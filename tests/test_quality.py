@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from shapes import CORNERS, CUBE_FACES
 
+from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
-from parameterize.certificate.jacobian import certify
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.quality.distances import Distances, nearest_on_boundary
 from parameterize.quality.quality import arap, arap_grid, measure, scaled_jacobian

@@ -9,7 +9,7 @@ import torch
 from shapes import turned
 from small_run import STEPS, small_surface, tiny_config
 
-from parameterize.certificate.jacobian import certify
+from parameterize.certificate.body import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig
 from parameterize.cube import boundary_map, edge_paths

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import box, frame, held_at, plate, ring, two
+from cube_grids import box, frame, held_at, plate, ring, two
 
 import iga_nn
 from parameterize.conjugate_gradients import conjugate_gradients

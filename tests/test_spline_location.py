@@ -1,6 +1,7 @@
 import igl
 import numpy as np
 import pytest
+from rational_shapes import bent_bar, quarter_ring
 
 from parameterize.spline import location
 from parameterize.spline.bspline import greville, open_uniform_knots
@@ -34,6 +35,8 @@ VOLUMES = {
     "left-handed": BSplineVolume.from_function(lambda u, v, w: twisted(v, u, w), 7),
     "one span": BSplineVolume.from_function(lambda u, v, w: (u + 0.2 * v * w, v, 1e-3 * w), 4),
     "large": BSplineVolume.from_function(twisted, 6).transformed(1e6, [1e9, 0.0, -1e9]),
+    "ring": quarter_ring(),
+    "rational": bent_bar(),
 }
 
 
@@ -50,7 +53,7 @@ def test_points_inside_are_found(name):
     assert found.min() >= 0.0 and found.max() <= 1.0
 
 
-@pytest.mark.parametrize("name", ["cubic", "uneven", "left-handed"])
+@pytest.mark.parametrize("name", ["cubic", "uneven", "left-handed", "ring", "rational"])
 @pytest.mark.parametrize("gap", [1e-1, 1e-4, 1e-8])
 def test_points_beside_the_boundary_are_told_apart(name, gap):
     volume, rng = VOLUMES[name], np.random.default_rng(1)
@@ -72,8 +75,9 @@ def test_all_of_a_box_agrees_with_the_winding_number():
     assert (np.isfinite(locate(volume, points)[:, 0]) != inside).sum() <= 2  # the triangles cut a little off
 
 
-def test_what_newton_does_not_find_is_found_by_halving(monkeypatch):
-    volume, places = VOLUMES["cubic"], np.random.default_rng(3).random((200, 3))
+@pytest.mark.parametrize("name", ["cubic", "rational"])
+def test_what_newton_does_not_find_is_found_by_halving(name, monkeypatch):
+    volume, places = VOLUMES[name], np.random.default_rng(3).random((200, 3))
     location._index.cache_clear()
     index = location._index(volume)
     index.starts[:] = index.starts[::-1].copy()  # the farthest starts

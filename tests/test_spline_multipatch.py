@@ -6,7 +6,7 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
-from bodies import box, frame, plate, ring, two
+from cube_grids import box, frame, plate, ring, two
 
 import iga_nn
 from iga_nn import BSplineVolume, Interface, MultiPatch

@@ -246,14 +246,14 @@ def check(
     """Check a surface for acceptance, or certify a volume; write nothing but a picture of regions.
 
     Args:
-        path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
+        path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM, GeoPDEs or splinepy).
         strict: refuse a surface that intersects itself; by default this is a notice.
         region: regions of the surface, such as "nz > 0.9 and x < 2"; the answer has the area of each region and the
             number of triangles that lie mostly in it; a region without a point of the surface is refused.
         picture: PNG of the surface to write, with the regions in colours.
         force: replace an existing picture.
     """
-    from ..io.formats import is_volume, load_volume
+    from ..io.formats import is_volume, load_one_patch
     from ..models import resolve
     from ..report import document as reports
     from ..workflow.verdict import certified_facts
@@ -273,7 +273,7 @@ def check(
     if surface != SURFACE or strict or region or picture:
         options = "--component, --max-faces, --decimate, --strict, --region and --picture"
         raise InputError(f"{path}: is a volume; {options} are for surfaces")
-    facts = certified_facts(load_volume(path))
+    facts = certified_facts(load_one_patch(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
 

@@ -3,9 +3,9 @@
 docs/output.md explains our own files, NumPy archives without pickles.
 
 A solution, scalar or a displacement, is exported with its volume into every format: `vtk` and `view` hold it as the
-point data `u`, the others as a second file beside the volume's. `io.splinepy` explains G+Smo XML, MFEM meshes and
-splinepy's JSON, which are also read; `io.vtk` and `io.view` those for ParaView. IGES and STEP have no trivariate
-splines.
+point data `u`, the others as a second file beside the volume's. `io.gismo`, `io.mfem` and `io.splinepy` explain the
+formats that are also read, `io.geopdes` one that is only read; `io.vtk` and `io.view` those for ParaView. IGES and STEP
+have no trivariate splines.
 """
 
 from collections.abc import Callable, Iterable
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.files import replacing
+from parameterize.spline.multipatch import TOLERANCE, MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
@@ -27,8 +28,8 @@ from ..new_file import check_new
 from ..options import PROBLEMS
 from ..report import document as reports
 from ..type_check import check_type
-from . import splinepy, view, vtk
-from .splinepy_gate import CHECKS, kind_of
+from . import gismo, mfem, splinepy, view, vtk
+from .reading import ENDINGS, READERS, kind_of, read_body
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
@@ -48,8 +49,8 @@ class Format:
 
 
 FORMATS = {
-    "gismo": Format(".xml", splinepy.write_gismo, ("_u.xml", splinepy.write_gismo)),
-    "mfem": Format(".mesh", splinepy.write_mfem, (".gf", splinepy.write_mfem_field)),
+    "gismo": Format(".xml", gismo.write_gismo, ("_u.xml", gismo.write_gismo)),
+    "mfem": Format(".mesh", mfem.write_mfem, (".gf", mfem.write_mfem_field)),
     "vtk": Format("_bezier.vtu", vtk.write_bezier),
     "view": Format("_view.vtu", view.write_view),
     "json": Format(".json", splinepy.write_json, ("_u.json", splinepy.write_json)),
@@ -63,29 +64,35 @@ def is_volume(path: str | Path) -> bool:
     here, for a volume or for a surface; a volume may be in a .zip, too.
     """
     source = Path(path)
-    endings = ("", ".zip", *(FORMATS[kind].ending for kind in CHECKS), *SURFACES)
+    endings = ("", ".zip", *ENDINGS.values(), *SURFACES)
     return source.suffix == ".npz" or (
         source.suffix.lower() in endings and source.is_file() and kind_of(source) is not None
     )
 
 
-def load_volume(path: str | Path) -> BSplineVolume:
-    """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh or splinepy JSON, recognized by their beginnings.
+def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BSplineVolume | MultiPatch:
+    """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh, GeoPDEs geometry file or splinepy JSON.
+
+    The kinds are recognized by their beginnings.
 
     Parameters
     ----------
     path : str or Path
         The file.
+    tolerance : float
+        The largest distance of two control points on faces of patches that are taken for one, as a share of the body's
+        size. volume.npz names its interfaces, whose control points are the same.
 
     Returns
     -------
-    BSplineVolume
+    BSplineVolume or MultiPatch
+        A MultiPatch of a file with several patches, or with one that is glued to itself.
 
     Raises
     ------
     InputError
-        Where the file has no such format, is damaged, rational or of several patches, and where splinepy is needed and
-        missing.
+        Where the file has no such format or is damaged, where its patches do not fit together, and where splinepy,
+        which reads JSON, is missing.
 
     Examples
     --------
@@ -96,6 +103,9 @@ def load_volume(path: str | Path) -> BSplineVolume:
     (3, 3, 3)
     """
     check_type("path", path, str | Path)
+    check_type("tolerance", tolerance, float)
+    if not 0.0 <= tolerance < 1.0:
+        raise InputError(f"tolerance {tolerance}: must be 0 or larger, and smaller than 1, the body's size")
     if path == "":
         raise InputError("no volume is named: give a volume.npz, or a file of another program")
     source = Path(path)
@@ -105,10 +115,29 @@ def load_volume(path: str | Path) -> BSplineVolume:
         kind = kind_of(source) if source.is_file() else "npz"
         if kind is None and source.suffix != ".npz":
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
-        volume = splinepy.read(source, kind) if kind in CHECKS else BSplineVolume.load(source)
-    if min(float(np.diff(np.unique(knots)).min()) for knots in volume.knots) < NARROWEST:
+        body = read_body(source, kind, tolerance) if kind in READERS else _load_archive(source)
+    rows = [row for patch in as_multipatch(body) for row in patch.knots]
+    if min(float(np.diff(np.unique(row)).min()) for row in rows) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
-    return volume
+    return body
+
+
+def _load_archive(path: Path) -> BSplineVolume | MultiPatch:
+    """Return what a volume.npz holds, a body where it has interfaces."""
+    body = MultiPatch.load(path)
+    return body if len(body) > 1 or body.interfaces else body.patches[0]
+
+
+def load_one_patch(path: str | Path) -> BSplineVolume:
+    """Return the volume of a file as `load_volume` does. Raises InputError where it has several patches, too."""
+    return _one_patch(load_volume(path), path)
+
+
+def _one_patch(body: BSplineVolume | MultiPatch, path: str | Path) -> BSplineVolume:
+    if isinstance(body, MultiPatch):
+        held = f"{len(body)} patch{'' if len(body) == 1 else 'es'} with {len(body.interfaces)} interfaces"
+        raise InputError(f"{path}: has {held}; this takes a volume of one patch that is not glued")
+    return body
 
 
 def export(
@@ -173,14 +202,18 @@ def export(
     for file in (target, beside):
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
-    loaded = load_volume(volume)
-    field, problem = (None, None) if solution is None else _load_solution(Path(solution), loaded)
+    if solution is None and to != "view":
+        loaded = load_volume(volume)
+        field, problem = None, None
+    else:
+        loaded = one = load_one_patch(volume)
+        field, problem = (None, None) if solution is None else _load_solution(Path(solution), one)
     try:
         with replacing(target) as temporary:
             chosen.write(temporary, loaded, field, problem, samples, tuple(quantity) or None)
             if field is not None and write_field is not None:
                 with replacing(beside) as temporary_beside:
-                    write_field(temporary_beside, field, loaded)
+                    write_field(temporary_beside, field, one)
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
     return target

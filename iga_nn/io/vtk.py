@@ -3,9 +3,15 @@
 Exact (`_bezier.vtu`): every knot span is a VTK_BEZIER_HEXAHEDRON (cell type 79) that holds the Bernstein coefficients
 of F; neighbours share the points between them. A cell's points are in the order of `vtkHigherOrderHexahedron`: corners,
 edges, faces, inside. The cells count u fastest. The degrees of each cell (HigherOrderDegrees) and the weights of the
-points (RationalWeights, all 1) are active attributes: readers take them for the shape functions. Point data are
-Bernstein coefficients, too. Where a solution has a higher degree or more knots than the map, both are written in the
-higher degree on all spans, exactly. VTK's cells are right-handed: of a left-handed volume each has w reversed.
+points (RationalWeights, 1 but on a rational volume) are active attributes: readers take them for the shape functions.
+Point data are Bernstein coefficients, too. Where a solution has a higher degree or more knots than the map, both are
+written in the higher degree on all spans, exactly. On a rational volume the shape functions of the solution are
+rational, too: u = (u W) / W, of the sum of the degrees. VTK's cells are right-handed: of a left-handed volume each has
+w reversed.
+
+The patches of a body are in one grid, not a block each: neighbours share the points of an interface where they have the
+same weights there, so that the surface is the body's and fields run on through it. The cell data `patch` is the number
+of a cell's patch, by which ParaView selects (Threshold) or colours.
 
 VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
 tessellations are right. For slicing and clipping there are the samples of `io.view`.
@@ -21,10 +27,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.spline.bernstein import elevation, extraction
-from parameterize.spline.bspline import apply_along, insert_knots, sparse_rows
+from parameterize.spline.bspline import (
+    apply_along,
+    evaluate_grid,
+    greville,
+    insert_knots,
+    interpolate_grid,
+    sparse_rows,
+)
+from parameterize.spline.interface import WEIGHT_TOLERANCE, Interface, face_layer
+from parameterize.spline.multipatch import MultiPatch, shared_numbers
 from parameterize.spline.orientation import orientation
+from parameterize.spline.rational import projected
 from parameterize.spline.volume import BSplineVolume
 from solve.field import SplineField
 
@@ -34,28 +50,84 @@ if TYPE_CHECKING:
 BEZIER_HEXAHEDRON = 79
 
 
-def write_bezier(path: Path, volume: BSplineVolume, solution: SplineField | None = None, *_: object) -> None:
+def write_bezier(
+    path: Path, volume: BSplineVolume | MultiPatch, solution: SplineField | None = None, *_: object
+) -> None:
     """Write the exact cells; a solution becomes the point data `u`."""
-    save(path, exact_cells(volume, solution))
+    save(path, exact_cells(volume, solution) if isinstance(volume, BSplineVolume) else cells_of_patches(volume))
+
+
+def cells_of_patches(body: MultiPatch) -> pyvista.UnstructuredGrid:
+    """Return the cells of all patches, with the number of each cell's patch as the cell data `patch`.
+
+    Neighbours share the points of their interface where these have the same weights, so that the surface of the grid is
+    that of the body. Where the weights of two faces differ by a factor, each patch keeps points of its own.
+    """
+    grids = [exact_cells(patch, None) for patch in body]
+    shapes = [tuple(1 + p * (len(np.unique(k)) - 1) for p, k in zip(v.degrees, v.knots, strict=True)) for v in body]
+    own = [grid.point_data["RationalWeights"].reshape(shape) for grid, shape in zip(grids, shapes, strict=True)]
+    labels, count = shared_numbers(shapes, [interface for interface in body.interfaces if _are_alike(own, interface)])
+    points, weights = np.empty((count, 3)), np.empty(count)
+    cells, sizes = [], []
+    for number, (grid, label) in enumerate(zip(grids, labels, strict=True)):
+        points[label.ravel()], weights[label] = grid.points, own[number]
+        rows = grid.cells.reshape(grid.n_cells, -1)
+        cells.append(np.column_stack([rows[:, :1], label.ravel()[rows[:, 1:]]]).ravel())
+        sizes.append(np.full(grid.n_cells, number))
+    degrees = np.concatenate([grid.cell_data["HigherOrderDegrees"] for grid in grids])
+    joined = _grid(np.concatenate(cells), points, weights, degrees)
+    joined.cell_data["patch"] = np.concatenate(sizes)
+    return joined
+
+
+def _are_alike(weights: Sequence[Array], interface: Interface) -> bool:
+    """Return whether the weights (m_u, m_v, m_w) of two patches' points are the same at an interface."""
+    first, second = (face_layer(weights[patch], face) for patch, face in (interface.first, interface.second))
+    return np.allclose(first, interface.turned(second), rtol=WEIGHT_TOLERANCE, atol=0.0)
 
 
 def exact_cells(volume: BSplineVolume, solution: SplineField | None) -> pyvista.UnstructuredGrid:
     """Return the cells of a volume with the coefficients of a solution on it."""
-    import pyvista
-
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
     breaks, degrees = breaks_of(volume, solution), [max(s.degrees[a] for s in shown) for a in range(3)]
-    points = _bernstein(volume.degrees, volume.knots, volume.control_points, breaks, degrees).reshape(-1, 3)
+    if volume.weights is not None and solution is not None:
+        degrees = [sum(max(s.degrees) for s in shown)] * 3
+    net = volume.control_points if volume.weights is None else volume.homogeneous
+    net = _bernstein(volume.degrees, volume.knots, net, breaks, degrees)
+    points, weights = (net, np.ones(net.shape[:3])) if volume.weights is None else projected(net)
     cells = _cells([len(b) - 1 for b in breaks], degrees, orientation(volume) < 0)  # (s, nodes of a cell)
     counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
-    grid = pyvista.UnstructuredGrid(counted.ravel(), np.full(len(cells), BEZIER_HEXAHEDRON), points)
-    grid.cell_data.set_array(np.tile(degrees, (len(cells), 1)).astype(np.float64), "HigherOrderDegrees")
-    grid.point_data.set_array(np.ones(len(points)), "RationalWeights")
-    grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
-    grid.GetPointData().SetActiveRationalWeights("RationalWeights")
-    if solution is not None:
+    sizes = np.tile(degrees, (len(cells), 1)).astype(np.float64)
+    grid = _grid(counted.ravel(), points.reshape(-1, 3), weights.ravel(), sizes)
+    if solution is not None and volume.weights is None:
         values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)
         grid.point_data["u"] = values.reshape(-1, *values.shape[3:])
+    elif solution is not None:
+        values = _weighted(solution, volume, breaks, degrees[0])
+        grid.point_data["u"] = values.reshape(weights.size, -1) / weights.reshape(-1, 1)
+    return grid
+
+
+def _weighted(solution: SplineField, volume: BSplineVolume, breaks: Sequence[Array], degree: int) -> Array:
+    """Return the Bernstein coefficients (s_u q + 1, ..., c) of u W, W the weight of a rational volume, of degree q."""
+    knots = [np.repeat(row, [degree + 1, *[degree] * (len(row) - 2), degree + 1]) for row in breaks]
+    u, v, w = (greville(row, degree) for row in knots)
+    weight = evaluate_grid(volume.degrees, volume.knots, volume.homogeneous[..., 3:], (u, v, w))
+    return interpolate_grid(knots, degree, solution.grid(u, v, w).reshape(*weight.shape[:3], -1) * weight)
+
+
+def _grid(cells: IntArray, points: Array, weights: Array, degrees: Array) -> pyvista.UnstructuredGrid:
+    """Return Bezier cells with the weights (m,) of points (m, 3) and degrees (s, 3).
+
+    cells: for each the number of its points, then the points.
+    """
+    import pyvista
+
+    grid = pyvista.UnstructuredGrid(cells, np.full(len(degrees), BEZIER_HEXAHEDRON), points)
+    grid.cell_data.set_array(degrees, "HigherOrderDegrees")
+    grid.point_data.set_array(weights, "RationalWeights")
+    grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
+    grid.GetPointData().SetActiveRationalWeights("RationalWeights")
     return grid
 
 

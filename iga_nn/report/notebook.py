@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 
 from parameterize.arrays import Array, in_brackets
+from parameterize.certificate.body import BodyCertificate
 from parameterize.certificate.jacobian import Certificate
 from parameterize.quality.quality import BothScales, QualityReport
 from parameterize.spline.bspline import breakpoints
@@ -61,6 +62,14 @@ def _certificate(certificate: Certificate) -> str:
     if certificate.witness is not None:
         facts.append(("folded at u, v, w", in_brackets(certificate.witness)))
     return _table(f"{certificate.claim}: {certificate.verdict}", facts)
+
+
+@as_html.register
+def _body_certificate(certificate: BodyCertificate) -> str:
+    facts = [("volume", f"{certificate.volume:.6g}")]
+    if certificate.verdict == "certified":
+        facts.append(("|det J| is at least", f"{certificate.lower_bound:.3g} of its mean"))
+    return _table(f"{len(certificate.patches)} patches: {certificate.verdict}", facts) + _list(certificate.defects)
 
 
 @as_html.register

@@ -22,7 +22,7 @@ from solve.discretization.slab import agreed
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, input_errors
-from ..io.formats import load_volume
+from ..io.formats import load_one_patch
 from ..level_table import as_csv, as_table, rows_of
 from ..options import (
     NO_UNITS,
@@ -199,7 +199,7 @@ def solve_to(
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
     problem = with_part(statement.problem(), path)
-    loaded, options = load_volume(path), replace(statement.solve_options(), device=device, comm=comm)
+    loaded, options = load_one_patch(path), replace(statement.solve_options(), device=device, comm=comm)
     processes = 1 if comm is None else comm.size
     if comm is not None and processes == 1:
         log.warning("--mpi in a single process: `mpiexec -n 4 iga-nn solve ... --mpi` takes four")
@@ -255,7 +255,7 @@ def study_to(
     check_type("volume", volume, str | Path)
     study_options, path = study_options or StudyOptions(), Path(volume)
     problem, levels = study_options.problem(), study_options.levels()
-    loaded = load_volume(path)
+    loaded = load_one_patch(path)
     degrees = sorted(study_options.degree) or [max(loaded.degrees)]
     for degree in degrees:
         check_size(loaded, levels[-1], degree, problem.form.components)
@@ -291,7 +291,7 @@ def modes_to(
     """
     check_type("volume", volume, str | Path)
     modes_options, path = modes_options or ModesOptions(), Path(volume)
-    body, loaded = with_part(modes_options.problem(), path), load_volume(path)
+    body, loaded = with_part(modes_options.problem(), path), load_one_patch(path)
     check_size(loaded, modes_options.refine, modes_options.degree, body.form.components)
     with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
         state.begin("modes")

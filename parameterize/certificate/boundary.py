@@ -1,11 +1,13 @@
-"""Is a volume's boundary injective: do its six faces meet nowhere but where they are joined?
+"""Is the outer boundary of a body injective: do faces meet nowhere but where they are joined?
 
-With det J > 0 on the whole cube, an injective boundary makes the whole map one-to-one. The faces are cut into Bezier
-patches, and every pair of patches is settled by a proof (patch_proofs.py), or cut in four and looked at again. Where
-nothing is proved, two parameters of one point are searched for.
+With det J of one sign on every patch, opposite sides at every interface and an injective boundary the whole map is
+one-to-one (docs/certificate.md). The faces that are not glued are cut into Bezier pieces, and every pair of pieces is
+settled by a proof (patch_proofs.py), or cut in four and looked at again. Where nothing is proved, two parameters of one
+point are searched for.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numba
@@ -14,12 +16,15 @@ import numpy as np
 from ..arrays import Array, IntArray, in_brackets
 from ..cube.cube import VARYING_AXES
 from ..spline.bspline import breakpoints
+from ..spline.interface import axis_side
+from ..spline.multipatch import MultiPatch, as_multipatch
 from ..spline.volume import BSplineVolume
 from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, is_proved
+from .shells import overlap
 
 Point = tuple[float, float, float]
 
-_MOST_PAIRS = 50_000, 10  # pairs in all, and further ones for each patch: for more no proof is tried
+_MOST_PAIRS = 50_000, 10  # pairs in all, and further ones for each piece: for more no proof is tried
 _TRIED = 64  # pairs at a level, from each of which a common point is searched for
 _NEWTON_STEPS = 12
 _DISTINCT = 1e3  # times their errors the two parameters of a meeting must differ
@@ -27,40 +32,57 @@ _DISTINCT = 1e3  # times their errors the two parameters of a meeting must diffe
 
 @dataclass(frozen=True)
 class Meeting:
-    """Two parameters on the boundary of the cube that the map takes to one point, in the user's units."""
+    """Two parameters on outer faces that the map takes to one point, in the user's units.
+
+    patches: the numbers of the patches that they belong to; None where the body is one patch.
+    """
 
     parameters: tuple[Point, Point]
     point: Point
+    patches: tuple[int, int] | None = None
 
     def __str__(self) -> str:
         first, second, place = map(in_brackets, (*self.parameters, self.point))
-        return f"meets itself at {place}, parameters {first} and {second}"
+        p, q = (f"p{k} " for k in self.patches) if self.patches else ("", "")
+        return f"meets itself at {place}, parameters {p}{first} and {q}{second}"
 
 
 @dataclass(frozen=True)
 class BoundaryCheck:
     """Whether a boundary is injective, and a point where it is not.
 
-    injective: True where proved, False where `meeting` was found (up to rounding), None where neither succeeded.
-    undecided: the number of pairs of patches left without a proof.
+    injective: True where proved, False where `meeting` was found (up to rounding) or parts of the body `overlap`, None
+    where neither succeeded.
+    undecided: the number of pairs of pieces left without a proof.
+    overlap: whether the body encloses a place twice although its boundary meets nowhere, such as a body inside another
+    one; None where that is not known, or the boundary not proved to meet nowhere.
     """
 
     injective: bool | None
     meeting: Meeting | None
     undecided: int
+    overlap: bool | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return entries of the section `parameterization` of report.json."""
         meeting = self.meeting
         place = meeting and {"parameters": [list(row) for row in meeting.parameters], "point": list(meeting.point)}
+        if place and meeting and meeting.patches:
+            place["patches"] = list(meeting.patches)
         return {"boundary_injective": self.injective, "boundary_meeting": place}
 
 
-def check_boundary(volume: BSplineVolume, *, max_depth: int = 24) -> BoundaryCheck:
-    """Decide whether F is injective on the boundary of the cube, cutting patches at most `max_depth` times in four."""
+def check_boundary(body: BSplineVolume | MultiPatch, *, max_depth: int = 24) -> BoundaryCheck:
+    """Decide whether the map is injective on the outer boundary, where points that interfaces make one are one.
+
+    A volume is a body of one patch. Pieces are cut at most `max_depth` times in four. Of several shells, the outer
+    boundary's connected parts, those that face outward are also found not to enclose each other.
+    Raises ValueError for a negative depth and for a body without a face that is not glued.
+    """
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
-    local = _local(volume)
+    body = as_multipatch(body)
+    local = _local(body)
     pieces = boundary_pieces(local)
     error = _rounding(local, max_depth)
     own = np.repeat(np.arange(len(pieces.nets))[:, None], 2, axis=1)
@@ -71,85 +93,143 @@ def check_boundary(volume: BSplineVolume, *, max_depth: int = 24) -> BoundaryChe
         hopeless = len(pairs) > most  # only a common point is searched for then
         pairs = pairs if hopeless else pairs[~is_proved(pieces, pairs, error)]
         if not len(pairs):
-            return BoundaryCheck(True, None, 0)
+            found = overlap(local)
+            return BoundaryCheck(None if found is None else not found, None, 0, found)
         met = _search(local, pieces, pairs, error)
         if met is not None:
-            p, q, point = (tuple(row.tolist()) for row in (*met, volume(met[0])[0]))
-            return BoundaryCheck(False, Meeting((p, q), point), len(pairs))
+            return BoundaryCheck(False, _meeting(body, *met), len(pairs))
         if hopeless or depth == max_depth:
             break
         pieces, pairs = halved(pieces, pairs)
     return BoundaryCheck(None, None, len(pairs))
 
 
-def _local(volume: BSplineVolume) -> BSplineVolume:
-    """Return the volume with its middle moved to the origin, and scaled by a power of two to magnitude 1.
+def _local(body: MultiPatch) -> MultiPatch:
+    """Return the body with its middle moved to the origin, and scaled by a power of two to magnitude 1.
 
     Each coordinate is rounded once, relative to its difference from the middle, however far away the middle is.
     """
-    points = volume.control_points
-    moved = points - (points.min(axis=(0, 1, 2)) + points.max(axis=(0, 1, 2))) / 2.0
-    exponent = int(np.frexp(np.abs(moved).max())[1])
-    return BSplineVolume(volume.degrees, volume.knots, np.ldexp(moved, -exponent))
+    low = np.min([patch.control_points.min(axis=(0, 1, 2)) for patch in body], axis=0)
+    high = np.max([patch.control_points.max(axis=(0, 1, 2)) for patch in body], axis=0)
+    moved = [patch.control_points - (low + high) / 2.0 for patch in body]
+    exponent = int(np.frexp(max(np.abs(points).max() for points in moved))[1])
+    patches = (
+        replace(patch, control_points=np.ldexp(points, -exponent)) for patch, points in zip(body, moved, strict=True)
+    )
+    return MultiPatch(tuple(patches), body.interfaces)
 
 
-def _rounding(local: BSplineVolume, max_depth: int) -> float:
+def _rounding(local: MultiPatch, max_depth: int) -> float:
     """Return a bound of the rounding error of a Bezier control point's coordinate.
 
     No weight is negative and all sum to 1, so that each rounding changes a sum by at most the unit roundoff times the
     largest coordinate: 6 p + 2 a direction for the extraction (bernstein.py), 2 p + 2 for the elevation, p + 1 a
     halving, and 1 for the move to the origin. All that underflows is below 2**-1000, and the largest coordinate at
     least 1/2.
+
+    Homogeneous components begin with one rounding more, and their quotient has the errors of both, and one more. The
+    vectors that bound the derivatives of a rational piece, products with weights of at most 1, are off by 10 times as
+    much where a difference is off by 2: five times the bound leaves them the room that differences have.
     """
-    degree = max(local.degrees)
+    degree = max(max(patch.degrees) for patch in local)
     roundings = 2 * (8 * degree + 4 + max_depth * (degree + 1)) + 8 + 1
-    return 1.01 * roundings * 2.0**-53 * float(np.abs(local.control_points).max())
+    if any(patch.weights is not None for patch in local):
+        roundings = 5 * (2 * (roundings + 1) + 1)
+    return 1.01 * roundings * 2.0**-53 * max(float(np.abs(patch.control_points).max()) for patch in local)
 
 
-def _search(local: BSplineVolume, pieces: Pieces, pairs: IntArray, error: float) -> tuple[Array, Array] | None:
-    """Return two parameters of a common point of pieces that do not touch in the cube.
+def _meeting(body: MultiPatch, patches: IntArray, where: tuple[Array, Array]) -> Meeting:
+    """Return the meeting of two parameters, (3,) each, of patches (2,)."""
+    p, q = (tuple(row.tolist()) for row in where)
+    point = tuple(body.patches[patches[0]](where[0])[0].tolist())
+    return Meeting((p, q), point, (int(patches[0]), int(patches[1])) if len(body) > 1 else None)
+
+
+def _search(
+    local: MultiPatch, pieces: Pieces, pairs: IntArray, error: float
+) -> tuple[IntArray, tuple[Array, Array]] | None:
+    """Return two parameters of a common point of pieces that do not touch, and the numbers (2,) of their patches.
 
     Newton's method starts from the middle of some pairs. Beside an edge of the cube it tends to two equal parameters:
     so the gap must be rounding, and the parameters farther apart than their errors, gap / (least slope), can explain.
     """
     some = pairs[:: 1 + len(pairs) // _MOST_PAIRS[0]]
-    touching, _ = contact(pieces, some[:, 0], some[:, 1])
-    open_pairs = some[~touching]
+    open_pairs = some[contact(pieces, some[:, 0], some[:, 1]) < 0]
     if not len(open_pairs):
         return None
     chosen = open_pairs[np.unique(np.linspace(0, len(open_pairs) - 1, _TRIED).astype(np.int64))]
     rows = np.arange(len(chosen))[:, None]
     tangents = [VARYING_AXES[pieces.axes[part]] for part in chosen.T]
+    patches = [pieces.patches[part] for part in chosen.T]
     where = [_middles(local, pieces, part) for part in chosen.T]  # two (k, 3)
     for _ in range(_NEWTON_STEPS):
-        gap = local(where[0]) - local(where[1])
-        slopes = _slopes(local, where, tangents)
+        gap = _at(local, patches[0], where[0]) - _at(local, patches[1], where[1])
+        slopes = _slopes(local, patches, where, tangents)
         step = np.einsum("kab,kb->ka", np.linalg.pinv(slopes, rcond=1e-9), gap)  # (k, 4)
         for side in range(2):
             where[side][rows, tangents[side]] -= step[:, 2 * side : 2 * side + 2]
             np.clip(where[side], 0.0, 1.0, out=where[side])
-    gap = np.linalg.norm(local(where[0]) - local(where[1]), axis=1)
-    singular = np.linalg.svd(_slopes(local, where, tangents), compute_uv=False)
+    gap = np.linalg.norm(_at(local, patches[0], where[0]) - _at(local, patches[1], where[1]), axis=1)
+    singular = np.linalg.svd(_slopes(local, patches, where, tangents), compute_uv=False)
     met = (gap < error) & (singular[:, 2] > 1e-4 * singular[:, 0])  # the surfaces cross, they do not just touch
-    distance = np.abs(where[0] - where[1]).max(axis=1)
+    distance = _distance(local, patches, where)
     met &= (distance > 1e-6) & (distance * singular[:, 2] > _DISTINCT * (gap + error))
     if not met.any():
         return None
     best = int(np.flatnonzero(met)[0])
-    return where[0][best], where[1][best]
+    return np.array([patches[0][best], patches[1][best]]), (where[0][best], where[1][best])
 
 
-def _slopes(volume: BSplineVolume, where: list[Array], tangents: list[IntArray]) -> Array:
+def _slopes(body: MultiPatch, patches: list[IntArray], where: list[Array], tangents: list[IntArray]) -> Array:
     """Return the derivative (k, 3, 4) of F(p) - F(q) in the two free parameters of each."""
-    of_p, of_q = (np.take_along_axis(volume.jacobian(where[k]), tangents[k][:, None], axis=2) for k in range(2))
+    of_p, of_q = (
+        np.take_along_axis(_by_patch(body, patches[k], where[k], BSplineVolume.jacobian), tangents[k][:, None], axis=2)
+        for k in range(2)
+    )
     return np.concatenate([of_p, -of_q], axis=2)
 
 
-def _middles(volume: BSplineVolume, pieces: Pieces, rows: IntArray) -> Array:
+def _distance(body: MultiPatch, patches: list[IntArray], where: list[Array]) -> Array:
+    """Return a lower bound (k,) of the distance of two parameters, in one patch or through glued faces; at most 1."""
+    direct = np.where(patches[0] == patches[1], np.abs(where[0] - where[1]).max(axis=1), 1.0)
+    glued = np.ones((len(body), 2, 3), dtype=bool)  # faces where a parameter is 0, then those where it is 1
+    for k, names in enumerate(body.outer):
+        for axis, side in map(axis_side, names):
+            glued[k, side, axis] = False
+    to_glued = (
+        np.where(glued[own], np.stack([place, 1.0 - place], axis=1), 1.0).min(axis=(1, 2))
+        for own, place in zip(patches, where, strict=True)
+    )
+    return np.minimum(direct, sum(to_glued))
+
+
+def _by_patch(
+    body: MultiPatch, patches: IntArray, where: Array, function: Callable[[BSplineVolume, Array], Array]
+) -> Array:
+    """Return the values (k, ...) of a function of a patch and parameters, at parameters (k, 3) of patches (k,)."""
+    numbers = np.unique(patches)
+    parts = [function(body.patches[number], where[patches == number]) for number in numbers]
+    values = np.empty((len(where), *parts[0].shape[1:]))
+    for number, part in zip(numbers, parts, strict=True):
+        values[patches == number] = part
+    return values
+
+
+def _at(body: MultiPatch, patches: IntArray, where: Array) -> Array:
+    """Return the points (k, 3) at parameters (k, 3) of patches (k,)."""
+    return _by_patch(body, patches, where, BSplineVolume.__call__)
+
+
+def _middles(body: MultiPatch, pieces: Pieces, rows: IntArray) -> Array:
     """Return the parameters (k, 3) of the middle of pieces."""
     middle = (pieces.low[rows] + pieces.high[rows]) / 2.0 ** (pieces.depth + 1)
+    return _by_patch(body, pieces.patches[rows], middle, _parameters)
+
+
+def _parameters(volume: BSplineVolume, places: Array) -> Array:
+    """Return the parameters (k, 3) of places (k, 3) that are counted in spans."""
     breaks = [breakpoints(knots) for knots in volume.knots]
-    return np.stack([np.interp(middle[:, a], np.arange(len(breaks[a])), breaks[a]) for a in range(3)], axis=1)
+    return np.stack([np.interp(places[:, a], np.arange(len(breaks[a])), breaks[a]) for a in range(3)], axis=1)
 
 
 def overlapping_boxes(low: Array, high: Array) -> IntArray:

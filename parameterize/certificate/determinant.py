@@ -36,10 +36,10 @@ class DeterminantForm:
         derivatives = [_differences(points, volume.knots[b], volume.degrees[b], b) for b in range(3)]
         self.nets, self.exponent = _to_unit_magnitude(derivatives)  # for each derivative: (3, N_0, N_1, N_2)
         self.bases = [  # for each derivative and direction: first, weights
-            [_scaled_extraction(volume.knots[a], volume.degrees[a], a == b) for a in range(3)] for b in range(3)
+            [scaled_extraction(volume.knots[a], volume.degrees[a], a == b) for a in range(3)] for b in range(3)
         ]
-        weights = [1.0 / binomials(3 * p - 1) for p in self.degrees]
-        self.unscale = np.einsum("i,j,k->ijk", *weights)[..., None]  # (d_u, d_v, d_w, 1)
+        self.counts: tuple[int, ...] = tuple(3 * p for p in self.degrees)
+        self.unscale = unscaling(self.counts)
 
     def numbers(self, flat: IntArray) -> IntArray:
         """Return flat span numbers (k,) as rows (i, j, l): (k, 3)."""
@@ -66,7 +66,7 @@ class DeterminantForm:
         local, sizes = zip(*(self._derivative(b, spans) for b in range(3)), strict=True)
         f_u, f_v, f_w = local  # (3, n_0, n_1, n_2, k) each, scaled Bernstein form
         cross = cross_products(f_v, f_w)
-        determinant = np.zeros((*(3 * p for p in self.degrees), len(spans)))
+        determinant = np.zeros((*self.counts, len(spans)))
         for one, other in zip(f_u, cross, strict=True):
             add_products(one, other, 1.0, determinant)
         determinant *= self.unscale
@@ -78,25 +78,29 @@ class DeterminantForm:
 
         A halving is one product with weights that sum to 1 a direction: as many roundings as it has terms.
         """
-        relative = (self.roundings + depth * sum(3 * p for p in self.degrees)) * _UNIT_ROUNDOFF
+        relative = (self.roundings + depth * sum(self.counts)) * _UNIT_ROUNDOFF
         return 1.01 * relative / (1.0 - relative) * permanents + _UNDERFLOW  # one percent: the bound itself is rounded
 
     def _derivative(self, b: int, spans: IntArray) -> tuple[Array, Array]:
         """Return the b-th derivative on spans (k, 3): scaled Bernstein form (3, n_0, n_1, n_2, k), sizes (3, k)."""
-        first = np.stack([start[number] for (start, _), number in zip(self.bases[b], spans.T, strict=True)])  # (3, k)
-        net = _windows(self.nets[b], first, tuple(weights.shape[1] for _, weights in self.bases[b]))
+        net = self._near(self.nets[b], b, spans)
         magnitudes, shape = np.abs(net).max(axis=(1, 2, 3)), net.shape
         for axis, ((_, weights), number) in enumerate(zip(self.bases[b], spans.T, strict=True)):
             matrices = np.ascontiguousarray(np.moveaxis(weights[number], 0, -1))
-            net = _times(matrices, net.reshape(3 * int(np.prod(shape[1 : 1 + axis])), len(matrices), -1, len(spans)))
+            net = _times(matrices, net.reshape(int(np.prod(shape[: 1 + axis])), len(matrices), -1, len(spans)))
         return net.reshape(shape), magnitudes
+
+    def _near(self, net: Array, b: int, spans: IntArray) -> Array:
+        """Return those of the b-th derivative's control points (c, ...) that spans (k, 3) need: (c, ..., k)."""
+        first = np.stack([start[number] for (start, _), number in zip(self.bases[b], spans.T, strict=True)])  # (3, k)
+        return _windows(net, first, tuple(weights.shape[1] for _, weights in self.bases[b]))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _windows(net: Array, first: IntArray, sizes: tuple[int, int, int]) -> Array:
-    """Return the control points of (3, N_0, N_1, N_2) from each of the first ones (3, k) on: (3, *sizes, k)."""
-    found = np.empty((3, sizes[0], sizes[1], sizes[2], first.shape[1]))
-    for c in range(3):
+    """Return the control points of (c, N_0, N_1, N_2) from each of the first ones (3, k) on: (c, *sizes, k)."""
+    found = np.empty((net.shape[0], sizes[0], sizes[1], sizes[2], first.shape[1]))
+    for c in range(net.shape[0]):
         for i in range(sizes[0]):
             for j in range(sizes[1]):
                 for m in range(sizes[2]):
@@ -159,7 +163,12 @@ def _to_unit_magnitude(derivatives: list[tuple[Array, IntArray]]) -> tuple[list[
     return nets, int(rows.sum() + columns.sum())
 
 
-def _scaled_extraction(knots: Array, degree: int, derivative: bool) -> tuple[IntArray, Array]:
+def unscaling(counts: tuple[int, ...]) -> Array:
+    """Return the factors (d_u, d_v, d_w, 1) that take polynomials of d coefficients from scaled Bernstein form."""
+    return np.asarray(np.einsum("i,j,k->ijk", *(1.0 / binomials(d - 1) for d in counts)))[..., None]
+
+
+def scaled_extraction(knots: Array, degree: int, derivative: bool) -> tuple[IntArray, Array]:
     """Return the extraction to scaled Bernstein form for the basis, or for the basis of its derivative."""
     lowered = int(derivative)
     first, weights = extraction(knots[lowered : len(knots) - lowered], degree - lowered)

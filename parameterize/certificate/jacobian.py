@@ -4,7 +4,8 @@ For a left-handed volume, whose det J is negative on the whole, the mirror image
 
 The Bernstein coefficients of det J bound it on every span, those at its corners are values (docs/method.md, section 6;
 Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys. 233, 2013, section
-3). "Positive" and "negative" mean by more than a bound of all rounding errors (determinant.py).
+3). Of a rational volume det J times a positive polynomial takes its place (rational_determinant.py). "Positive" and
+"negative" mean by more than a bound of all rounding errors (determinant.py).
 """
 
 from dataclasses import dataclass
@@ -16,8 +17,9 @@ from ..arrays import Array, IntArray, Mask
 from ..display import Shown
 from ..spline.bernstein import split
 from ..spline.orientation import mirrored, orientation
-from ..spline.volume import BSplineVolume, demand_volume
+from ..spline.volume import BSplineVolume
 from .determinant import CHUNK, DeterminantForm, corners_of
+from .rational_determinant import RationalDeterminantForm
 
 CLAIMS = {"right-handed": "det J > 0", "left-handed": "det J < 0"}
 
@@ -35,7 +37,8 @@ class Certificate(Shown):
         "certified" (det J > 0 on the whole cube), "folded" (det J < 0 at `witness`), or "undecided". Of a left-handed
         volume -det J takes the place of det J.
     lower_bound : float
-        Proved lower bound of det J over the cube, divided by the magnitude of its mean.
+        Proved lower bound of det J over the cube, divided by the magnitude of its mean. Of a rational volume that of
+        det J W^4, W the sum w_i N_i over the largest weight: a lower one where it is positive.
     mean_det : float
         Integral of det J over the cube, which is the signed volume, in the volume's own units; negative if left-handed.
     witness : three float or None
@@ -71,42 +74,15 @@ class Certificate(Shown):
         return CLAIMS[self.orientation]
 
 
-def certify(volume: BSplineVolume, *, max_depth: int = 6) -> Certificate:
+def certify_patch(volume: BSplineVolume, max_depth: int) -> Certificate:
     """Decide whether det J has one sign on the whole cube, cutting doubtful spans at most `max_depth` times in eight.
 
-    Parameters
-    ----------
-    volume : BSplineVolume
-        The map.
-    max_depth : int
-        0 or more; each cut makes the bounds on the pieces closer.
-
-    Returns
-    -------
-    Certificate
-
-    Raises
-    ------
-    TypeError
-        For an object that is not a BSplineVolume.
-    ValueError
-        For a negative depth, or where derivatives overflow.
-
-    Examples
-    --------
-    >>> import iga_nn
-    >>> from solve import benchmark_volume
-    >>> certificate = iga_nn.certify(benchmark_volume(4))
-    >>> certificate.verdict, certificate.lower_bound > 0, certificate.witness
-    ('certified', True, None)
+    Raises ValueError where derivatives overflow.
     """
-    demand_volume(volume)
-    if max_depth < 0:
-        raise ValueError(f"max_depth must be non-negative, got {max_depth}")
     left_handed = orientation(volume) < 0
     if left_handed:
         volume = mirrored(volume)
-    form = DeterminantForm(volume)
+    form = DeterminantForm(volume) if volume.weights is None else RationalDeterminantForm(volume)
     bounds, corners, means = form.survey()
     search = _Search(form, max_depth, float(corners.min()))
     doubtful = np.flatnonzero(~(bounds > search.target))  # span numbers, flat

@@ -1,23 +1,31 @@
-"""The boundary of a volume as Bezier patches, and three proofs that two of them meet only where they are joined.
+"""The outer boundary of a body as Bezier pieces, and three proofs that two of them meet only where they are joined.
 
-- Patches without a common point: a plane keeps their control points apart.
-- Patches with a common corner: a plane through the corner, with all other control points strictly beside it.
-- Patches with a common edge, unfolded into a rectangle, and a patch by itself: projected to a plane the derivative has
+- Pieces without a common point: a plane keeps their control points apart.
+- Pieces with a common corner: a plane through the corner, with all other control points strictly beside it.
+- Pieces with a common edge, unfolded into a rectangle, and a piece by itself: projected to a plane the derivative has
   a positive definite symmetric part, so that <x - y, F(x) - F(y)> > 0 on a convex domain.
 
-A control net bounds its patch, and its differences bound the derivatives, so each proof looks at finitely many numbers,
-with room for their rounding errors.
+A control net bounds its piece, and its differences bound the derivatives, so each proof looks at finitely many numbers,
+with room for their rounding errors. With positive weights a control net bounds its piece, too; what bounds the
+derivatives of a rational piece is in `_rational_differences`. Pieces may also be joined through interfaces of patches
+(gluing.py).
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
+import numba
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
-from ..cube.cube import VARYING_AXES, axis_and_side
+from ..cube.cube import VARYING_AXES
 from ..spline.bernstein import elevation, extraction, halving
 from ..spline.bspline import breakpoints
+from ..spline.interface import axis_side
+from ..spline.multipatch import MultiPatch
+from ..spline.rational import projected
 from ..spline.volume import BSplineVolume
+from .gluing import SharedPoints
 
 _CHUNK = 4096  # pairs at a time
 _NEWTON_STEPS = 40  # towards a separating plane
@@ -25,16 +33,27 @@ _REACH = 2.0  # largest change of a product in a step
 _MARGIN = 0.5  # least product at which the search ends
 _LIFT = 1e-14  # of the shares' sum, onto a Hessian's diagonal: the vectors may all lie in one plane
 
+# A piece has two directions, those of its face that vary. Its places in them, counted in halves of its edges:
+_CORNERS = [(0, 0), (0, 2), (2, 0), (2, 2)]
+_MIDDLES = [(0, 1), (2, 1), (1, 0), (1, 2)]  # of its edges: two along the second direction, two along the first
+_ENDS = np.array([[0, 1], [2, 3], [0, 2], [1, 3]])  # the corners at which these edges begin and end
+_STEPS = np.zeros((3, 8, 3), dtype=np.int64)  # the eight places, for each constant parameter
+for _axis, _varying in enumerate(VARYING_AXES):
+    _STEPS[_axis][:, _varying] = _CORNERS + _MIDDLES
+
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Parts of the six faces, all cut equally often: their edges are 2**-depth of a span's edges.
+    """Parts of the outer faces of patches, all cut equally often: their edges are 2**-depth of a span's edges.
 
-    axes: (n,) the parameter that is constant. low: (n, 3) the lower corner in the cube, counted in edges of pieces.
-    nets: (n, q + 1, q + 1, 3) Bezier control points, along the two other parameters in their order.
+    patches: (n,) the number of the patch. axes: (n,) the parameter that is constant. low: (n, 3) the lower corner in
+    the cube, counted in edges of pieces. nets: (n, q + 1, q + 1, 3) Bezier control points, along the two other
+    parameters in their order; homogeneous, (.., 4), where a patch of the body is rational.
     """
 
     depth: int
+    shared: SharedPoints
+    patches: IntArray
     axes: IntArray
     low: IntArray
     nets: Array
@@ -44,19 +63,36 @@ class Pieces:
         """Return the upper corners in the cube (n, 3), one edge of a piece away along the two other parameters."""
         return self.low + (np.arange(3) != self.axes[:, None])
 
+    @cached_property
+    def names(self) -> IntArray:
+        """Return the names (n, 8, 3) of the four corners and of the middles of the four edges."""
+        positions = 2 * self.low[:, None] + _STEPS[self.axes]
+        return self.shared.names(self.patches, self.axes, positions, 2 ** (self.depth + 1))
 
-def boundary_pieces(volume: BSplineVolume) -> Pieces:
-    """Return all spans of the six faces, raised to the largest degree."""
-    degree = max(volume.degrees)
-    parts = [_face_pieces(volume, axis, side, degree) for axis, side in map(axis_and_side, range(6))]
-    return Pieces(0, *(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+def boundary_pieces(body: MultiPatch) -> Pieces:
+    """Return all spans of the faces that are not glued, raised to the largest degree. Raises ValueError for none."""
+    degree = max(max(patch.degrees) for patch in body)
+    is_rational = any(patch.weights is not None for patch in body)
+    nets = [patch.homogeneous if is_rational else patch.control_points for patch in body]
+    faces = [(k, *axis_side(name)) for k, names in enumerate(body.outer) for name in names]
+    if not faces:
+        raise ValueError("every face is glued: a body has a boundary")
+    parts = [_face_pieces(body.patches[k], nets[k], axis, side, degree) for k, axis, side in faces]
+    patches = np.repeat([k for k, _, _ in faces], [len(found) for _, _, found in parts])
+    return Pieces(0, SharedPoints(body), patches, *(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _face_pieces(volume: BSplineVolume, axis: int, side: int, degree: int) -> tuple[IntArray, IntArray, Array]:
-    """Return constant axes (n,), low corners (n, 3) and nets (n, q + 1, q + 1, 3) of one face's spans."""
-    net = volume.face(axis, side)  # (n_a, n_b, 3)
+def _face_pieces(
+    volume: BSplineVolume, control: Array, axis: int, side: int, degree: int
+) -> tuple[IntArray, IntArray, Array]:
+    """Return constant axes (n,), low corners (n, 3) and nets (n, q + 1, q + 1, c) of one face's spans.
+
+    control: (n_u, n_v, n_w, c), control points of the volume, or homogeneous ones.
+    """
+    net = np.take(control, -1 if side else 0, axis=axis)  # (n_a, n_b, c)
     a, b = VARYING_AXES[axis]
-    for direction, position in ((a, 0), (b, 2)):  # (s_a, q + 1, n_b, 3), then (s_a, q + 1, s_b, q + 1, 3)
+    for direction, position in ((a, 0), (b, 2)):  # (s_a, q + 1, n_b, c), then (s_a, q + 1, s_b, q + 1, c)
         own = volume.degrees[direction]
         first, weights = extraction(volume.knots[direction], own)
         local = np.take(net, first[:, None] + np.arange(own + 1), axis=position)
@@ -66,7 +102,7 @@ def _face_pieces(volume: BSplineVolume, axis: int, side: int, degree: int) -> tu
     place = np.indices(net.shape[0:3:2]).reshape(2, -1).T  # (n, 2)
     low = np.full((len(place), 3), side * (len(breakpoints(volume.knots[axis])) - 1))
     low[:, [a, b]] = place
-    nets = net.transpose(0, 2, 1, 3, 4).reshape(-1, degree + 1, degree + 1, 3)
+    nets = net.transpose(0, 2, 1, 3, 4).reshape(-1, degree + 1, degree + 1, control.shape[3])
     return np.full(len(place), axis), low, nets
 
 
@@ -76,26 +112,48 @@ def halved(pieces: Pieces, pairs: IntArray) -> tuple[Pieces, IntArray]:
     q = pieces.nets.shape[1] - 1
     halves = halving(q)
     nets = np.einsum("gij,hkl,njlc->nghikc", halves, halves, pieces.nets[used], optimize=True)
-    axes = np.repeat(pieces.axes[used], 4)
+    patches, axes = np.repeat(pieces.patches[used], 4), np.repeat(pieces.axes[used], 4)
     low = np.repeat(2 * pieces.low[used], 4, axis=0)
     low[np.arange(len(low))[:, None], VARYING_AXES[axes]] += np.tile(list(np.ndindex(2, 2)), (len(used), 1))
-    finer = Pieces(pieces.depth + 1, axes, low, nets.reshape(-1, q + 1, q + 1, 3))
+    finer = Pieces(pieces.depth + 1, pieces.shared, patches, axes, low, nets.reshape(-1, *pieces.nets.shape[1:]))
     four = 4 * compact.reshape(-1, 1, 2)
     alone = four[:, 0, 0] == four[:, 0, 1]
     own, others = np.argwhere(np.tri(4, dtype=bool)), np.argwhere(np.ones((4, 4), dtype=bool))
     return finer, np.concatenate([(four[alone] + own).reshape(-1, 2), (four[~alone] + others).reshape(-1, 2)])
 
 
-def contact(pieces: Pieces, first: IntArray, second: IntArray) -> tuple[Mask, IntArray]:
-    """Return the mask (k,) of pairs that touch in the cube, and the dimension (k,) of their common part."""
-    low = np.maximum(pieces.low[first], pieces.low[second])
-    high = np.minimum(pieces.high[first], pieces.high[second])
-    return np.all(low <= high, axis=1), np.sum(low < high, axis=1)
+def contact(pieces: Pieces, first: IntArray, second: IntArray) -> IntArray:
+    """Return what pairs have in common (k,): nothing (-1), a corner (0), an edge (1) or all (2).
+
+    Pieces around a short hole may have several edges in common: a proof for one of them fails, and succeeds on parts.
+    """
+    (corners, _), (edges, _) = _joints(pieces.names, first, second)
+    return np.where(first == second, 2, np.where(edges > 0, 1, np.where(corners > 0, 0, -1)))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _joints(names: IntArray, first: IntArray, second: IntArray) -> IntArray:
+    """Return how many corners of pairs are one, and a place 4 i + j of such: corner i and corner j; the same of edges.
+
+    names: (n, 8, 3) of all pieces. The result is (2, 2, k): corners and edges, number and place.
+    """
+    found = np.zeros((2, 2, len(first)), dtype=np.int64)
+    for k in range(len(first)):
+        a, b = names[first[k]], names[second[k]]
+        for kind in range(2):
+            for i in range(4):
+                for j in range(4):
+                    p, q = a[4 * kind + i], b[4 * kind + j]
+                    if p[0] == q[0] and p[1] == q[1] and p[2] == q[2]:
+                        found[kind, 0, k] += 1
+                        found[kind, 1, k] = 4 * i + j
+    return found
 
 
 def as_rows(nets: Array) -> Array:
-    """Return nets (n, i, j, 3) as rows of points (n, i * j, 3)."""
-    return nets.reshape(len(nets), nets.shape[1] * nets.shape[2], 3)
+    """Return nets (n, i, j, 3), or homogeneous ones (n, i, j, 4), as rows of points (n, i * j, 3)."""
+    points = projected(nets)[0] if nets.shape[3] == 4 else nets
+    return points.reshape(len(nets), nets.shape[1] * nets.shape[2], 3)
 
 
 def is_proved(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
@@ -104,11 +162,11 @@ def is_proved(pieces: Pieces, pairs: IntArray, error: float) -> Mask:
     for start in range(0, len(pairs), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         first, second = pairs[chunk].T
-        touching, shared = contact(pieces, first, second)
-        for kind, proof in enumerate((_corner_proof, _edge_proof, _own_proof)):  # in common: a point, an edge, all
-            rows = np.flatnonzero(touching & (shared == kind))
+        common = contact(pieces, first, second)
+        for kind, proof in enumerate((_corner_proof, _edge_proof, _own_proof)):
+            rows = np.flatnonzero(common == kind)
             done[start + rows] = proof(pieces, first[rows], second[rows], error)
-        rows = np.flatnonzero(~touching)
+        rows = np.flatnonzero(common < 0)
         a, b = (as_rows(pieces.nets[part[rows]]) for part in (first, second))
         done[start + rows] = _apart(a, b, error)
     return done
@@ -120,13 +178,8 @@ def _own_proof(pieces: Pieces, piece: IntArray, _: IntArray, error: float) -> Ma
 
 
 def _edge_proof(pieces: Pieces, first: IntArray, second: IntArray, error: float) -> Mask:
-    """Return the mask of pairs with a common edge that are monotone together, unfolded side by side into a rectangle.
-
-    Axis 1 of the nets leads from the first over the edge into the second, axis 2 along the edge.
-    """
-    edge = np.maximum(pieces.low[first], pieces.low[second])  # its lower end
-    along = np.argmax(edge < np.minimum(pieces.high[first], pieces.high[second]), axis=1)
-    nets = [_turned(pieces, part, along, edge, last) for part, last in ((first, True), (second, False))]
+    """Return the mask of pairs with a common edge that are monotone together, unfolded into a rectangle."""
+    nets = _unfolded(pieces, first, second)
     by_edge = np.concatenate([_differences(net, 2) for net in nets], axis=1)
     # Each side may have a parameter of its own, the unfolded pair stays a rectangle: with equal widths the mean over
     # both sides points out of the solid where the edge is as sharp as a knife's.
@@ -143,38 +196,61 @@ def _width(vectors: Array, directions: Array) -> Array:
         return np.asarray(np.linalg.norm(np.cross(vectors, directions), axis=1) / np.linalg.norm(directions, axis=1))
 
 
-def _turned(pieces: Pieces, rows: IntArray, along: IntArray, edge: IntArray, edge_last: bool) -> Array:
-    """Return nets whose axis 2 runs `along` the shared edge, and which have it last, or first, on axis 1."""
-    nets, tangents = pieces.nets[rows], VARYING_AXES[pieces.axes[rows]]
-    swap = tangents[:, 0] == along
-    nets = np.where(swap[:, None, None, None], nets.swapaxes(1, 2), nets)
-    across = np.where(swap, tangents[:, 1], tangents[:, 0])[:, None]
-    at_high = np.take_along_axis(pieces.high[rows] == edge, across, axis=1)[:, 0]
-    return np.where((at_high == edge_last)[:, None, None, None], nets, nets[:, ::-1])
+def _unfolded(pieces: Pieces, first: IntArray, second: IntArray) -> tuple[Array, Array]:
+    """Return nets whose axis 1 leads from the first over the common edge into the second, and axis 2 along the edge."""
+    edge, other = divmod(_joints(pieces.names, first, second)[1, 1], 4)
+    before = _turned(pieces.nets[first], edge, edge_last=True)
+    behind = _turned(pieces.nets[second], other, edge_last=False)
+    alike = np.all(pieces.names[first, _ENDS[edge, 0]] == pieces.names[second, _ENDS[other, 0]], axis=1)
+    return before, np.where(alike[:, None, None, None], behind, behind[:, :, ::-1])
+
+
+def _turned(nets: Array, edges: IntArray, edge_last: bool) -> Array:
+    """Return nets whose axis 2 runs along the shared edge, and which have it last, or first, on axis 1."""
+    nets = np.where((edges > 1)[:, None, None, None], nets.swapaxes(1, 2), nets)
+    return np.where((edges % 2 == edge_last)[:, None, None, None], nets, nets[:, ::-1])
 
 
 def _corner_proof(pieces: Pieces, first: IntArray, second: IntArray, error: float) -> Mask:
     """Return where all vectors to the corner, and from it into the second piece, have a common direction."""
-    corner = np.maximum(pieces.low[first], pieces.low[second])
-    before, behind = (_corner_last(pieces, part, corner) for part in (first, second))
+    corner, other = divmod(_joints(pieces.names, first, second)[0, 1], 4)
+    before, behind = _corner_last(pieces.nets[first], corner), _corner_last(pieces.nets[second], other)
     vectors = np.concatenate([before[:, -1:] - before[:, :-1], behind[:, :-1] - behind[:, -1:]], axis=1)
     normal = _half_space(vectors)
     proved: Mask = _along(vectors, normal).min(axis=1) > 4.0 * error * np.abs(normal).sum(axis=1)
     return proved
 
 
-def _corner_last(pieces: Pieces, rows: IntArray, corner: IntArray) -> Array:
+def _corner_last(nets: Array, corners: IntArray) -> Array:
     """Return control points (n, (q + 1)^2, 3), the one at the shared corner last."""
-    nets = pieces.nets[rows]
-    at_high = np.take_along_axis(pieces.high[rows] == corner, VARYING_AXES[pieces.axes[rows]], axis=1)
-    nets = np.where(at_high[:, 0, None, None, None], nets, nets[:, ::-1])
-    nets = np.where(at_high[:, 1, None, None, None], nets, nets[:, :, ::-1])
+    nets = np.where((corners > 1)[:, None, None, None], nets, nets[:, ::-1])
+    nets = np.where((corners % 2 == 1)[:, None, None, None], nets, nets[:, :, ::-1])
     return as_rows(nets)
 
 
 def _differences(nets: Array, axis: int) -> Array:
     """Return control vectors (n, k, 3) of the derivative, up to the degree as a factor."""
+    if nets.shape[3] == 4:
+        return _rational_differences(np.moveaxis(nets, axis, 1))
     return as_rows(np.diff(nets, axis=axis))
+
+
+def _rational_differences(nets: Array) -> Array:
+    """Return vectors (n, k, 3) whose convex hull holds the derivative of F times a positive number at each point.
+
+    nets: homogeneous, (n, i, j, 4); the derivative is that along i. Of F = A / W, W^2 F_s = A_s W - A W_s is, up to the
+    degree as a factor, the sum over all i, j, k, l of B_ij C_kl, positive polynomials that sum to 1, times
+    w_(i+1)j w_kl (P_(i+1)j - P_kl) - w_ij w_kl (P_ij - P_kl). The number is the same for both derivatives, so that a
+    positive definite symmetric part stays one. Weights are scaled: the largest of each net is 1.
+    """
+    points, weights = projected(nets)
+    weights = weights / weights.max(axis=(1, 2), keepdims=True)
+    ahead, behind = (
+        (weights[:, part, :, None, None] * weights[:, None, None])[..., None]
+        * (points[:, part, :, None, None] - points[:, None, None])
+        for part in (slice(1, None), slice(None, -1))
+    )  # (n, q, q + 1, q + 1, q + 1, 3)
+    return np.asarray(ahead - behind).reshape(len(nets), int(np.prod(ahead.shape[1:5])), 3)
 
 
 def _monotone(across: Array, along: Array, across_error: Array | float, along_error: float) -> Mask:

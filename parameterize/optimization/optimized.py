@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
+from ..certificate.body import certify
 from ..certificate.boundary import check_boundary
-from ..certificate.jacobian import Certificate, certify
+from ..certificate.jacobian import Certificate
 from ..spline.spline_map import SplineMap
 
 

@@ -10,6 +10,9 @@ from ..arrays import Floats
 from .volume import FACE_NAMES, BSplineVolume
 
 KNOT_TOLERANCE = 1e-9  # of the interval [0, 1]: files give knots in decimals, and reversed ones are rounded
+WEIGHT_TOLERANCE = (
+    1e-9  # relative: files give weights in decimals, and a common factor of all, which is free, is rounded
+)
 
 Face = tuple[int, str]  # the number of a patch, and the name of one of its faces
 
@@ -88,9 +91,22 @@ def knots_agree(patches: Sequence[BSplineVolume], interface: Interface) -> bool:
 
 
 def gap(patches: Sequence[BSplineVolume], interface: Interface) -> float:
-    """Return the largest distance of two control points of an interface that should be one; infinite for other nets."""
-    first, second = (face_layer(patches[p].control_points, face) for p, face in (interface.first, interface.second))
-    second = interface.turned(second)
+    """Return the largest distance of two control points of an interface that should be one.
+
+    It is infinite for nets of other shapes, and where the weights of the two faces differ by more than a factor.
+    """
+    layers = [_net(patches[p], face) for p, face in (interface.first, interface.second)]
+    first, second = layers[0], interface.turned(layers[1])
     if first.shape != second.shape:
         return float("inf")
-    return float(np.linalg.norm(first - second, axis=-1).max())
+    factors = first[..., 3] / second[..., 3]
+    if factors.max() > (1.0 + WEIGHT_TOLERANCE) * factors.min():
+        return float("inf")
+    return float(np.linalg.norm((first - second)[..., :3], axis=-1).max())
+
+
+def _net(patch: BSplineVolume, face: str) -> Floats:
+    """Return the control points of a face with their weights, (n_a, n_b, 4)."""
+    points = face_layer(patch.control_points, face)
+    weights = np.ones(points.shape[:2]) if patch.weights is None else face_layer(patch.weights, face)
+    return np.concatenate([points, weights[..., None]], axis=-1)

@@ -3,6 +3,8 @@
 Newton's method from the middle of a knot span near the point finds most. The rest is decided by branch and bound: the
 Bezier control points of a span, and of each part that halving gives, form a box in which that part lies (Farouki, "The
 Bernstein polynomial basis: a centennial retrospective", CAGD 29, 2012). Where no box holds a point, it is outside.
+Nets of a rational volume are halved in homogeneous components; with positive weights the box of the control points
+holds the part, too.
 """
 
 from dataclasses import dataclass
@@ -17,6 +19,7 @@ from ..arrays import Array, IntArray, Knots
 from ..threads import in_parallel
 from .bernstein import extraction
 from .bspline import breakpoints, fill_basis, midpoints, real_array
+from .rational import projected
 from .volume import BSplineVolume
 
 CLOSE = 1e-10  # distance from x, over the diagonal of the box of control points, at which F(u, v, w) counts as x
@@ -52,9 +55,9 @@ def _index(volume: BSplineVolume) -> "_Index":
 class _Index:
     """A volume prepared for the search.
 
-    starts (s, 3): the middles of the spans, with their images in the tree. nets (s, n_u, n_v, n_w, 3): their Bezier
-    control points, and low and high (s, 3), the boxes of these. ends (s, 2, 3): the spans themselves. The cells of a
-    grid over the whole box list the spans whose boxes reach them: members[first[c] : first[c + 1]] of cell c.
+    starts (s, 3): the middles of the spans, with their images in the tree. nets: their Bezier control points, as
+    `bezier_nets` returns them, and low and high (s, 3), the boxes of these. ends (s, 2, 3): the spans themselves.
+    Cells of a grid over the whole box list the spans whose boxes reach them: members[first[c] : first[c + 1]] of c.
     """
 
     volume: BSplineVolume
@@ -76,7 +79,8 @@ class _Index:
         u, v, w = (midpoints(row) for row in volume.knots)
         starts = np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3)
         nets = bezier_nets(volume)
-        low, high = nets.min(axis=(1, 2, 3)), nets.max(axis=(1, 2, 3))
+        points = nets if volume.weights is None else projected(nets)[0]
+        low, high = points.min(axis=(1, 2, 3)), points.max(axis=(1, 2, 3))
         corner, size = low.min(axis=0), np.ptp(np.concatenate([low, high]), axis=0)
         diagonal = float(np.linalg.norm(size))
         margin = CLOSE * diagonal
@@ -97,7 +101,7 @@ class _Index:
         return found
 
     def _parameters(self, points: Array) -> Array:
-        spline = (_padded(self.volume.knots), np.array(self.volume.degrees), self.volume.control_points)
+        spline = (_padded(self.volume.knots), np.array(self.volume.degrees), _coefficients(self.volume))
         search = (self.nets, self.low, self.high, self.ends, self.corner, self.cell, self.counts)
 
         def task(part: slice) -> Array:
@@ -109,14 +113,22 @@ class _Index:
 
 
 def bezier_nets(volume: BSplineVolume) -> Array:
-    """Return the Bezier control points (s, p_u + 1, p_v + 1, p_w + 1, 3) of all spans, those of w fastest."""
-    net = volume.control_points
+    """Return the Bezier control points (s, p_u + 1, p_v + 1, p_w + 1, 3) of all spans, those of w fastest.
+
+    Of a rational volume they are homogeneous, (.., 4).
+    """
+    net = _coefficients(volume)
     for axis, (knots, degree) in enumerate(zip(volume.knots, volume.degrees, strict=True)):
         first, weights = extraction(knots, degree)
         windows = np.moveaxis(net, 2 * axis, 0)[first[:, None] + np.arange(degree + 1)]
         net = np.moveaxis(np.einsum("sjk,sk...->sj...", weights, windows), (0, 1), (2 * axis, 2 * axis + 1))
-    s_u, n_u, s_v, n_v, s_w, n_w, _ = net.shape
-    return np.ascontiguousarray(net.transpose(0, 2, 4, 1, 3, 5, 6)).reshape(s_u * s_v * s_w, n_u, n_v, n_w, 3)
+    s_u, n_u, s_v, n_v, s_w, n_w, c = net.shape
+    return np.ascontiguousarray(net.transpose(0, 2, 4, 1, 3, 5, 6)).reshape(s_u * s_v * s_w, n_u, n_v, n_w, c)
+
+
+def _coefficients(volume: BSplineVolume) -> Array:
+    """Return the control points (n_u, n_v, n_w, 3), of a rational volume homogeneous, (.., 4)."""
+    return volume.control_points if volume.weights is None else volume.homogeneous
 
 
 def _padded(knots: Knots) -> Array:
@@ -233,7 +245,7 @@ def _halve(point: Array, stack: Array, boxes: Array, levels: IntArray, top: int,
     axis, widest = 0, -1.0
     for d in range(3):
         ahead, behind = _layer(stack[top], d, stack.shape[1 + d] - 1), _layer(stack[top], d, 0)
-        width = np.abs(ahead - behind).max()
+        width = _farthest(ahead, behind)
         if width > widest:
             axis, widest = d, width
     right = stack[top].copy()
@@ -249,12 +261,24 @@ def _halve(point: Array, stack: Array, boxes: Array, levels: IntArray, top: int,
         net = right if side else left
         low, high = np.empty(3), np.empty(3)
         for d in range(3):
-            low[d], high[d] = net[..., d].min() - margin, net[..., d].max() + margin
+            along = net[..., d] if net.shape[3] == 3 else net[..., d] / net[..., 3]
+            low[d], high[d] = along.min() - margin, along.max() + margin
         if _holds(low, high, point):
             stack[size], boxes[size], levels[size] = net, box, level
             boxes[size, 1 - side, axis] = middle
             size += 1
     return size
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _farthest(one: Array, other: Array) -> float:
+    """Return the largest difference of a coordinate of two layers (n, m, 3) of control points, or (n, m, 4)."""
+    if one.shape[2] == 3:
+        return float(np.abs(one - other).max())
+    farthest = 0.0
+    for d in range(3):
+        farthest = max(farthest, np.abs(one[..., d] / one[..., 3] - other[..., d] / other[..., 3]).max())
+    return farthest
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -331,7 +355,10 @@ def _evaluate(
     value: Array,
     jacobian: Array,
 ) -> None:
-    """Write F (3,) and its Jacobian (3, 3), columns the directions, at parameters (3,)."""
+    """Write F (3,) and its Jacobian (3, 3), columns the directions, at parameters (3,).
+
+    control: (n_u, n_v, n_w, 3), or homogeneous, (.., 4), with the weight in the last place.
+    """
     first = np.empty(3, dtype=np.int64)
     for d in range(3):
         n = control.shape[d]
@@ -340,6 +367,7 @@ def _evaluate(
         fill_basis(knots[d], degrees[d], where[d : d + 1], np.array([span]), basis[d, :, :, : degrees[d] + 1])
         first[d] = span - degrees[d]
     value[:], jacobian[:] = 0.0, 0.0
+    is_rational, weight, along_u, along_v, along_w = control.shape[3] == 4, 0.0, 0.0, 0.0, 0.0  # W and its gradient
     u, v, w = basis[0, :, 0], basis[1, :, 0], basis[2, :, 0]
     for i in range(degrees[0] + 1):
         for j in range(degrees[1] + 1):
@@ -350,3 +378,14 @@ def _evaluate(
                     jacobian[d, 0] += u[1, i] * v[0, j] * w[0, k] * p[d]
                     jacobian[d, 1] += u[0, i] * v[1, j] * w[0, k] * p[d]
                     jacobian[d, 2] += u[0, i] * v[0, j] * w[1, k] * p[d]
+                if is_rational:
+                    weight += u[0, i] * v[0, j] * w[0, k] * p[3]
+                    along_u += u[1, i] * v[0, j] * w[0, k] * p[3]
+                    along_v += u[0, i] * v[1, j] * w[0, k] * p[3]
+                    along_w += u[0, i] * v[0, j] * w[1, k] * p[3]
+    if is_rational:
+        for d in range(3):
+            value[d] /= weight
+            jacobian[d, 0] = (jacobian[d, 0] - value[d] * along_u) / weight
+            jacobian[d, 1] = (jacobian[d, 1] - value[d] * along_v) / weight
+            jacobian[d, 2] = (jacobian[d, 2] - value[d] * along_w) / weight

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,20 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, IntArray
-from ..display import Brief, Shown
-from .interface import Face, Interface, axis_side, face_label, face_layer, gap, knots_agree, orientations
+from ..arrays import Array, IntArray, Mask
+from ..display import Brief, Shown, above
+from .archive import is_of_patches, load_patches, save_patches
+from .interface import (
+    WEIGHT_TOLERANCE,
+    Face,
+    Interface,
+    axis_side,
+    face_label,
+    face_layer,
+    gap,
+    knots_agree,
+    orientations,
+)
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
 
 TOLERANCE = 1e-6  # of the body's size: distance of two control points that are taken for one
@@ -29,7 +41,8 @@ class MultiPatch(Brief, Shown):
     patches : tuple of BSplineVolume
         Of any degrees and knots.
     interfaces : tuple of Interface
-        Pairs of faces with equal degrees, knots and control points; a face is glued once at most.
+        Pairs of faces with equal degrees, knots, control points and, up to a factor, weights; a face is glued once at
+        most.
 
     Raises
     ------
@@ -67,15 +80,15 @@ class MultiPatch(Brief, Shown):
             if not knots_agree(self.patches, interface):
                 raise ValueError(f"interface {interface}: degrees or knots along the two faces differ")
             if gap(self.patches, interface) > 0.0:
-                raise ValueError(f"interface {interface}: the control points of the two faces differ")
+                raise ValueError(f"interface {interface}: the control points or weights of the two faces differ")
 
     @classmethod
     def from_patches(cls, patches: Sequence[BSplineVolume], tolerance: float = TOLERANCE) -> "MultiPatch":
         """Return the body of patches, glued where two faces have the same control points.
 
         tolerance: the largest distance of two control points that are taken for one, as a share of the body's size;
-        they become one, that of the patch that comes first. Raises ValueError where two faces have the same corners
-        and the same shape, but not the same degrees, knots and control points, and where three faces are the same.
+        they become one, that of the patch that comes first. Raises ValueError where two faces are the same
+        surface, but do not have the same degrees, knots and weights, and where three faces are the same.
         """
         given = tuple(patches)
         if not given:
@@ -87,6 +100,39 @@ class MultiPatch(Brief, Shown):
         found = tuple(_interfaces(given, tolerance * size, size))
         labels, _ = shared_numbers([patch.shape for patch in given], found)
         return cls(_merged(given, labels), found)
+
+    @classmethod
+    def from_splinepy(cls, splines: Any) -> "MultiPatch":
+        """Make the body of a splinepy.Multipatch, or of a list of its splines, glued as by `from_patches`.
+
+        Raises TypeError for other objects, ValueError where the splines are no volumes or do not fit together.
+        """
+        return above("io.splinepy").body_from_splinepy(splines)
+
+    def to_splinepy(self) -> Any:
+        """Return the same body as a splinepy.Multipatch. Raises InputError where splinepy is missing."""
+        return above("io.splinepy").body_to_splinepy(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the patches and interfaces as volume.npz; atomic. One patch that is not glued is a volume there."""
+        if len(self) == 1 and not self.interfaces:
+            self.patches[0].save(path)
+        else:
+            save_patches(path, self.patches, self.interfaces)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "MultiPatch":
+        """Read volume.npz, of one patch or several.
+
+        Raises FileNotFoundError, or ValueError that names the defect of the file.
+        """
+        if not is_of_patches(path):
+            return cls((BSplineVolume.load(path),))
+        patches, interfaces = load_patches(path)
+        try:
+            return cls(patches, interfaces)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
 
     @cached_property
     def outer(self) -> tuple[tuple[str, ...], ...]:
@@ -137,19 +183,30 @@ def shared_numbers(
 
 
 def _merged(patches: Sequence[BSplineVolume], labels: Sequence[IntArray]) -> tuple[BSplineVolume, ...]:
-    """Return the patches with one control point for each label, the first that has it."""
+    """Return the patches with one control point for each label, the first that has it.
+
+    Its weight goes with it, except to patches whose weights there are other ones by a factor.
+    """
     every = np.concatenate([label.ravel() for label in labels])
     points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in patches])
     _, first = np.unique(every, return_index=True)
-    chosen = points[first]
-    return tuple(replace(patch, control_points=chosen[label]) for patch, label in zip(patches, labels, strict=True))
+    own = [np.ones(patch.shape) if patch.weights is None else patch.weights for patch in patches]
+    chosen, weights = points[first], np.concatenate([row.ravel() for row in own])[first]
+    return tuple(
+        replace(patch, control_points=chosen[label], weights=np.where(_alike(weights[label], row), weights[label], row))
+        for patch, label, row in zip(patches, labels, own, strict=True)
+    )
+
+
+def _alike(one: Array, other: Array) -> Mask:
+    return np.abs(one - other) <= WEIGHT_TOLERANCE * other
 
 
 def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float) -> Iterator[Interface]:
     """Yield the pairs of faces with the same control points; raise ValueError for those that nearly match."""
     faces = [(i, name) for i in range(len(patches)) for name in FACE_NAMES]
     nets = [face_layer(patches[i].control_points, name) for i, name in faces]
-    has_area = [_area(net) > FLAT * size**2 for net in nets]
+    has_area = [net_area(net) > FLAT * size**2 for net in nets]
     middles = np.array([_corners(net).mean(axis=0) for net in nets])
     taken: dict[int, int] = {}
     for i, j in sorted(cKDTree(middles).query_pairs(2.0 * tolerance)):
@@ -161,8 +218,8 @@ def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float)
             one, other = (_samples(patches[p], name) for p, name in (faces[i], faces[j]))
             if _same_points(one, other, tolerance):
                 raise ValueError(
-                    f"{face_label(*faces[i])} and {face_label(*faces[j])} are the same surface with other degrees or "
-                    "knots: give both faces the same ones"
+                    f"{face_label(*faces[i])} and {face_label(*faces[j])} are the same surface, but with other degrees, "
+                    "knots or weights: give both faces the same ones"
                 )
             continue  # two surfaces over the same corners
         for k, partner in ((i, j), (j, i)):
@@ -186,7 +243,7 @@ def _corners(net: Array) -> Array:
     return net[:: len(net) - 1, :: net.shape[1] - 1].reshape(4, 3)
 
 
-def _area(net: Array) -> float:
+def net_area(net: Array) -> float:
     """Return the area of a face's control net, sum over its cells."""
     a, b = np.diff(net, axis=0)[:, :-1], np.diff(net, axis=1)[:-1]
     return float(np.linalg.norm(np.cross(a, b), axis=-1).sum())

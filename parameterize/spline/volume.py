@@ -1,7 +1,8 @@
-"""BSplineVolume: a trivariate tensor-product B-spline F from the unit cube to space (paper, eq. 1)."""
+"""BSplineVolume: a trivariate tensor-product spline F from the unit cube to space (paper, eq. 1), or a rational one."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ from .bspline import (
     open_uniform_knots,
     real_array,
 )
+from .rational import Orders, homogeneous, projected, quotients
 
 if TYPE_CHECKING:
     import pyvista
@@ -31,7 +33,8 @@ if TYPE_CHECKING:
 
 AXES = "uvw"
 FACE_NAMES = ("u0", "u1", "v0", "v1", "w0", "w1")
-LARGEST = 1e100  # coordinate: determinants of larger ones leave double precision
+LARGEST = 1e100  # coordinate, or weight: determinants of larger ones leave double precision
+UNITS: tuple[Orders, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))  # orders of the first derivatives
 
 
 def checked_knots(degrees: Sequence[int], knots: Sequence[ArrayLike], counts: Sequence[int], what: str) -> Knots:
@@ -69,7 +72,9 @@ def load_spline(path: str | Path, content: str) -> tuple[tuple[int, int, int], K
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BSplineVolume(Brief, Shown):
-    """A trivariate B-spline.
+    """A trivariate B-spline, or with weights a rational one (NURBS).
+
+    With control points P_i, weights w_i and B-splines N_i it is F = sum w_i P_i N_i / sum w_i N_i.
 
     Parameters
     ----------
@@ -78,7 +83,9 @@ class BSplineVolume(Brief, Shown):
     knots : three arrays
         Open knot vectors on [0, 1], of n + degree + 1 numbers.
     control_points : (n_u, n_v, n_w, 3) array
-        In the user's units.
+        In the user's units; with weights, too, the points P_i themselves.
+    weights : (n_u, n_v, n_w) array, optional
+        Positive; None for a polynomial volume. Weights that are all equal become None.
 
     Raises
     ------
@@ -102,6 +109,7 @@ class BSplineVolume(Brief, Shown):
     degrees: tuple[int, int, int]
     knots: Knots
     control_points: Array
+    weights: Array | None = None
 
     def __post_init__(self) -> None:
         if not all(isinstance(part, Sequence | np.ndarray) and len(part) == 3 for part in (self.degrees, self.knots)):
@@ -119,6 +127,7 @@ class BSplineVolume(Brief, Shown):
         object.__setattr__(self, "degrees", tuple(int(p) for p in self.degrees))
         object.__setattr__(self, "knots", knots)
         object.__setattr__(self, "control_points", points)
+        object.__setattr__(self, "weights", _checked_weights(self.weights, points.shape[:3]))
 
     @classmethod
     def uniform(cls, control_points: ArrayLike, degree: int = 3) -> "BSplineVolume":
@@ -159,13 +168,12 @@ class BSplineVolume(Brief, Shown):
     def from_splinepy(cls, spline: Any) -> "BSplineVolume":
         """Make the volume of a spline of splinepy, its knots scaled to run from 0 to 1; the map stays.
 
-        Raises TypeError for another object, ValueError for a spline that is rational or does not map 3 parameters to 3
-        coordinates.
+        Raises TypeError for another object, ValueError for a spline that does not map 3 parameters to 3 coordinates.
         """
         return above("io.splinepy").from_splinepy(spline)
 
     def to_splinepy(self) -> Any:
-        """Return the same map as a splinepy.BSpline. Raises InputError where splinepy is missing."""
+        """Return the same map as a splinepy.BSpline, or NURBS. Raises InputError where splinepy is missing."""
         return above("io.splinepy").to_splinepy(self)
 
     def to_pyvista(self, samples: int | None = None) -> "pyvista.UnstructuredGrid":
@@ -191,7 +199,7 @@ class BSplineVolume(Brief, Shown):
 
     def __call__(self, points: ArrayLike) -> Array:
         """Return F at points (m, 3) of the unit cube: (m, 3)."""
-        return self._at(points, (0, 0, 0))
+        return self._at(points, [(0, 0, 0)])[0]
 
     def locate(self, points: ArrayLike) -> Array:
         """Return the parameters (m, 3) of points (m, 3) in space, NaN for points outside.
@@ -205,25 +213,42 @@ class BSplineVolume(Brief, Shown):
 
     def jacobian(self, points: ArrayLike) -> Array:
         """Return J[i, a, b] = dF_a / du_b at points (m, 3): (m, 3, 3)."""
-        units = np.eye(3, dtype=int)
-        return np.stack([self._at(points, tuple(row)) for row in units], axis=-1)
+        return np.stack(self._at(points, UNITS), axis=-1)
 
     def hessian(self, points: ArrayLike) -> Array:
         """Return H[i, a, b, c] = d2F_a / du_b du_c at points (m, 3): (m, 3, 3, 3)."""
         units = np.eye(3, dtype=int)
-        rows = [[self._at(points, tuple(units[b] + units[c])) for c in range(3)] for b in range(3)]
-        return np.moveaxis(np.array(rows), (0, 1), (2, 3))
+        orders = [tuple((units[b] + units[c]).tolist()) for b in range(3) for c in range(3)]
+        rows = np.array(self._at(points, orders))
+        return np.moveaxis(rows.reshape(3, 3, *rows.shape[1:]), (0, 1), (2, 3))
 
-    def _at(self, points: ArrayLike, derivative: tuple[int, ...]) -> Array:
-        return evaluate_at(self.degrees, self.knots, self.control_points, points, derivative)
+    def _at(self, points: ArrayLike, orders: Sequence[Orders]) -> list[Array]:
+        """Return partial derivatives (m, 3) at points (m, 3)."""
+        return self._derivatives(lambda net, order: evaluate_at(self.degrees, self.knots, net, points, order), orders)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: tuple[int, int, int] = (0, 0, 0)) -> Array:
         """Return F or one of its partial derivatives on a tensor grid: (len(u), len(v), len(w), 3)."""
-        return evaluate_grid(self.degrees, self.knots, self.control_points, (u, v, w), derivative)
+        return self._on_grid((u, v, w), [derivative])[0]
 
     def grid_jacobian(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Return the Jacobian on a tensor grid: (len(u), len(v), len(w), 3, 3), last index the parametric direction."""
-        return np.stack([self.grid(u, v, w, d) for d in ((1, 0, 0), (0, 1, 0), (0, 0, 1))], axis=-1)
+        return np.stack(self._on_grid((u, v, w), UNITS), axis=-1)
+
+    def _on_grid(self, rows: Sequence[ArrayLike], orders: Sequence[Orders]) -> list[Array]:
+        """Return partial derivatives (len(u), len(v), len(w), 3) on the tensor grid of three rows."""
+        return self._derivatives(lambda net, order: evaluate_grid(self.degrees, self.knots, net, rows, order), orders)
+
+    def _derivatives(self, evaluate: Callable[[Array, Orders], Array], orders: Sequence[Orders]) -> list[Array]:
+        """Return partial derivatives of F; evaluate: returns that of the spline of given coefficients."""
+        if self.weights is None:
+            return [evaluate(self.control_points, order) for order in orders]
+        return quotients(partial(evaluate, self.homogeneous), orders)
+
+    @property
+    def homogeneous(self) -> Array:
+        """Return the coefficients (n_u, n_v, n_w, 4) of sum w_i P_i N_i and of sum w_i N_i; weights 1 without any."""
+        ones = np.ones(self.shape)
+        return homogeneous(self.control_points, ones if self.weights is None else self.weights)
 
     def refined(self, levels: int = 1) -> "BSplineVolume":
         """Return the same map with every span halved `levels` times, exactly (knot insertion). Raises ValueError."""
@@ -240,10 +265,11 @@ class BSplineVolume(Brief, Shown):
 
         Raises ValueError where these lack one of the map's own knots.
         """
-        points = self.control_points
+        net = self.control_points if self.weights is None else self.homogeneous
         for a in range(3):
-            points = apply_along(insertion_into(self.knots[a], self.degrees[a], finer[a]), points, a)
-        return BSplineVolume(self.degrees, finer, points)
+            net = apply_along(insertion_into(self.knots[a], self.degrees[a], finer[a]), net, a)
+        parts = (net,) if self.weights is None else projected(net)
+        return BSplineVolume(self.degrees, finer, *parts)
 
     def face(self, axis: int, side: int) -> Array:
         """Return the control points of a boundary face, e.g. (n_v, n_w, 3) for axis 0; side 0 or 1."""
@@ -251,20 +277,35 @@ class BSplineVolume(Brief, Shown):
 
     def transformed(self, scale: float, offset: ArrayLike) -> "BSplineVolume":
         """Return the map scale * F + offset."""
-        return BSplineVolume(self.degrees, self.knots, scale * self.control_points + np.asarray(offset))
+        return replace(self, control_points=scale * self.control_points + np.asarray(offset))
 
     def save(self, path: str | Path) -> None:
-        """Write volume.npz (degrees, knots_u, knots_v, knots_w, control_points); atomic."""
-        save_spline(path, self.degrees, self.knots, control_points=self.control_points)
+        """Write volume.npz (degrees, knots_u, knots_v, knots_w, control_points; weights where it has any); atomic."""
+        weights = {} if self.weights is None else {"weights": self.weights}
+        save_spline(path, self.degrees, self.knots, control_points=self.control_points, **weights)
 
     @classmethod
     def load(cls, path: str | Path) -> "BSplineVolume":
         """Read volume.npz. Raises FileNotFoundError, or ValueError that names the defect of the file."""
         degrees, knots, points = load_spline(path, "control_points")
+        weights = load_arrays(path, (), ("weights",)).get("weights")
         try:
-            return cls(degrees, knots, points)
+            return cls(degrees, knots, points, weights)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: {error}") from None
+
+
+def _checked_weights(given: ArrayLike | None, shape: tuple[int, ...]) -> Array | None:
+    """Return weights (n_u, n_v, n_w) as a float array, None where all are equal; raise ValueError for others."""
+    if given is None:
+        return None
+    weights = real_array(given, "weights")
+    if weights.shape != shape:
+        raise ValueError(f"weights must have shape {shape}, one for each control point, got {weights.shape}")
+    if np.any(refused := ~((weights >= 1.0 / LARGEST) & (weights <= LARGEST))):  # NaN included
+        first = weights[refused][0]
+        raise ValueError(f"weights must be positive, from {1.0 / LARGEST:g} to {LARGEST:g}, got {first:g}")
+    return None if np.all(weights == weights.flat[0]) else weights
 
 
 def demand_volume(volume: object) -> None:

@@ -12,7 +12,8 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation
-from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
+from parameterize.spline.rational import Orders, quotients
+from parameterize.spline.volume import AXES, FACE_NAMES, UNITS, BSplineVolume
 
 from ..field import Points
 from ..forms.boundary_value_problem import BoundaryValueProblem
@@ -28,8 +29,7 @@ ON_FACE = np.linspace(0.05, 0.95, 7)  # parameters a direction at which Robin's 
 SIGNS = tuple(product((1.0,), (1.0, -1.0), (1.0, -1.0)))  # of the waves that make up a standing one
 INSIDE = (-5, -3, -1)  # the axes of blocks that run over the points of a span
 
-Orders = tuple[int, int, int]
-FIRST: tuple[Orders, ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+FIRST = UNITS
 SECOND: tuple[Orders, ...] = ((2, 0, 0), (1, 1, 0), (1, 0, 1), (0, 2, 0), (0, 1, 1), (0, 0, 2))  # in order of PAIRS
 
 
@@ -77,11 +77,12 @@ def _inside(
         [[collocation(knots[a], degrees[a], rule.points[a], order) for order in range(3)] for a in range(3)]
         for degrees, knots in ((space.degrees, space.knots), (volume.degrees, volume.knots))
     ]
+    net = np.moveaxis(volume.control_points if volume.weights is None else volume.homogeneous, -1, 0)
     sizes, w_u, w_v, w_w = [np.diff(breaks) for breaks in space.breaks], *rule.weights
     for span, start in enumerate(range(0, rule.shape[0], counts[0])):
         layer = slice(start, start + counts[0])
         solution = _derivatives(bases[0], coefficients, layer)
-        geometry = _derivatives(bases[1], np.moveaxis(volume.control_points, -1, 0), layer)
+        geometry = _divided(_derivatives(bases[1], net, layer))
         x = Points.of(geometry[0, 0, 0], (rule.points[0][layer], *rule.points[1:]))
         inverse, det = _inverse([geometry[order] for order in FIRST])
         residual = problem.source_at(x) - strong_form(problem.form, _jets(geometry, solution, inverse), x)
@@ -207,6 +208,14 @@ def _derivatives(bases: list[list[csr_array]], coefficients: Array, layer: slice
             for k in range(3 - i - j):
                 found[i, j, k] = apply_along(bases[2][k], along_v, 3)
     return found
+
+
+def _divided(geometry: dict[Orders, Array]) -> dict[Orders, Array]:
+    """Return the derivatives of a map, (3, ...) each, from its own or from those of its homogeneous components."""
+    if len(geometry[0, 0, 0]) == 3:
+        return geometry
+    found = quotients(lambda order: np.moveaxis(geometry[order], 0, -1), list(geometry))
+    return {order: np.moveaxis(part, -1, 0) for order, part in zip(geometry, found, strict=True)}
 
 
 def _inverse(tangents: Sequence[Array]) -> tuple[list[Array], Array]:

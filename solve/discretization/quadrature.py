@@ -203,21 +203,32 @@ def map_planes(
     """Yield for every point q of direction u: q, the map on its plane, and its points in space, (3, q_w, q_v).
 
     The map is (3, 4, q_w, q_v): value and gradient of its components. points: the numbers q, all by default. The arrays
-    are reused from one step to the next.
+    are reused from one step to the next. A rational volume is the quotient of splines that the kernels evaluate.
     """
+    is_rational = volume.weights is not None
+    net = volume.homogeneous if is_rational else volume.control_points
     (first, basis, functions), table_v, table_w = rule.tabulate(volume.degrees, volume.knots)
     tables = (np.zeros_like(first), basis, functions), table_v, table_w
-    row, components = -1, np.empty((3, 0, 0, 0))
-    fields = np.empty((3, 4, *rule.plane_shape))
+    row, components = -1, np.empty((net.shape[-1], 0, 0, 0))
+    splines = np.empty((net.shape[-1], 4, *rule.plane_shape))
+    fields = splines[:3]
     u, v, w = rule.points
     for q in range(rule.shape[0]) if points is None else points:
         if first[q] != row:  # the rows of control points that are not zero on a span: all at once would be a second map
             row = int(first[q])
-            rows = volume.control_points[row : row + len(functions)]
-            components = np.ascontiguousarray(np.moveaxis(rows, -1, 0))  # (3, p + 1, n_v, n_w)
-        for component, out in zip(components, fields, strict=True):
+            rows = net[row : row + len(functions)]
+            components = np.ascontiguousarray(np.moveaxis(rows, -1, 0))  # (3 or 4, p + 1, n_v, n_w)
+        for component, out in zip(components, splines, strict=True):
             kernels.evaluate_plane(component, q, tables, out)
+        if is_rational:
+            _divide(fields, splines[3])
         yield q, fields, Points.of(fields[:, 0], (u[q : q + 1], v, w), (2, 1))
+
+
+def _divide(fields: Array, weight: Array) -> None:
+    """Divide components A (3, 4, q_w, q_v), values and gradients, by the weight W (4, q_w, q_v) in place."""
+    fields[:, 0] /= weight[0]
+    fields[:, 1:] = (fields[:, 1:] - fields[:, :1] * weight[1:]) / weight[0]
 
 
 def geometry_planes(

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.bspline import evaluate_at
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 
@@ -30,7 +29,6 @@ TOLERANCE = 1e-4  # share of the area of a face's regions by which it may be wro
 SPREAD = 0.05  # of a cell in which lines differ, its usual error; these are of either sign
 HALVINGS = 8  # of such cells, at most
 MOST_CELLS = 6000  # of one size, of rims that are ragged as the triangles of a mesh are
-TANGENTS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +48,9 @@ class FacePoints:
     def of(cls, volume: BSplineVolume, hand: int, axis: int, side: int, across: Array) -> "FacePoints":
         """Return the points with parameters (m, 2) of the two directions along a face; hand: the orientation."""
         parameters = np.insert(across, axis, float(side), axis=1)
-        spline = volume.degrees, volume.knots, volume.control_points, parameters
-        jacobian = np.stack([evaluate_at(*spline, tangent) for tangent in TANGENTS], axis=-1)
+        jacobian = volume.jacobian(parameters)
         area = np.cross(jacobian[..., (axis + 1) % 3], jacobian[..., (axis + 2) % 3]).T
-        return cls(parameters, evaluate_at(*spline).T, (hand if side else -hand) * area, jacobian)
+        return cls(parameters, volume(parameters).T, (hand if side else -hand) * area, jacobian)
 
     @property
     def size(self) -> Array:

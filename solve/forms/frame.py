@@ -31,8 +31,8 @@ class UnitFrame:
     def of(cls, body: BSplineVolume | MultiPatch) -> "UnitFrame":
         """Return the frame of a body.
 
-        The size of the volume follows exactly from the six faces (divergence theorem); the bounding box is that of
-        points on the faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
+        The size of the volume follows from the six faces (`enclosed_volume`); the bounding box is that of points on the
+        faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
         Raises ValueError where the volume encloses nothing.
         """
         patches = as_multipatch(body).patches

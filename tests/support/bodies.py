@@ -1,53 +1,61 @@
-"""Bodies of several patches by formula: boxes glued in a grid, and a ring."""
+"""Bodies of several patches by formula for the tests."""
 
-from __future__ import annotations
-
-from itertools import product
+from dataclasses import replace
 
 import numpy as np
+from rational_shapes import quarter_ring
+from volumes import mapped
 
-from iga_nn import BSplineVolume, MultiPatch
-
-
-def box(corner: tuple[float, ...], spans: int = 2, degree: int = 3) -> BSplineVolume:
-    """The unit cube with its least corner at a point."""
-    x, y, z = corner
-    return BSplineVolume.from_function(lambda u, v, w: (x + u, y + v, z + w), spans + degree, degree)
+from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.volume import BSplineVolume
 
 
-def glued(corners: list[tuple[int, ...]], spans: int = 2, degree: int = 3) -> MultiPatch:
-    return MultiPatch.from_patches([box(corner, spans, degree) for corner in corners])
+def turned(volume, order=(0, 1, 2), back=(False, False, False)):
+    """The same volume with its parameters in another order, and then some of them reversed."""
+    degrees, knots = (tuple(part[a] for a in order) for part in (volume.degrees, volume.knots))
+    ways = tuple(slice(None, None, -1 if b else 1) for b in back)
+    net = volume.control_points.transpose(*order, 3)[ways]
+    weights = None if volume.weights is None else volume.weights.transpose(order)[ways]
+    knots = tuple(1.0 - k[::-1] if b else k for k, b in zip(knots, back, strict=True))
+    return BSplineVolume(degrees, knots, net, weights)
 
 
-def two(spans: int = 2, degree: int = 3) -> MultiPatch:
-    return glued([(0, 0, 0), (1, 0, 0)], spans, degree)
+def row_of(places, turns, degrees=(2, 3, 1), shape=(4, 5, 3)):
+    """Bent boxes at whole places (x, y, z), each turned in its way, glued where they touch.
+
+    All have the same degrees and numbers of control points in x, y and z.
+    """
+
+    def patch(place):
+        def bent(u, v, w):
+            x, y, z = (coordinate + start for coordinate, start in zip((u, v, w), place, strict=True))
+            return x + 0.1 * np.sin(y + z), y + 0.1 * np.sin(z - x), z + 0.05 * np.sin(x * y)
+
+        return mapped(bent, shape, degrees)
+
+    patches = [turned(patch(place), *turn) for place, turn in zip(places, turns, strict=True)]
+    return MultiPatch.from_patches(patches)
 
 
-def plate(spans: int = 2, degree: int = 3) -> MultiPatch:
-    """Eight cubes around a hole."""
-    return glued([(i, j, 0) for i, j in product(range(3), repeat=2) if (i, j) != (1, 1)], spans, degree)
+def exact_ring():
+    """A ring with circular walls, of four rational quarters."""
+    quarters, quarter = [], quarter_ring()
+    for number in range(4):
+        turn = np.linalg.matrix_power(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), number)
+        quarters.append(replace(quarter, control_points=quarter.control_points @ turn.T))
+    return MultiPatch.from_patches(quarters)
 
 
-def frame(spans: int = 2, degree: int = 3) -> MultiPatch:
-    """The edges of a cube, 20 patches: genus 5."""
-    return glued([c for c in product(range(3), repeat=3) if c.count(1) < 2], spans, degree)
+def ring(patches, shape=(6, 4, 3), degrees=(2, 2, 1), twist=0.0):
+    """A ring of patches around the z axis; the section turns by `twist` half turns on the way."""
 
-
-def ring(spans: int = 8, degree: int = 3, patches: int = 1) -> MultiPatch:
-    """A ring of radii 1 and 2 and height 1, cut into patches; one patch is glued to itself."""
-
-    def part(number: int) -> BSplineVolume:
+    def part(number):
         def place(u, v, w):
-            angle = (number + u) * 2.0 * np.pi / patches
-            return (1.0 + v) * np.cos(angle), (1.0 + v) * np.sin(angle), w
+            angle = 2.0 * np.pi * (u + number) / patches
+            a, b, turn = 0.5 * (v - 0.5), 0.3 * (w - 0.5), 0.5 * twist * angle
+            radius, height = 2.0 + np.cos(turn) * a - np.sin(turn) * b, np.sin(turn) * a + np.cos(turn) * b
+            return radius * np.cos(angle), radius * np.sin(angle), height
 
-        counts = (2 * max(spans // patches, 1) + degree, *[max(spans // 2, 1) + degree] * 2)
-        return BSplineVolume.from_function(place, counts, degree)
+        return mapped(place, shape, degrees)
 
     return MultiPatch.from_patches([part(number) for number in range(patches)])
-
-
-def held_at(body: MultiPatch, face: str) -> dict[str, None]:
-    """The exact flux on all outer faces but one."""
-    labels = [f"p{i}_{name}" for i, faces in enumerate(body.outer) for name in faces]
-    return {label: None for label in labels if label != face}

@@ -1,7 +1,7 @@
 """det J in rational arithmetic: every float is a rational, so that its sign can be decided exactly."""
 
 from fractions import Fraction
-from functools import cache
+from functools import cache, reduce
 from itertools import permutations, product
 from math import comb
 
@@ -50,8 +50,14 @@ def exact_bezier_rows(knots, degree):
 
 
 def exact_coefficients(volume):
-    """Bernstein coefficients of det J on every span, (spans..., d_u, d_v, d_w) of Fractions."""
+    """Bernstein coefficients of det J on every span, (spans..., d_u, d_v, d_w) of Fractions.
+
+    Of a rational volume those of det J W^4.
+    """
     points = rational(volume.control_points)
+    if volume.weights is not None:
+        weights = rational(volume.weights)[..., None]
+        points = np.concatenate([points * weights, weights], axis=-1)
     rows = [exact_bezier_rows(k, p) for k, p in zip(volume.knots, volume.degrees, strict=True)]
     result = {}
     for span in product(*(range(len(r)) for r in rows)):
@@ -67,7 +73,7 @@ def exact_coefficients(volume):
             breaks = np.unique(volume.knots[b])
             width = Fraction(float(breaks[span[b] + 1])) - Fraction(float(breaks[span[b]]))
             columns.append(np.diff(net, axis=b) * volume.degrees[b] / width)
-        result[span] = exact_determinant(columns, volume.degrees)
+        result[span] = exact_determinant(columns if volume.weights is None else [*columns, net])
     return result
 
 
@@ -91,12 +97,13 @@ def convolve(a, b):
     return out
 
 
-def exact_determinant(columns, degrees):
-    total = np.full(tuple(3 * p for p in degrees), Fraction(0), dtype=object)
-    for order in permutations(range(3)):
-        sign = round(np.linalg.det(np.eye(3)[list(order)]))
-        parts = [scale(columns[b][..., order[b]]) for b in range(3)]
-        total += sign * convolve(convolve(parts[0], parts[1]), parts[2])
+def exact_determinant(columns):
+    n = len(columns)
+    total = Fraction(0)
+    for order in permutations(range(n)):
+        sign = round(np.linalg.det(np.eye(n)[list(order)]))
+        parts = [scale(columns[b][..., order[b]]) for b in range(n)]
+        total = total + sign * reduce(convolve, parts)
     return scale(total, inverse=True)
 
 

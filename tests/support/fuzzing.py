@@ -35,6 +35,8 @@ from pathlib import Path
 import formulas
 import meshio
 import numpy as np
+from bodies import exact_ring
+from foreign_files import geopdes, geopdes_07, mfem_patches
 from mesh_files import (
     CUBE,
     MIXED,
@@ -53,6 +55,7 @@ from mesh_files import (
 from reader_files import Ply, beside, faces, grid, msh2, msh2_binary, msh41, msh41_binary, save, vertices
 
 from iga_nn.errors import InputError, input_errors, one_line
+from iga_nn.io import gismo, mfem
 from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume, load_volume
 from iga_nn.models import resolve
@@ -62,6 +65,7 @@ from iga_nn.workflow.verdict import certified_facts
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import MeshError
 from solve.field import SplineField
@@ -246,6 +250,13 @@ def check(path):
         resolve(str(path)).summary()
 
 
+def read_volume(path):
+    """What every command does first with a volume; of one patch, `iga-nn check` does the rest."""
+    body = load_volume(path)
+    if isinstance(body, BSplineVolume):
+        certified_facts(body)
+
+
 def given(read):
     """The same for a file that the command line is given beside its input."""
 
@@ -297,6 +308,16 @@ def written(write, suffix):
 def bent(n, degree):
     grid = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, n)] * 3, indexing="ij"), axis=-1)
     return BSplineVolume.uniform(grid + 0.05 * np.sin(3.0 * np.roll(grid, 1, axis=3)), degree)
+
+
+def glued(n, degree):
+    """Two patches; the second has u and v exchanged, and w reversed."""
+    first = bent(n, degree)
+    points = first.control_points
+    shifted = points + (points[-1:] - points[:1])
+    shifted[0] = points[-1]
+    second = BSplineVolume.uniform(shifted.transpose(1, 0, 2, 3)[:, :, ::-1], degree)
+    return MultiPatch.from_patches([first, second])
 
 
 def field_on(volume, coefficients):
@@ -382,18 +403,21 @@ def checkpoint_reader():
 
 
 def foreign_readers():
-    """Files of other programs, where the package that reads them is installed."""
-    if find_spec("splinepy") is None:
-        return
-    volumes = [bent(3, 1), bent(3, 2)]
-    for kind, suffix in (("gismo", ".xml"), ("mfem", ".mesh"), ("json", ".json")):
-        write = getattr(spline_files, f"write_{kind}")
-        yield Reader(
-            kind,
-            suffix,
-            check,
-            tuple([written(lambda path, v=v, write=write: write(path, v), suffix)] for v in volumes),
-        )
+    """Files of other programs, of one patch and of several; JSON where the package that reads it is installed."""
+    volumes = [bent(3, 1), bent(3, 2), glued(3, 2), exact_ring()]
+    formats = {"gismo": (".xml", gismo.write_gismo), "mfem": (".mesh", mfem.write_mfem)}
+    if find_spec("splinepy") is not None:
+        formats["json"] = (".json", spline_files.write_json)
+    for kind, (suffix, write) in formats.items():
+        seeds = [[written(lambda path, v=v, write=write: write(path, v), suffix)] for v in volumes]
+        yield Reader(kind, suffix, read_volume, tuple(seeds))
+    yield Reader("mfem, patches", ".mesh", read_volume, ([mfem_patches().encode()],))
+    yield Reader(
+        "geopdes",
+        ".txt",
+        read_volume,
+        ([geopdes(volumes[2]).encode()], [geopdes_07(volumes[0]).encode()], [geopdes(volumes[3]).encode()]),
+    )
 
 
 FORMULAS = ("exp(x+z)*sin(y)", "1e-3*(x**2-y)/(2+z)-3.5", "-tanh(x*y)**(1/3)+abs(log(z))*pi", "sqrt(e**x)+cos(tan(y))")
@@ -427,6 +451,8 @@ def readers() -> tuple[Reader, ...]:
         surface_reader("vtu of VTK", ".vtu", *vtk_files()),
         meshio_reader("vtu", ".vtu", {"binary": False}, {"compression": None}, {"compression": "zlib"}),
         npz_reader("volume.npz", check, *volumes),
+        npz_reader("volume.npz of patches", read_volume, glued(3, 2)),
+        npz_reader("volume.npz, rational", read_volume, exact_ring()),
         npz_reader("solution.npz", given(SplineField.load), *fields),
         npz_reader("boundary.npz", given(BoundaryMap.load), box),
         checkpoint_reader(),

@@ -1,0 +1,92 @@
+"""Reads geometry files of GeoPDEs, "nurbs mesh v.0.7" to "v.2.1", with one patch or several.
+
+After rows of comments stand the numbers of parameters, coordinates (since v.2.0), patches, interfaces and subdomains.
+A patch has its name, degrees, numbers of control points, knot vectors, a row for each homogeneous coordinate of the
+control points, u fastest, and a row of weights. An interface has its name, patch and side of either face, and the way
+they lie on each other, which the control points tell, too. Patches count from 1, sides from 1: u0, u1, v0, v1, w0, w1.
+Subdomains and boundaries, at the end, are not read. Source: geo_specs_mp_v21.txt of GeoPDEs.
+"""
+
+import re
+
+import numpy as np
+
+from parameterize.arrays import Array
+from parameterize.spline.interface import Face
+from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
+
+from .patches import patch_of
+from .words import Words
+
+HEADER = re.compile(r"^\s*#.*nurbs (?:mesh|geometry) v\.?(\d{1,3})\.", re.IGNORECASE | re.MULTILINE)
+HEAD = 4096  # characters in which it stands
+
+
+def read_geopdes(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]]]:
+    """Return the patches, and the pairs of faces that the file declares glued. Raises ValueError with the line."""
+    words = Words(text)
+    header = HEADER.search(text, 0, HEAD)
+    old = header is not None and int(header[1]) < 2
+    counts = words.as_wholes(
+        words.row("the numbers of dimensions and patches"), "the numbers of dimensions and patches"
+    )
+    dimension, *rest = counts
+    space = dimension if old or not rest else rest.pop(0)
+    if (dimension, space) != (3, 3):
+        raise words.fault(f"maps {dimension} parameters to {space} coordinates; a volume maps 3 to 3")
+    patches, interfaces, *_ = [*rest, *(1, 0)[len(rest) :]]
+    return (
+        [_read_patch(words, f"patch {number + 1}") for number in range(patches)],
+        [_read_interface(words, f"interface {number + 1}") for number in range(interfaces)],
+    )
+
+
+def _read_patch(words: Words, name: str) -> BSplineVolume:
+    """Return the next patch. name: for errors."""
+    if not (words.peek() or "").isdigit():
+        words.row(f"the name of {name}")
+    degrees = _wholes(words, 3, f"the degrees of {name}")
+    counts = _wholes(words, 3, f"the numbers of control points of {name}")
+    knots = [
+        _reals(words, count + degree + 1, f"the knots of {name} in {axis}")
+        for count, degree, axis in zip(counts, degrees, AXES, strict=True)
+    ]
+    total = int(np.prod(counts, dtype=object))
+    points = np.stack([_reals(words, total, f"the {axis} coordinates of {name}") for axis in "xyz"], axis=1)
+    weights = _reals(words, total, f"the weights of {name}")
+    if not np.all(weights > 0.0):
+        raise words.fault(f"the weights of {name} must be positive")
+    try:
+        return patch_of(degrees, knots, points / weights[:, None], weights)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def _read_interface(words: Words, name: str) -> tuple[Face, Face]:
+    words.row(f"the name of {name}")
+    first, second = (_face(words, name) for _ in range(2))
+    words.row(f"the orientation of {name}")
+    return first, second
+
+
+def _face(words: Words, name: str) -> Face:
+    patch, side = _wholes(words, 2, f"patch and side of {name}")
+    if patch < 1 or not 1 <= side <= len(FACE_NAMES):
+        raise words.fault(f"{name} names side {side} of patch {patch}: both count from 1, sides to {len(FACE_NAMES)}")
+    return patch - 1, FACE_NAMES[side - 1]
+
+
+def _wholes(words: Words, count: int, what: str) -> list[int]:
+    return words.as_wholes(_row(words, count, what), what)
+
+
+def _reals(words: Words, count: int, what: str) -> Array:
+    return words.as_reals(_row(words, count, what), what)
+
+
+def _row(words: Words, count: int, what: str) -> list[str]:
+    """Return the next row, which must have `count` words."""
+    row = words.row(what)
+    if len(row) != count:
+        raise words.fault(f"{what} must be {count} numbers in one row, got {len(row)}")
+    return row

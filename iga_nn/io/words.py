@@ -1,0 +1,116 @@
+"""Reads a text file of numbers word by word, and says at which line something is wrong."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from parameterize.arrays import Array
+
+MAX_BYTES = 128 << 20
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a file. Raises OSError, and ValueError where it is too large or not in UTF-8."""
+    size = path.stat().st_size
+    if size > MAX_BYTES:
+        raise ValueError(f"has {size} bytes, more than {MAX_BYTES}")
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError("is not a text file in UTF-8") from None
+
+
+class Words:
+    """The words of a text in turn; rows that begin with # are comments. All functions raise ValueError with the line.
+
+    what: in the functions below, the name of what is read, for the error.
+    """
+
+    def __init__(self, text: str) -> None:
+        self._rows: Iterator[tuple[int, str]] = iter(enumerate(text.splitlines(), 1))
+        self._line = 0
+        self._words: list[str] = []
+        self._at = 0
+
+    def fault(self, reason: str) -> ValueError:
+        """Return the error for a reason at the present line."""
+        return ValueError(f"line {self._line}: {reason}")
+
+    def peek(self) -> str | None:
+        """Return the next word without taking it, None at the end."""
+        while self._at == len(self._words):
+            number, row = next(self._rows, (0, ""))
+            if not number:
+                return None
+            self._line, self._at = number, 0
+            self._words = [] if row.lstrip().startswith("#") else row.split()
+        return self._words[self._at]
+
+    def row(self, what: str) -> list[str]:
+        """Return the words left in the present row, of the next row where there are none."""
+        if self.peek() is None:
+            raise ValueError(f"ends before {what}: the file is cut off, or a count in it is too large")
+        found = self._words[self._at :]
+        self._at = len(self._words)
+        return found
+
+    def take(self, count: int, what: str) -> list[str]:
+        """Return the next words, over as many rows as they take."""
+        found: list[str] = []
+        while len(found) < count:
+            row = self.row(what)
+            wanted = count - len(found)
+            found += row[:wanted]
+            self._at -= max(len(row) - wanted, 0)
+        return found
+
+    def word(self, what: str) -> str:
+        """Return the next word."""
+        return self.take(1, what)[0]
+
+    def whole(self, what: str) -> int:
+        """Return the next word as a whole number that is not negative: a count, or a number of something."""
+        return self.wholes(1, what)[0]
+
+    def wholes(self, count: int, what: str) -> list[int]:
+        """Return the next words as whole numbers that are not negative."""
+        return self.as_wholes(self.take(count, what), what)
+
+    def as_wholes(self, words: list[str], what: str) -> list[int]:
+        """Return words as whole numbers that are not negative."""
+        for word in words:
+            if not (word.isascii() and word.isdigit() and len(word) < 19):  # a number of 64 bits
+                raise self.fault(f"{what} must be a whole number, got {word[:40]!r}")
+        return [int(word) for word in words]
+
+    def reals(self, count: int, what: str) -> Array:
+        """Return the next words as finite numbers (count,)."""
+        return self.as_reals(self.take(count, what), what)
+
+    def as_reals(self, words: list[str], what: str) -> Array:
+        """Return words as finite numbers (n,)."""
+        try:
+            return finite_numbers(words, what)
+        except ValueError as error:
+            raise self.fault(str(error)) from None
+
+
+def finite_numbers(words: list[str], what: str) -> Array:
+    """Return words as finite numbers (n,). Raises ValueError with the word that is none."""
+    try:
+        values = np.array([float(word) for word in words], dtype=np.float64)
+    except ValueError:
+        bad = next(word for word in words if not _is_number(word))
+        raise ValueError(f"{what} must be numbers, got {bad[:40]!r}") from None
+    if not np.all(np.isfinite(values)):
+        raise ValueError(f"{what} must be finite, got {words[int(np.argmin(np.isfinite(values)))][:40]!r}")
+    return values
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,69 @@
+"""volume.npz of several patches; of one patch it is what it was."""
+
+import numpy as np
+import pytest
+from bodies import exact_ring, ring, row_of
+from glued import demand_same
+
+import iga_nn
+from parameterize.files import load_arrays, save_arrays
+from parameterize.spline.multipatch import MultiPatch
+from solve import benchmark_volume
+
+TURNS = [((0, 1, 2), (False, False, False)), ((1, 2, 0), (True, False, True)), ((2, 1, 0), (False, True, False))]
+PLACES = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
+
+
+def names(body):
+    parts = ("degrees", "knots_u", "knots_v", "knots_w", "control_points")
+    return ("interfaces", *(f"p{number}_{part}" for number in range(len(body)) for part in parts))
+
+
+@pytest.mark.parametrize("body", [row_of(PLACES, TURNS), ring(1), ring(3), exact_ring()])
+def test_a_body_is_read_again_bit_by_bit(body, tmp_path):
+    body.save(tmp_path / "body.npz")
+    again = iga_nn.load_volume(tmp_path / "body.npz")
+    assert again.interfaces == body.interfaces
+    demand_same(again, body)
+
+
+def test_one_patch_is_written_as_a_volume(tmp_path):
+    volume = benchmark_volume(2)
+    volume.save(tmp_path / "volume.npz")
+    MultiPatch((volume,)).save(tmp_path / "body.npz")
+    assert (tmp_path / "body.npz").read_bytes() == (tmp_path / "volume.npz").read_bytes()
+    assert isinstance(iga_nn.load_volume(tmp_path / "body.npz"), iga_nn.BSplineVolume)
+    assert len(MultiPatch.load(tmp_path / "volume.npz")) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("interfaces", lambda rows: rows[:, :6], "interfaces must have 7 whole numbers a row"),
+        ("interfaces", lambda rows: 1.0 * rows, "interfaces must have 7 whole numbers a row"),
+        ("interfaces", lambda rows: rows + [0, 6, 0, 0, 0, 0, 0], "faces are 0 to 5"),
+        ("interfaces", lambda rows: rows - [9, 0, 0, 0, 0, 0, 0], "there is no such face"),
+        ("interfaces", lambda rows: np.concatenate([rows, rows]), "is glued twice"),
+        ("p1_control_points", lambda points: points + 1e-9, "the control points or weights of the two faces differ"),
+        ("p1_control_points", lambda points: points * np.nan, "patch 1: control_points must be finite"),
+        ("p2_knots_u", lambda row: row[1:], "patch 2: "),
+        ("p0_degrees", lambda degrees: degrees + 1, "patch 0: "),
+    ],
+)
+def test_damaged_arrays_are_refused(name, change, says, tmp_path):
+    body = row_of(PLACES, TURNS)
+    body.save(tmp_path / "body.npz")
+    held = load_arrays(tmp_path / "body.npz", names(body))
+    save_arrays(tmp_path / "bad.npz", **held | {name: change(held[name])})
+    with pytest.raises(iga_nn.InputError, match=r"bad\.npz: .*" + says):
+        iga_nn.load_volume(tmp_path / "bad.npz")
+
+
+def test_a_missing_array_is_named(tmp_path):
+    body = row_of(PLACES, TURNS)
+    body.save(tmp_path / "body.npz")
+    held = load_arrays(tmp_path / "body.npz", names(body))
+    del held["p1_knots_v"]
+    save_arrays(tmp_path / "bad.npz", **held)
+    with pytest.raises(iga_nn.InputError, match=r"bad\.npz: has no array named p1_knots_v"):
+        iga_nn.load_volume(tmp_path / "bad.npz")
