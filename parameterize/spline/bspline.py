@@ -183,6 +183,12 @@ def halved(knots: Array) -> Array:
     return np.sort(np.concatenate([knots, midpoints(knots)]))
 
 
+def with_full_knots(knots: Array, degree: int, values: Sequence[float]) -> Array:
+    """Return a knot vector in which each value is a knot `degree` times at least: there splines are only continuous."""
+    missing = [np.full(max(0, degree - int(np.count_nonzero(knots == value))), value) for value in values]
+    return np.sort(np.concatenate([knots, *missing]))
+
+
 def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
     """Return `field` with a sparse matrix (m, n) applied along one axis, whose length goes from n to m."""
     moved = np.moveaxis(field, axis, 0)
