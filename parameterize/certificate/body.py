@@ -50,7 +50,7 @@ class BodyCertificate(Shown):
 
     @property
     def lower_bound(self) -> float:
-        """Return the smallest of the patches' lower bounds of |det J|, each divided by the mean of its own patch."""
+        """Return the smallest of the lower bounds of the patches, each relative to the mean of its own patch."""
         return min(patch.lower_bound for patch in self.patches)
 
     @property
