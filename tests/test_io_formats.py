@@ -381,7 +381,7 @@ BOMB = '<!DOCTYPE xml [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><xml>'
         ("geopdes", "1 1 1", "1 1", "line 7: the degrees of patch 1 must be 3 numbers in one row, got 2"),
         ("geopdes", "1 1 1", "1 1 0", "line 11: the knots of patch 1 in w must be 3 numbers in one row, got 4"),
         ("geopdes", "1 1 1", "1 1 -1", "must be a whole number, got '-1'"),
-        ("geopdes", " 1.0\nSUB", " 0.0\nSUB", "line 15: the weights of patch 1 must be positive"),
+        ("geopdes", " 1.0\nSUB", " 0.0\nSUB", "patch 1: weights must be positive"),
         ("geopdes", "0.0 0.0 1.0 1.0", "0.0 0.1 0.9 1.0", "patch 1: the knot vector is not open"),
         ("geopdes", "0.0 0.0 1.0 1.0", "0.0 nan 1.0 1.0", "line 9: the knots of patch 1 in u must be finite"),
         ("json", '"SplineList": [', '"SplineList": [1, ', "as splinepy writes it"),

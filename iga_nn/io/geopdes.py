@@ -15,7 +15,7 @@ from parameterize.arrays import Array
 from parameterize.spline.interface import Face
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
-from .patches import patch_of
+from .patches import patch_of, projected
 from .words import Words
 
 HEADER = re.compile(r"^\s*#.*nurbs (?:mesh|geometry) v\.?(\d{1,3})\.", re.IGNORECASE | re.MULTILINE)
@@ -54,10 +54,8 @@ def _read_patch(words: Words, name: str) -> BSplineVolume:
     total = int(np.prod(counts, dtype=object))
     points = np.stack([_reals(words, total, f"the {axis} coordinates of {name}") for axis in "xyz"], axis=1)
     weights = _reals(words, total, f"the weights of {name}")
-    if not np.all(weights > 0.0):
-        raise words.fault(f"the weights of {name} must be positive")
     try:
-        return patch_of(degrees, knots, points / weights[:, None], weights)
+        return patch_of(degrees, knots, projected(points, weights), weights)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
 

@@ -25,7 +25,7 @@ from solve.field import SplineField
 
 from ..errors import InputError
 from .mfem_layout import CORNERS, FACES, Layout, edges_along
-from .patches import as_text, patch_of
+from .patches import as_text, patch_of, projected
 from .words import Words
 
 log = logging.getLogger(__name__)
@@ -128,11 +128,11 @@ def _read_patch(words: Words, name: str) -> BSplineVolume:
     kind = _expect(words, "controlpoints", "controlpoints_homogeneous", "controlpoints_cartesian")
     counts = [len(row) - degree - 1 for degree, row in vectors]
     rows = words.reals(4 * int(np.prod(counts, dtype=object)), f"the control points of {name}").reshape(-1, 4)
-    if not np.all(rows[:, 3] > 0.0):
-        raise words.fault(f"the weights of {name} must be positive")
-    points = rows[:, :3] if kind == "controlpoints_cartesian" else rows[:, :3] / rows[:, 3:]
+    points, weights = rows[:, :3], rows[:, 3]
     try:
-        return patch_of([degree for degree, _ in vectors], [row for _, row in vectors], points, rows[:, 3])
+        if kind != "controlpoints_cartesian":
+            points = projected(points, weights)
+        return patch_of([degree for degree, _ in vectors], [row for _, row in vectors], points, weights)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
 

@@ -13,6 +13,7 @@ import argparse
 import gzip
 import io
 import json
+import logging
 import multiprocessing
 import os
 import re
@@ -252,6 +253,7 @@ def check(path):
 
 def read_volume(path):
     """What every command does first with a volume; of one patch, `iga-nn check` does the rest."""
+    logging.getLogger("iga_nn.io").setLevel(logging.ERROR)  # notices are no errors
     body = load_volume(path)
     if isinstance(body, BSplineVolume):
         certified_facts(body)
