@@ -378,6 +378,7 @@ BOMB = '<!DOCTYPE xml [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><xml>'
         ("mfem", "1 2 0.0", "0 2 0.0", "the degree must be 1 to 1"),
         ("geopdes", " 3 3 1", " 2 2 1", "line 5: maps 2 parameters to 2 coordinates"),
         ("geopdes", " 3 3 1", " 3 3 9", "patch 2"),
+        ("geopdes", " 3 3 1", " 3 3 0", "holds no patch"),
         ("geopdes", "1 1 1", "1 1", "line 7: the degrees of patch 1 must be 3 numbers in one row, got 2"),
         ("geopdes", "1 1 1", "1 1 0", "line 11: the knots of patch 1 in w must be 3 numbers in one row, got 4"),
         ("geopdes", "1 1 1", "1 1 -1", "must be a whole number, got '-1'"),

@@ -27,10 +27,8 @@ def read_geopdes(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]
     words = Words(text)
     header = HEADER.search(text, 0, HEAD)
     old = header is not None and int(header[1]) < 2
-    counts = words.as_wholes(
-        words.row("the numbers of dimensions and patches"), "the numbers of dimensions and patches"
-    )
-    dimension, *rest = counts
+    what = "the numbers of dimensions and patches"
+    dimension, *rest = words.as_wholes(words.row(what), what)
     space = dimension if old or not rest else rest.pop(0)
     if (dimension, space) != (3, 3):
         raise words.fault(f"maps {dimension} parameters to {space} coordinates; a volume maps 3 to 3")

@@ -73,6 +73,8 @@ def body_of(
     where the two faces of a pair are apart, and where the patches do not fit together. Interfaces that the file does
     not name, though it names others, are glued with a notice.
     """
+    if not patches:
+        raise ValueError("holds no patch")
     body = MultiPatch.from_patches(patches, tolerance)
     _compare(body, [frozenset(pair) for pair in declared])
     return body if len(body) > 1 or body.interfaces else body.patches[0]
