@@ -71,9 +71,11 @@ class BodyCertificate(Shown):
 
 
 def _defect(patch: Certificate) -> str:
-    """Return where a patch is folded, or on how many spans it is not proved."""
+    """Return where a patch is folded or flat, or on how many spans it is not proved."""
     if patch.witness is not None:
         return f"folded at {in_brackets(patch.witness)}"
+    if patch.flat is not None:
+        return f"det J is zero, up to rounding, at {in_brackets(patch.flat)}"
     return f"{patch.claim} not proved on {len(patch.unproved)} knot spans"
 
 
