@@ -28,7 +28,7 @@ LINE, ARC = [0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]  # knots of deg
 
 
 def quarter_pipe() -> iga_nn.BSplineVolume:
-    """u runs along the radius, v along the angle from x to y, w along the axis."""
+    """A quarter of the pipe: u runs along the radius, v along the angle from x to y, w along the axis."""
     corner = np.array([[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     points = np.empty((2, 3, 2, 3))
     points[..., :2] = np.array([INNER, OUTER])[:, None, None, None] * corner[:, None]
