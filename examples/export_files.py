@@ -3,8 +3,7 @@
 
 ParaView, MFEM and G+Smo, with the solution; the view, cut open.
 
-On the command line: `iga-nn export volume.npz --to view --solution solution.npz`. MFEM and G+Smo need the extra
-`interop`: `pip install iga-nn[interop]`.
+On the command line: `iga-nn export volume.npz --to view --solution solution.npz`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """A volume from elsewhere
 =======================
 
-G+Smo XML, an MFEM NURBS mesh, splinepy's JSON, or volume.npz, certified and solved on.
+G+Smo XML, an MFEM NURBS mesh, a GeoPDEs geometry file, splinepy's JSON, or volume.npz, certified and solved on.
 
 `python examples/load_volume.py yeti.mesh` reads yours; without a file, a twisted column is written as G+Smo XML first.
-G+Smo, MFEM and JSON need the extra `interop`: `pip install iga-nn[interop]`.
+JSON needs the extra `interop`: `pip install iga-nn[interop]`.
 """
 
 from __future__ import annotations

@@ -78,14 +78,12 @@ def test_compare_finds_the_better_map(tmp_path, capsys):
 
 
 def test_load_volume(tmp_path, capsys):
-    pytest.importorskip("splinepy")
     assert shown(load("load_volume").main(out=tmp_path))
     assert "certificate: certified" in capsys.readouterr().out
     assert (tmp_path / "column.xml").exists()
 
 
 def test_export_files(tmp_path, capsys):
-    pytest.importorskip("splinepy")
     assert shown(load("export_files").main(out=tmp_path))
     files = [Path(line) for line in capsys.readouterr().out.split()]
     assert {file.suffix for file in files} == {".vtu", ".mesh", ".xml"} and all(file.exists() for file in files)

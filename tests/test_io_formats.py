@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bodies import turned
 from foreign_files import geopdes
+from rational_shapes import bent_bar, octant, quarter_ring
 from volumes import spans_at
 
 from iga_nn.cli.commands import main
@@ -19,6 +21,7 @@ from iga_nn.io.formats import export, is_volume, load_volume
 from parameterize.spline.bernstein import binomials, elevation
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve import Poisson, solve_problem
 from solve.field import SplineField
@@ -356,9 +359,9 @@ BOMB = '<!DOCTYPE xml [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><xml>'
         ("gismo", "0.0 0.0 0.0", "0.0 0.0", "three numbers each"),
         ("gismo", 'geoDim="3"', 'geoDim="2"', "coefs of geoDim 3"),
         ("gismo", 'geoDim="3"', 'geoDim="3" format="B64Float64"', "B64Float64: save the file with the format ASCII"),
-        ("mfem", "weights\n1", "weights\n2", "rational"),
-        ("mfem", "weights\n1", "weights\n1e999", "line 51: weights must be finite, got '1e999'"),
-        ("mfem", "weights" + 8 * "\n1", "weights" + 8 * "\n-1", "rational"),
+        ("mfem", "weights\n1.0", "weights\n0.0", "patch 0: weights must be positive"),
+        ("mfem", "weights\n1.0", "weights\n1e999", "line 51: weights must be finite, got '1e999'"),
+        ("mfem", "weights" + 8 * "\n1.0", "weights" + 8 * "\n-1.0", "patch 0: weights must be positive"),
         ("mfem", "elements\n1\n", "elements\n2\n1 5 8 9 10 11 12 13 14 15\n", "names vertex 15, and there are 8"),
         ("mfem", "1 5 0 1 2 3", "1 5 0 2 1 3", "element 0: has no edge between the vertices 0 and 2"),
         ("mfem", "1 5 0 1 2 3", "1 5 0 1 1 3", "element 0 has a vertex twice"),
@@ -369,7 +372,7 @@ BOMB = '<!DOCTYPE xml [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><xml>'
         ("mfem", "knotvectors", "patches\n\nknotvectors", "dimension must follow, got 'weights'"),
         ("mfem", "knotvectors", "periodic\n1 1\nknotvectors", "must follow, got 'periodic'"),
         ("mfem", "v1.0", "v7.0", "MFEM NURBS mesh v7.0"),
-        ("mfem", "weights\n1", "weights\n(1.0)*9**9**9", "weights must be numbers, got '(1.0)*9**9**9'"),
+        ("mfem", "weights\n1.0", "weights\n(1.0)*9**9**9", "weights must be numbers, got '(1.0)*9**9**9'"),
         ("mfem", "Ordering: 1", "Ordering: 7", "Ordering of 0 or 1"),
         ("mfem", "1 2 0.0", "1 99999999999 0.0", "ends before knots"),
         ("mfem", "1 2 0.0", "0 2 0.0", "the degree must be 1 to 1"),
@@ -379,7 +382,6 @@ BOMB = '<!DOCTYPE xml [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><xml>'
         ("geopdes", "1 1 1", "1 1 0", "line 11: the knots of patch 1 in w must be 3 numbers in one row, got 4"),
         ("geopdes", "1 1 1", "1 1 -1", "must be a whole number, got '-1'"),
         ("geopdes", " 1.0\nSUB", " 0.0\nSUB", "line 15: the weights of patch 1 must be positive"),
-        ("geopdes", " 1.0\nSUB", " 2.0\nSUB", "patch 1: is rational"),
         ("geopdes", "0.0 0.0 1.0 1.0", "0.0 0.1 0.9 1.0", "patch 1: the knot vector is not open"),
         ("geopdes", "0.0 0.0 1.0 1.0", "0.0 nan 1.0 1.0", "line 9: the knots of patch 1 in u must be finite"),
         ("json", '"SplineList": [', '"SplineList": [1, ', "as splinepy writes it"),
@@ -401,16 +403,45 @@ def test_files_that_are_no_volume_are_refused_in_one_line(to, old, new, says, in
     assert set(Path().iterdir()) == before
 
 
-def test_rational_splines_are_refused_and_constant_weights_are_not(in_folder):
+@pytest.mark.parametrize("to", ["gismo", "mfem", "json"])
+@pytest.mark.parametrize("rational", [quarter_ring(), octant(), bent_bar()], ids=["ring", "octant", "bar"])
+def test_rational_volumes_are_written_and_read(to, rational, in_folder):
+    if to == "json":
+        pytest.importorskip("splinepy")
+    rational.save("rational.npz")
+    again = load_volume(export("rational.npz", to))
+    if to == "mfem" and orientation(rational) < 0:
+        rational = turned(rational, back=(False, False, True))
+    assert np.array_equal(again.weights, rational.weights)
+    exact = 1e-15 if to == "json" else 0.0  # splinepy keeps homogeneous coordinates
+    assert largest(again.control_points - rational.control_points) <= exact
+
+
+def test_other_programs_read_rational_volumes(in_folder):
+    pygismo, mfem = pytest.importorskip("pygismo"), pytest.importorskip("mfem.ser")
+    rational = quarter_ring()
+    rational.save("ring.npz")
+    patches = pygismo.core.gsMultiPatch()
+    pygismo.io.gsFileData(str(export("ring.npz", "gismo"))).getId(0, patches)
+    assert largest(patches.patch(0).eval(POINTS.T).T - rational(POINTS)) < 1e-12
+    mesh = mfem.Mesh(str(export("ring.npz", "mfem")), 1, 0)
+    places = zip(*spans_at(rational, POINTS), strict=True)
+    read = [np.array(mesh.GetElementTransformation(int(e)).Transform(mfem_point(*local))) for e, local in places]
+    assert largest(np.array(read) - rational(POINTS)) < 1e-12
+
+
+def test_weights_that_are_alike_are_left_out(in_folder):
     splinepy = pytest.importorskip("splinepy")
-    cube = splinepy.helpme.create.box(1, 2, 3).nurbs
-    splinepy.io.json.export("box.json", [cube])
-    assert load_volume("box.json")([[0.5, 0.5, 0.5]]) == pytest.approx(np.array([[0.5, 1.0, 1.5]]))
+    splinepy.io.json.export("box.json", [splinepy.helpme.create.box(1, 2, 3).nurbs])
+    box = load_volume("box.json")
+    assert box.weights is None and box([[0.5, 0.5, 0.5]]) == pytest.approx(np.array([[0.5, 1.0, 1.5]]))
     bent = splinepy.helpme.create.disk(1.0).create.extruded([0, 0, 1])
     for name in ("json", "gismo"):
         getattr(splinepy.io, name).export(f"bent.{name}", [bent])
-        with pytest.raises(InputError, match=r"bent\.\w+: .* is rational"):
-            load_volume(f"bent.{name}")
+        body = load_volume(f"bent.{name}")  # a full disk: its first and last angle are one face
+        assert [str(interface) for interface in body.interfaces] == ["p0_v0 = p0_v1"]
+        lower, upper = bent.parametric_bounds  # the angle runs from 0 to 4
+        assert largest(body.patches[0](POINTS) - bent.evaluate(lower + POINTS * (upper - lower))) < 1e-14
 
 
 def test_a_huge_file_is_refused_before_it_is_read(in_folder):

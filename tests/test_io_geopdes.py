@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import ring, row_of
+from bodies import exact_ring, ring, row_of
 from foreign_files import geopdes, geopdes_07, geopdes_patch
 from foreign_models import patch_files
 from glued import POINTS, demand_same
@@ -29,6 +29,16 @@ def test_patches_and_interfaces_are_read(body, in_folder):
 def test_control_points_are_homogeneous(in_folder):
     """All weights are 2: the coordinates in the file are twice those of the control points."""
     demand_same(opened(geopdes(CORNER, scale=2.0), in_folder), CORNER)
+
+
+def test_weights_are_read(in_folder):
+    """Homogeneous coordinates are rounded, and so are those that are made of them."""
+    body = exact_ring()
+    again = opened(geopdes(body), in_folder)
+    assert len(again.interfaces) == 4
+    for one, other in zip(again, body, strict=True):
+        assert np.array_equal(one.weights, other.weights)
+        assert np.abs(one.control_points - other.control_points).max() < 1e-15
 
 
 @pytest.mark.parametrize(

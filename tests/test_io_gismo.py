@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import ring, row_of
+from bodies import exact_ring, ring, row_of
 from foreign_models import patch_files
 from glued import POINTS, demand_same
 
@@ -12,7 +12,12 @@ from parameterize.spline.interface import axis_side, varying
 from parameterize.spline.volume import FACE_NAMES
 
 TURNS = [((0, 1, 2), (False, False, False)), ((1, 2, 0), (True, False, True)), ((2, 1, 0), (False, True, False))]
-BODIES = {"corner": row_of([(0, 0, 0), (1, 0, 0), (1, 1, 0)], TURNS), "ring": ring(1), "three": ring(3)}
+BODIES = {
+    "corner": row_of([(0, 0, 0), (1, 0, 0), (1, 1, 0)], TURNS),
+    "ring": ring(1),
+    "three": ring(3),
+    "exact": exact_ring(),
+}
 
 
 @pytest.fixture(params=BODIES)
@@ -48,17 +53,11 @@ def test_what_was_written_is_read_again(body):
 
 
 def test_gismo_reads_its_patches_and_interfaces(body):
-    """The traces agree in G+Smo, at points that its own map of directions brings to the other patch."""
     pygismo = pytest.importorskip("pygismo")
-    file = pygismo.io.gsFileData(str(iga_nn.export("body.npz", "gismo")))
-    splines = []
-    for number, patch in enumerate(body):
-        spline = pygismo.nurbs.gsTensorBSpline3()
-        file.getId(100 + number, spline)
-        splines.append(spline)
-        assert np.abs(spline.eval(POINTS.T).T - patch(POINTS)).max() < 1e-12
     patches = pygismo.core.gsMultiPatch()
-    file.getId(0, patches)
+    pygismo.io.gsFileData(str(iga_nn.export("body.npz", "gismo"))).getId(0, patches)
+    for number, patch in enumerate(body):
+        assert np.abs(patches.patch(number).eval(POINTS.T).T - patch(POINTS)).max() < 1e-12
     assert patches.nPatches() == len(body)
     assert len(patches.interfaces()) == len(body.interfaces)
     assert len(patches.boundaries()) == sum(map(len, body.outer))
@@ -98,10 +97,16 @@ def test_a_multipatch_chooses_among_the_geometries(in_folder):
     assert [str(interface) for interface in body.interfaces] == ["p0_u0 = p1_u1"]
 
 
+def test_geometries_without_ids_or_with_one_id_are_all_taken(in_folder):
+    """As in G+Smo's own cube.xml and cylinder.xml."""
+    for content in (cube(1) + cube(1, 1), (cube(1) + cube(1, 1)).replace(' id="1"', "")):
+        assert len(opened(f"<xml>{content}</xml>", in_folder).interfaces) == 1
+
+
 @pytest.mark.parametrize(
     ("rows", "says"),
     [
-        ("0 2 1 2 0 1 2 1 1 1", "interface p0_u1 = p1_u1: the file says that they are one"),
+        ("0 2 1 2 0 1 2 1 1 1", "interface p0_u1 = p1_u1: the file says that they are one, .* are 1 apart"),
         ("0 2 4 1 0 1 2 1 1 1", "an interface of its MultiPatch names no patch and side: 4 1"),
         ("0 2 1 x", "an interface of its MultiPatch must be whole numbers"),
     ],
@@ -112,6 +117,27 @@ def test_interfaces_that_are_none_are_refused(rows, says, in_folder):
     )
     with pytest.raises(iga_nn.InputError, match=rf"file\.xml: {says}"):
         opened(f"<xml>{cube(0)}{cube(1, 1)}{chosen}</xml>", in_folder)
+
+
+def test_faces_that_a_file_calls_one_though_they_are_apart(in_folder):
+    """The message has the distance, and a tolerance that makes them one: the first patch stays as it is."""
+    chosen = (
+        '<MultiPatch parDim="3"><patches type="id_range">0 1</patches><interfaces>0 2 1 1</interfaces></MultiPatch>'
+    )
+    text = f"<xml>{cube(0)}{cube(1, 1.001)}{chosen}</xml>"
+    with pytest.raises(iga_nn.InputError, match=r"are 0\.001 apart, 5\.0e-04 of .*tolerance=5\.5e-04\) makes them one"):
+        opened(text, in_folder)
+    body = iga_nn.load_volume("file.xml", tolerance=5.5e-4)
+    assert [str(interface) for interface in body.interfaces] == ["p0_u1 = p1_u0"]
+    assert np.array_equal(body.patches[1].control_points[0], body.patches[0].control_points[-1])
+    assert body.patches[1].control_points[0, 0, 0, 0] == 1.0 and body.patches[1].control_points[1, 0, 0, 0] == 2.001
+
+
+@pytest.mark.parametrize("tolerance", [-1.0, 1.0, float("nan"), "wide"])
+def test_tolerances_that_are_none_are_refused(tolerance, in_folder):
+    (in_folder / "file.xml").write_text(f"<xml>{cube(0)}</xml>")
+    with pytest.raises(iga_nn.InputError, match=r"^tolerance"):
+        iga_nn.load_volume("file.xml", tolerance=tolerance)
 
 
 def test_an_interface_that_is_not_listed_is_told(in_folder, caplog):

@@ -1,11 +1,12 @@
 """MFEM NURBS meshes of several patches: written ones are read by MFEM itself, those of MFEM here and there alike."""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import ring, row_of, turned
+from bodies import exact_ring, ring, row_of, turned
 from foreign_files import mfem_patches
 from foreign_models import patch_files
 from glued import POINTS, demand_same
@@ -13,6 +14,7 @@ from volumes import spans_at
 
 import iga_nn
 from iga_nn.io.mfem import read_mfem
+from parameterize.spline.multipatch import as_multipatch
 from parameterize.spline.orientation import orientation
 
 CORNER = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
@@ -24,6 +26,7 @@ BODIES = {
     "left": row_of(CORNER, LEFT),
     "block": row_of(BLOCK, (WAYS * 3)[:8]),
     "three": ring(3),
+    "exact": exact_ring(),
     "four, twisted": ring(4, shape=(6, 4, 4), degrees=(2, 2, 2), twist=2.0),
 }
 
@@ -107,6 +110,14 @@ def test_a_moebius_strip_is_refused(in_folder):
         iga_nn.export("strip.npz", "mfem")
 
 
+def test_weights_in_proportion_have_no_place(in_folder):
+    body = exact_ring()
+    doubled = [replace(patch, weights=(1 + number % 2) * patch.weights) for number, patch in enumerate(body)]
+    iga_nn.MultiPatch.from_patches(doubled).save("ring.npz")
+    with pytest.raises(iga_nn.InputError, match="multiply the weights of one by their ratio"):
+        iga_nn.export("ring.npz", "mfem")
+
+
 @pytest.mark.parametrize("kind", ["controlpoints", "controlpoints_homogeneous", "controlpoints_cartesian"])
 def test_patches_with_their_own_control_points(kind, in_folder):
     Path("patches.mesh").write_text(mfem_patches(kind, weight=2))
@@ -153,10 +164,28 @@ def test_neighbours_with_other_numbers_of_control_points_are_refused(in_folder):
         iga_nn.load_volume("bad.mesh")
 
 
-def test_models_of_mfem_open(tmp_path):
-    for path in patch_files("beam-hex-nurbs.mesh"):
-        patches, declared = read_mfem(path.read_text())
-        body = iga_nn.load_volume(path)
-        assert (len(patches), len(list(declared)), len(body.interfaces)) == (2, 1, 1)
-        found, _ = in_mfem(path, body)
-        assert np.abs(found - [patch(POINTS) for patch in body]).max() < 1e-12
+def demand_alike(path, patches, interfaces):
+    body = iga_nn.MultiPatch.from_patches(list(as_multipatch(iga_nn.load_volume(path))))
+    assert (len(body), len(body.interfaces)) == (patches, interfaces)
+    found, _ = in_mfem(path, body)
+    assert np.abs(found - [patch(POINTS) for patch in body]).max() < 1e-12
+
+
+@pytest.mark.parametrize(("name", "patches", "interfaces"), [("beam-hex-nurbs.mesh", 2, 1), ("pipe-nurbs.mesh", 4, 4)])
+def test_models_of_mfem_open(name, patches, interfaces):
+    for path in patch_files(name):
+        assert len(list(read_mfem(path.read_text())[1])) == interfaces
+        demand_alike(path, patches, interfaces)
+
+
+@pytest.mark.parametrize(
+    ("name", "patches", "interfaces"),
+    [("ball-nurbs", 7, 18), ("cube-nurbs", 1, 0), ("pipe-nurbs-log", 4, 4), ("beam-hex-nurbs", 2, 1)],
+)
+def test_meshes_that_come_with_mfem_open(name, patches, interfaces):
+    """The unit ball of seven rational patches of degree 4 among them."""
+    package = pytest.importorskip("mfem")
+    path = Path(package.__file__).parent / "external" / "ser" / "data" / f"{name}.mesh"
+    if not path.is_file():
+        pytest.skip(f"{path} does not come with this MFEM")
+    demand_alike(path, patches, interfaces)

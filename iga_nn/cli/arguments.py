@@ -31,7 +31,8 @@ def converted(kind: Any, tokens: Sequence[Token]) -> Any:
 
 Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
 Volume = Annotated[
-    Path, Parameter(help="volume.npz as `iga-nn run` writes it, G+Smo XML, an MFEM NURBS mesh or splinepy's JSON.")
+    Path,
+    Parameter(help="volume.npz as `iga-nn run` writes it, or a file of G+Smo (XML), MFEM, GeoPDEs or splinepy (JSON)."),
 ]
 ObjFile = Annotated[Path | None, Parameter(help="file to write; NAME.obj in the current folder by default.")]
 Overwrite = Annotated[bool, Parameter(help="replace that file where it has other content.")]

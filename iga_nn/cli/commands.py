@@ -246,7 +246,7 @@ def check(
     """Check a surface for acceptance, or certify a volume; write nothing but a picture of regions.
 
     Args:
-        path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM or splinepy).
+        path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM, GeoPDEs or splinepy).
         strict: refuse a surface that intersects itself; by default this is a notice.
         region: regions of the surface, such as "nz > 0.9 and x < 2"; the answer has the area of each region and the
             number of triangles that lie mostly in it; a region without a point of the surface is refused.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.files import replacing
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.multipatch import TOLERANCE, MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
@@ -29,7 +29,6 @@ from ..options import PROBLEMS
 from ..report import document as reports
 from ..type_check import check_type
 from . import gismo, mfem, splinepy, view, vtk
-from .patches import as_several
 from .reading import ENDINGS, READERS, kind_of, read_body
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
@@ -71,7 +70,7 @@ def is_volume(path: str | Path) -> bool:
     )
 
 
-def load_volume(path: str | Path) -> BSplineVolume | MultiPatch:
+def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BSplineVolume | MultiPatch:
     """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh, GeoPDEs geometry file or splinepy JSON.
 
     The kinds are recognized by their beginnings.
@@ -80,6 +79,9 @@ def load_volume(path: str | Path) -> BSplineVolume | MultiPatch:
     ----------
     path : str or Path
         The file.
+    tolerance : float
+        The largest distance of two control points on faces of patches that are taken for one, as a share of the body's
+        size. volume.npz names its interfaces, whose control points are the same.
 
     Returns
     -------
@@ -89,8 +91,8 @@ def load_volume(path: str | Path) -> BSplineVolume | MultiPatch:
     Raises
     ------
     InputError
-        Where the file has no such format, is damaged or rational, where its patches do not fit together, and where
-        splinepy, which reads JSON, is missing.
+        Where the file has no such format or is damaged, where its patches do not fit together, and where splinepy,
+        which reads JSON, is missing.
 
     Examples
     --------
@@ -101,6 +103,9 @@ def load_volume(path: str | Path) -> BSplineVolume | MultiPatch:
     (3, 3, 3)
     """
     check_type("path", path, str | Path)
+    check_type("tolerance", tolerance, float)
+    if not 0.0 <= tolerance < 1.0:
+        raise InputError(f"tolerance {tolerance}: must be 0 or larger, and smaller than 1, the body's size")
     if path == "":
         raise InputError("no volume is named: give a volume.npz, or a file of another program")
     source = Path(path)
@@ -110,8 +115,8 @@ def load_volume(path: str | Path) -> BSplineVolume | MultiPatch:
         kind = kind_of(source) if source.is_file() else "npz"
         if kind is None and source.suffix != ".npz":
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
-        body = read_body(source, kind) if kind in READERS else _load_archive(source)
-    rows = [row for patch in as_several(body) for row in patch.knots]
+        body = read_body(source, kind, tolerance) if kind in READERS else _load_archive(source)
+    rows = [row for patch in as_multipatch(body) for row in patch.knots]
     if min(float(np.diff(np.unique(row)).min()) for row in rows) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
     return body

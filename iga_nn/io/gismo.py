@@ -18,11 +18,11 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.spline.interface import Face, Interface, axis_side, varying
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.field import SplineField
 
-from .patches import as_several, as_text, fastest_first, patch_of
+from .patches import as_text, fastest_first, patch_of
 from .words import finite_numbers
 
 log = logging.getLogger(__name__)
@@ -164,12 +164,12 @@ def write_gismo(path: Path, spline: BSplineVolume | MultiPatch | SplineField, *_
     root = Element("xml")
     if isinstance(spline, SplineField):
         _add_topology(root, 1, (), [FACE_NAMES])
-        _add_patch(root, 0, spline, spline.coefficients)
+        _add_patch(root, 0, spline, spline.coefficients, None)
     else:
-        body = as_several(spline)
+        body = as_multipatch(spline)
         _add_topology(root, len(body), body.interfaces, body.outer)
         for number, patch in enumerate(body):
-            _add_patch(root, number, patch, patch.control_points)
+            _add_patch(root, number, patch, patch.control_points, patch.weights)
     ElementTree.indent(root, " ")
     text = ElementTree.tostring(root, encoding="unicode")
     path.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n', encoding="utf-8")
@@ -200,11 +200,17 @@ def _row(interface: Interface) -> list[int]:
     return [FIRST_ID + p, sides[0], FIRST_ID + q, sides[1], *along, *same]
 
 
-def _add_patch(root: Element, number: int, spline: BSplineVolume | SplineField, net: Array) -> None:
-    node = SubElement(root, "Geometry", type="TensorBSpline3", id=str(FIRST_ID + number))
-    bases = SubElement(node, "Basis", type="TensorBSplineBasis3")
+def _add_patch(
+    root: Element, number: int, spline: BSplineVolume | SplineField, net: Array, weights: Array | None
+) -> None:
+    rational = weights is not None
+    node = SubElement(root, "Geometry", type=VOLUMES[rational], id=str(FIRST_ID + number))
+    outer = SubElement(node, "Basis", type="TensorNurbsBasis3") if rational else node
+    bases = SubElement(outer, "Basis", type="TensorBSplineBasis3")
     for axis, (degree, row) in enumerate(zip(spline.degrees, spline.knots, strict=True)):
         basis = SubElement(bases, "Basis", type="BSplineBasis", index=str(axis))
         SubElement(basis, "KnotVector", degree=str(degree)).text = " ".join(map(repr, row.tolist()))
+    if weights is not None:
+        SubElement(outer, "weights").text = as_text(fastest_first(weights))
     rows = fastest_first(net)
     SubElement(node, "coefs", geoDim=str(rows.shape[1])).text = as_text(rows)

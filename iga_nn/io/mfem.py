@@ -18,14 +18,14 @@ import numpy as np
 
 from parameterize.arrays import Array, Floats, IntArray
 from parameterize.spline.interface import Face
-from parameterize.spline.multipatch import MultiPatch, shared_numbers
+from parameterize.spline.multipatch import MultiPatch, as_multipatch, shared_numbers
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve.field import SplineField
 
 from ..errors import InputError
 from .mfem_layout import CORNERS, FACES, Layout, edges_along
-from .patches import as_several, as_text, patch_of
+from .patches import as_text, patch_of
 from .words import Words
 
 log = logging.getLogger(__name__)
@@ -176,7 +176,7 @@ def write_mfem(path: Path, volume: BSplineVolume | MultiPatch, solution: SplineF
 
     Raises InputError where the degrees of the solution differ, or MFEM has no way to tell the edges of a body apart.
     """
-    body = as_several(volume)
+    body = as_multipatch(volume)
     if solution is not None:
         body = MultiPatch((_on_knots_of(solution, body.patches[0]),))
     mirrored = _left_handed(body)
@@ -184,12 +184,13 @@ def write_mfem(path: Path, volume: BSplineVolume | MultiPatch, solution: SplineF
         log.warning("the volume is left-handed, which MFEM does not take: written with w reversed, w0 and w1 exchanged")
     layout, knots = _layout_of(body, mirrored)
     counts = [len(row) - degree - 1 for degree, row in knots]
-    nets = [_reversed(patch.control_points, back) for patch, back in zip(body, mirrored, strict=True)]
     places = layout.numbers(counts)
     _demand_same(body, mirrored, places)
-    rows = np.empty((layout.size(counts), 3))
-    for place, net in zip(places, nets, strict=True):
-        rows[place] = net
+    rows, weights = np.empty((layout.size(counts), 3)), np.empty(layout.size(counts))
+    for place, patch, back in zip(places, body, mirrored, strict=True):
+        rows[place] = _reversed(patch.control_points, back)
+        weights[place] = 1.0 if patch.weights is None else _reversed(patch.weights, back)
+    _demand_one_weight(body, mirrored, [weights[place] for place in places])
     outer = [
         f"{6 * number + ATTRIBUTES.index(face) + 1} {SQUARE} {_joined(layout.hexahedra[number, FACES[face]])}"
         for number, (faces, back) in enumerate(zip(body.outer, mirrored, strict=True))
@@ -199,7 +200,16 @@ def write_mfem(path: Path, volume: BSplineVolume | MultiPatch, solution: SplineF
     vectors = [f"{degree} {count} {_joined(row)}" for (degree, row), count in zip(knots, counts, strict=True)]
     lines = [HEADS[0], "", "dimension", "3", "", "elements", str(len(cells)), *cells, "", "boundary", str(len(outer))]
     lines += [*outer, "", "edges", str(len(layout.edges)), *map(_joined, layout.edges), "", "vertices"]
-    lines += [str(layout.vertices), "", "knotvectors", str(len(vectors)), *vectors, "", "weights", *["1"] * len(rows)]
+    lines += [
+        str(layout.vertices),
+        "",
+        "knotvectors",
+        str(len(vectors)),
+        *vectors,
+        "",
+        "weights",
+        *map(repr, weights.tolist()),
+    ]
     path.write_text("\n".join([*lines, "", *_space(3), as_text(rows)]) + "\n", encoding="utf-8")
 
 
@@ -320,6 +330,18 @@ def _demand_same(body: MultiPatch, mirrored: Sequence[bool], places: Sequence[In
     theirs = np.concatenate([place.ravel() for place in places])
     if len(np.unique(np.stack([ours, theirs]), axis=1).T) != count or len(np.unique(theirs)) != count:
         raise _cannot_hold()
+
+
+def _demand_one_weight(body: MultiPatch, mirrored: Sequence[bool], weights: Sequence[Array]) -> None:
+    """Raise InputError where patches give a control point that they share other weights."""
+    for number, (patch, back, entered) in enumerate(zip(body, mirrored, weights, strict=True)):
+        if not np.array_equal(
+            entered, np.ones(patch.shape) if patch.weights is None else _reversed(patch.weights, back)
+        ):
+            raise InputError(
+                f"an MFEM mesh has one weight for a control point: patch {number} and a neighbour have weights in "
+                "proportion alone; multiply the weights of one by their ratio, which does not change it"
+            )
 
 
 def _cannot_hold() -> InputError:

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.interface import Face, face_label, face_layer
-from parameterize.spline.multipatch import FLAT, MultiPatch, net_area
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.interface import Face, face_label, face_layer, gap, orientations
+from parameterize.spline.multipatch import FLAT, TOLERANCE, MultiPatch, net_area
+from parameterize.spline.volume import LARGEST, BSplineVolume
 
 log = logging.getLogger(__name__)
 
 WEIGHTS_ALIKE = 1e-12  # relative
+CLOSE = 0.01  # of the body's size: faces that are declared one and nearer than this were rounded or fitted apart
 
 
 def count_of(degrees: Sequence[int], knots: Sequence[Array]) -> int:
@@ -24,22 +25,22 @@ def count_of(degrees: Sequence[int], knots: Sequence[Array]) -> int:
 def patch_of(degrees: Sequence[int], knots: Sequence[Array], rows: Array, weights: Array | None) -> BSplineVolume:
     """Return the volume with these parts, its knots scaled to run from 0 to 1; the map stays.
 
-    rows: control points (n_u n_v n_w, 3), u fastest. weights: (n_u n_v n_w,), None where all are 1. Raises ValueError
-    where the parts do not fit together.
+    rows: control points (n_u n_v n_w, 3), u fastest. weights: (n_u n_v n_w,), None where all are 1; where they are
+    alike the volume is polynomial. Raises ValueError where the parts do not fit together.
     """
     if min(degrees) < 1:
         raise ValueError(f"has the degree {min(degrees)}; a degree is 1 or larger")
     counts = [len(row) - degree - 1 for row, degree in zip(knots, degrees, strict=True)]
     if min(counts) < 1 or len(rows) != count_of(degrees, knots):
         raise ValueError(f"has {len(rows)} control points; degrees and knots ask for {' x '.join(map(str, counts))}")
-    if not all(np.all(np.isfinite(row)) and row[-1] > row[0] for row in knots):
-        raise ValueError("knots must be finite and span an interval")
-    if weights is not None and not 0.0 < weights.max() <= (1.0 + WEIGHTS_ALIKE) * weights.min():  # refuses NaN, too
-        raise ValueError("is rational: its weights are not all equal and positive; only polynomial splines are taken")
+    if not all(np.all(np.abs(row) < LARGEST) and row[-1] - row[0] > 1.0 / LARGEST for row in knots):  # refuses NaN, too
+        raise ValueError(f"knots must be finite and span an interval of {1.0 / LARGEST:g} to {LARGEST:g}")
     k_u, k_v, k_w = ((row - row[0]) / (row[-1] - row[0]) for row in knots)
     p_u, p_v, p_w = (int(p) for p in degrees)
-    net = rows.reshape(*reversed(counts), 3).transpose(2, 1, 0, 3)
-    return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), np.ascontiguousarray(net))
+    net = np.ascontiguousarray(rows.reshape(*reversed(counts), 3).transpose(2, 1, 0, 3))
+    if weights is None or 0.0 < weights.max() <= (1.0 + WEIGHTS_ALIKE) * weights.min():  # polynomial
+        return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), net)
+    return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), net, weights.reshape(*reversed(counts)).transpose(2, 1, 0))
 
 
 def fastest_first(net: Array) -> Array:
@@ -52,21 +53,18 @@ def as_text(rows: Array) -> str:
     return "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
 
 
-def body_of(patches: Sequence[BSplineVolume], declared: Iterable[tuple[Face, Face]] = ()) -> BSplineVolume | MultiPatch:
+def body_of(
+    patches: Sequence[BSplineVolume], declared: Iterable[tuple[Face, Face]] = (), tolerance: float = TOLERANCE
+) -> BSplineVolume | MultiPatch:
     """Return one volume, or the patches with the interfaces that their control points show.
 
-    declared: pairs of faces that the file says are glued. Raises ValueError where one of them has two surfaces, and
-    where the patches do not fit together (`MultiPatch.from_patches`). Interfaces that the file does not name, though it
-    names others, are glued with a notice.
+    declared: pairs of faces that the file says are glued. tolerance: as in `MultiPatch.from_patches`. Raises ValueError
+    where the two faces of a pair are apart, and where the patches do not fit together. Interfaces that the file does
+    not name, though it names others, are glued with a notice.
     """
-    body = MultiPatch.from_patches(patches)
+    body = MultiPatch.from_patches(patches, tolerance)
     _compare(body, [frozenset(pair) for pair in declared])
     return body if len(body) > 1 or body.interfaces else body.patches[0]
-
-
-def as_several(body: BSplineVolume | MultiPatch) -> MultiPatch:
-    """Return a body of one patch or several as several: writers see one kind."""
-    return body if isinstance(body, MultiPatch) else MultiPatch((body,))
 
 
 def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
@@ -78,7 +76,13 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
         if any(patch >= len(body) for patch, _ in faces):
             raise ValueError(f"interface {names}: there are {len(body)} patches, counted from 0")
         if pair not in found and all(_has_area(body, face) for face in faces):
-            raise ValueError(f"interface {names}: the file says that they are one, but their control points differ")
+            apart = min(gap(body.patches, way) for way in orientations(faces[0], faces[-1]))
+            reason = "or weights do not fit together"
+            if np.isfinite(apart):
+                share = apart / _size(body)
+                close = f"; load_volume(path, tolerance={1.1 * share:.1e}) makes them one" if share < CLOSE else ""
+                reason = f"are {apart:.3g} apart, {share:.1e} of the body's size{close}"
+            raise ValueError(f"interface {names}: the file says that they are one, but their control points {reason}")
     if declared and (more := found - set(declared)):
         names = ", ".join(" = ".join(face_label(*face) for face in sorted(pair)) for pair in more)
         log.warning("%s: glued, for their control points are the same, though the file does not list them", names)
@@ -87,5 +91,9 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
 def _has_area(body: MultiPatch, face: Face) -> bool:
     """Return whether a face is a surface, and not shrunk to an edge or a point, where nothing is glued."""
     net = face_layer(body.patches[face[0]].control_points, face[1])
-    size = max(float(np.ptp(patch.control_points, axis=(0, 1, 2)).max()) for patch in body)
-    return net_area(net) > FLAT * size**2
+    return net_area(net) > FLAT * _size(body) ** 2
+
+
+def _size(body: MultiPatch) -> float:
+    points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in body])
+    return float(np.ptp(points, axis=0).max())

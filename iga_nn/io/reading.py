@@ -37,12 +37,13 @@ def kind_of(path: Path) -> str | None:
     return next((kind for mark, kind in marks.items() if head.startswith(mark)), None)
 
 
-def read_body(path: Path, kind: str) -> BSplineVolume | MultiPatch:
+def read_body(path: Path, kind: str, tolerance: float) -> BSplineVolume | MultiPatch:
     """Return the volume of a file of one patch, the body of several patches with their interfaces.
 
-    kind: one of READERS. Raises OSError, and ValueError where the file is damaged, or its patches do not fit together.
+    kind: one of READERS. tolerance: as in `MultiPatch.from_patches`. Raises OSError, and ValueError where the file is
+    damaged, or its patches do not fit together.
     """
     try:
-        return body_of(*READERS[kind](text_of(path)))
+        return body_of(*READERS[kind](text_of(path)), tolerance)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None

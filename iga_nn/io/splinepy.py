@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from parameterize.spline.interface import Face, Interface
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.field import SplineField
 
 from ..errors import InputError, one_line
-from .patches import as_several, fastest_first, patch_of
+from .patches import fastest_first, patch_of
 
 INSTALL = "pip install 'iga-nn[interop]'"
 
@@ -68,7 +68,7 @@ def _named(number: int, spline: Any) -> BSplineVolume:
 
 def write_json(path: Path, spline: BSplineVolume | MultiPatch | SplineField, *_: object) -> None:
     """Write a volume, a body or a solution as splinepy's JSON, which has no place for more."""
-    shown = [spline] if isinstance(spline, SplineField) else as_several(spline)
+    shown = [spline] if isinstance(spline, SplineField) else as_multipatch(spline)
     _splinepy().io.json.export(str(path), [to_splinepy(one) for one in shown])
 
 
@@ -85,9 +85,16 @@ def from_splinepy(spline: Any) -> BSplineVolume:
 
 
 def to_splinepy(spline: BSplineVolume | SplineField) -> Any:
-    """Return a splinepy.BSpline of the same degrees, knots and coefficients. Raises InputError without splinepy."""
-    net = spline.control_points if isinstance(spline, BSplineVolume) else spline.coefficients
-    return _splinepy().BSpline(list(spline.degrees), [row.tolist() for row in spline.knots], fastest_first(net))
+    """Return a splinepy.BSpline of the same degrees, knots and coefficients, of a rational volume a splinepy.NURBS.
+
+    Raises InputError where splinepy is missing.
+    """
+    splinepy, parts = _splinepy(), (list(spline.degrees), [row.tolist() for row in spline.knots])
+    if isinstance(spline, SplineField):
+        return splinepy.BSpline(*parts, fastest_first(spline.coefficients))
+    if spline.weights is None:
+        return splinepy.BSpline(*parts, fastest_first(spline.control_points))
+    return splinepy.NURBS(*parts, fastest_first(spline.control_points), fastest_first(spline.weights))
 
 
 def body_from_splinepy(splines: Any) -> MultiPatch:

@@ -1,5 +1,7 @@
 """Writes and reads the patches of a body in one .npz: p0_degrees, p0_knots_u, .., p1_degrees, .., and `interfaces`.
 
+Rational patches also have p0_weights, ..
+
 A row of `interfaces` has seven whole numbers: patch and face of the one side, patch and face of the other, whether the
 axes are exchanged, and which of them are reversed, as in `Interface`. Faces count as in FACE_NAMES.
 """
@@ -23,6 +25,8 @@ def save_patches(path: str | Path, patches: Sequence[BSplineVolume], interfaces:
     for number, patch in enumerate(patches):
         parts = dict(zip(_names(), (np.array(patch.degrees), *patch.knots, patch.control_points), strict=True))
         arrays |= {f"p{number}_{name}": array for name, array in parts.items()}
+        if patch.weights is not None:
+            arrays[f"p{number}_weights"] = patch.weights
     rows = np.array([_row(interface) for interface in interfaces], dtype=np.int64).reshape(-1, COLUMNS)
     save_arrays(path, interfaces=rows, **arrays)
 
@@ -31,12 +35,14 @@ def load_patches(path: str | Path) -> tuple[tuple[BSplineVolume, ...], tuple[Int
     """Read patches and interfaces. Raises FileNotFoundError, or ValueError that names the defect of the file."""
     count = sum(name.endswith("_degrees") for name in array_names(path))
     names = [f"p{number}_{name}" for number in range(count) for name in _names()]
-    data = load_arrays(path, ("interfaces", *names))
+    data = load_arrays(path, ("interfaces", *names), tuple(f"p{number}_weights" for number in range(count)))
     patches = []
     for number in range(count):
         degrees, *knots, points = (data[f"p{number}_{name}"] for name in _names())
         try:
-            patches.append(BSplineVolume(tuple(degrees.tolist()), tuple(knots), points))  # type: ignore[arg-type]
+            u, v, w = knots
+            weights = data.get(f"p{number}_weights")
+            patches.append(BSplineVolume(tuple(degrees.tolist()), (u, v, w), points, weights))
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: patch {number}: {error}") from None
     rows = data["interfaces"]

@@ -10,7 +10,9 @@ from ..arrays import Floats
 from .volume import FACE_NAMES, BSplineVolume
 
 KNOT_TOLERANCE = 1e-9  # of the interval [0, 1]: files give knots in decimals, and reversed ones are rounded
-WEIGHT_TOLERANCE = 1e-12  # relative: a common factor of all weights, which does not change the trace, is rounded
+WEIGHT_TOLERANCE = (
+    1e-9  # relative: files give weights in decimals, and a common factor of all, which is free, is rounded
+)
 
 Face = tuple[int, str]  # the number of a patch, and the name of one of its faces
 

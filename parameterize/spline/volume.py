@@ -168,13 +168,12 @@ class BSplineVolume(Brief, Shown):
     def from_splinepy(cls, spline: Any) -> "BSplineVolume":
         """Make the volume of a spline of splinepy, its knots scaled to run from 0 to 1; the map stays.
 
-        Raises TypeError for another object, ValueError for a spline that is rational or does not map 3 parameters to 3
-        coordinates.
+        Raises TypeError for another object, ValueError for a spline that does not map 3 parameters to 3 coordinates.
         """
         return above("io.splinepy").from_splinepy(spline)
 
     def to_splinepy(self) -> Any:
-        """Return the same map as a splinepy.BSpline. Raises InputError where splinepy is missing."""
+        """Return the same map as a splinepy.BSpline, or NURBS. Raises InputError where splinepy is missing."""
         return above("io.splinepy").to_splinepy(self)
 
     def to_pyvista(self, samples: int | None = None) -> "pyvista.UnstructuredGrid":

@@ -1,6 +1,9 @@
 """Bodies of several patches by formula for the tests."""
 
+from dataclasses import replace
+
 import numpy as np
+from rational_shapes import quarter_ring
 from volumes import mapped
 
 from parameterize.spline.multipatch import MultiPatch
@@ -10,8 +13,11 @@ from parameterize.spline.volume import BSplineVolume
 def turned(volume, order=(0, 1, 2), back=(False, False, False)):
     """The same volume with its parameters in another order, and then some of them reversed."""
     degrees, knots = (tuple(part[a] for a in order) for part in (volume.degrees, volume.knots))
-    net = volume.control_points.transpose(*order, 3)[tuple(slice(None, None, -1 if b else 1) for b in back)]
-    return BSplineVolume(degrees, tuple(1.0 - k[::-1] if b else k for k, b in zip(knots, back, strict=True)), net)
+    ways = tuple(slice(None, None, -1 if b else 1) for b in back)
+    net = volume.control_points.transpose(*order, 3)[ways]
+    weights = None if volume.weights is None else volume.weights.transpose(order)[ways]
+    knots = tuple(1.0 - k[::-1] if b else k for k, b in zip(knots, back, strict=True))
+    return BSplineVolume(degrees, knots, net, weights)
 
 
 def row_of(places, turns, degrees=(2, 3, 1), shape=(4, 5, 3)):
@@ -29,6 +35,15 @@ def row_of(places, turns, degrees=(2, 3, 1), shape=(4, 5, 3)):
 
     patches = [turned(patch(place), *turn) for place, turn in zip(places, turns, strict=True)]
     return MultiPatch.from_patches(patches)
+
+
+def exact_ring():
+    """A ring with circular walls, of four rational quarters."""
+    quarters, quarter = [], quarter_ring()
+    for number in range(4):
+        turn = np.linalg.matrix_power(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), number)
+        quarters.append(replace(quarter, control_points=quarter.control_points @ turn.T))
+    return MultiPatch.from_patches(quarters)
 
 
 def ring(patches, shape=(6, 4, 3), degrees=(2, 2, 1), twist=0.0):

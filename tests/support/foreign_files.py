@@ -11,11 +11,11 @@ def row(values):
 
 
 def geopdes_patch(volume, name=None, scale=1.0):
-    """Homogeneous control points, all with the weight `scale`."""
+    """Homogeneous control points; all weights are multiplied by `scale`."""
     lines = [name] if name else []
     lines += [row(volume.degrees), row(volume.shape), *map(row, volume.knots)]
-    lines += [row(scale * volume.control_points[..., k].ravel(order="F")) for k in range(3)]
-    return [*lines, row(np.full(np.prod(volume.shape), scale))]
+    weights = scale * (np.ones(volume.shape) if volume.weights is None else volume.weights)
+    return lines + [row((weights * x).ravel(order="F")) for x in (*np.moveaxis(volume.control_points, -1, 0), 1.0)]
 
 
 def geopdes(body: MultiPatch, head="# nurbs mesh v.2.1\n#\n# 24-Jun-2015\n#\n", scale=1.0):

@@ -35,6 +35,7 @@ from pathlib import Path
 import formulas
 import meshio
 import numpy as np
+from bodies import exact_ring
 from foreign_files import geopdes, geopdes_07, mfem_patches
 from mesh_files import (
     CUBE,
@@ -403,7 +404,7 @@ def checkpoint_reader():
 
 def foreign_readers():
     """Files of other programs, of one patch and of several; JSON where the package that reads it is installed."""
-    volumes = [bent(3, 1), bent(3, 2), glued(3, 2)]
+    volumes = [bent(3, 1), bent(3, 2), glued(3, 2), exact_ring()]
     formats = {"gismo": (".xml", gismo.write_gismo), "mfem": (".mesh", mfem.write_mfem)}
     if find_spec("splinepy") is not None:
         formats["json"] = (".json", spline_files.write_json)
@@ -411,7 +412,12 @@ def foreign_readers():
         seeds = [[written(lambda path, v=v, write=write: write(path, v), suffix)] for v in volumes]
         yield Reader(kind, suffix, read_volume, tuple(seeds))
     yield Reader("mfem, patches", ".mesh", read_volume, ([mfem_patches().encode()],))
-    yield Reader("geopdes", ".txt", read_volume, ([geopdes(volumes[2]).encode()], [geopdes_07(volumes[0]).encode()]))
+    yield Reader(
+        "geopdes",
+        ".txt",
+        read_volume,
+        ([geopdes(volumes[2]).encode()], [geopdes_07(volumes[0]).encode()], [geopdes(volumes[3]).encode()]),
+    )
 
 
 FORMULAS = ("exp(x+z)*sin(y)", "1e-3*(x**2-y)/(2+z)-3.5", "-tanh(x*y)**(1/3)+abs(log(z))*pi", "sqrt(e**x)+cos(tan(y))")
@@ -446,6 +452,7 @@ def readers() -> tuple[Reader, ...]:
         meshio_reader("vtu", ".vtu", {"binary": False}, {"compression": None}, {"compression": "zlib"}),
         npz_reader("volume.npz", check, *volumes),
         npz_reader("volume.npz of patches", read_volume, glued(3, 2)),
+        npz_reader("volume.npz, rational", read_volume, exact_ring()),
         npz_reader("solution.npz", given(SplineField.load), *fields),
         npz_reader("boundary.npz", given(BoundaryMap.load), box),
         checkpoint_reader(),

@@ -14,6 +14,8 @@ def demand_same(again, body):
     for one, other in zip(again, body, strict=True):
         assert one.degrees == other.degrees
         assert np.array_equal(one.control_points, other.control_points)
+        assert (one.weights is None) == (other.weights is None)
+        assert one.weights is None or np.array_equal(one.weights, other.weights)
         assert all(np.array_equal(a, b) for a, b in zip(one.knots, other.knots, strict=True))
     assert set(again.interfaces) == set(body.interfaces)
     assert all(gap(again.patches, interface) == 0.0 for interface in again.interfaces)
