@@ -90,7 +90,7 @@ def test_what_is_not_proved_is_named_by_patch():
     body = MultiPatch.from_patches([BSplineVolume((3, 3, 3), (knots,) * 3, net) for net in (first, points)])
     found = certify(body)
     assert found.verdict == "undecided" and len(body.interfaces) == 1
-    flat = "det J is zero, up to rounding, at (0, 0, 0.5)"
+    flat = "det J is zero, up to rounding, at (0.5, 0, 0.5)"
     assert str(found) == f"undecided: p0: {flat}; p1: {flat}"
 
 

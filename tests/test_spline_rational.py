@@ -128,7 +128,6 @@ def test_faces_are_glued_where_their_weights_agree_up_to_a_factor():
     body = MultiPatch.from_patches([inner, replace(outer, weights=3.0 * outer.weights)])
     assert [str(interface) for interface in body.interfaces] == ["p0_u1 = p1_u0"]
     np.testing.assert_array_equal(body.patches[1].weights, 3.0 * outer.weights)
-    with pytest.raises(ValueError, match="p0_u1 and p1_u0 are the same surface, but with other degrees, knots or w"):
-        MultiPatch.from_patches([inner, replace(outer, weights=outer.weights**2)])
+    assert not MultiPatch.from_patches([inner, replace(outer, weights=outer.weights**2)]).interfaces  # no circle
     with pytest.raises(ValueError, match="the control points or weights of the two faces differ"):
         MultiPatch((inner, replace(outer, weights=None)), body.interfaces)
