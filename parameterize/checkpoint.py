@@ -64,8 +64,8 @@ class Checkpoints:
 
     def _demand_own(self, path: Path, found: Any) -> None:
         """Raise CheckpointError for a checkpoint with another identity."""
-        if differing := _differing(json.loads(self._identity), found):
-            raise CheckpointError(f"{path}: belongs to another run ({', '.join(differing)} differ); {_ANEW}")
+        if names := differing(json.loads(self._identity), found):
+            raise CheckpointError(f"{path}: belongs to another run (different: {', '.join(names)}); {_ANEW}")
 
     def save(self, name: str, arrays: Mapping[str, NDArray[Any]], state: Mapping[str, Any]) -> None:
         """Write checkpoint `name`, replacing an older one. Raises OSError naming the file, say on a full disk."""
@@ -110,13 +110,13 @@ def _digest(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, str]) -> st
     return hashlib.sha256(to_bytes(dict(arrays)) + json.dumps(header, sort_keys=True).encode()).hexdigest()
 
 
-def _differing(wanted: Any, found: Any) -> list[str]:
-    """Return the dotted names of the entries in which two tables of plain JSON values differ."""
+def differing(wanted: Any, found: Any) -> list[str]:
+    """Return the dotted names of the entries in which two identities, tables of plain JSON values, differ."""
     names: list[str] = []
     for key in sorted(wanted.keys() | found.keys()):
         ours, theirs = wanted.get(key), found.get(key)
         if isinstance(ours, dict) and isinstance(theirs, dict):
-            names += [f"{key}.{name}" for name in _differing(ours, theirs)]
+            names += [f"{key}.{name}" for name in differing(ours, theirs)]
         elif ours != theirs:
             names.append(key)
     return names

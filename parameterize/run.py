@@ -152,7 +152,7 @@ def parameterize(
         raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
     place, dtype = choose_device(device), choose_precision(dtype)
     given = None if corners is None else corner_vertices(surface, corners)
-    identity = _identity(surface, config, seed, place, dtype, given)
+    identity = identity_of(surface, config, seed=seed, device=place, dtype=dtype, corners=given)
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     history, seconds = History(), dict[str, float]()
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
@@ -188,26 +188,20 @@ def parameterize(
     )
 
 
-def check_checkpoint(
+def identity_of(
     surface: Surface,
     config: Config,
     *,
     seed: int,
     device: str,
-    corners: ArrayLike | None,
-    checkpoint_dir: Path,
     dtype: str = "float32",
-) -> None:
-    """Raise CheckpointError where a run of these arguments of `parameterize` could not go on from that folder."""
-    given = None if corners is None else corner_vertices(surface, corners)
-    identity = _identity(surface, config, seed, choose_device(device), choose_precision(dtype), given)
-    Checkpoints(checkpoint_dir, identity, resume=True).check()
-
-
-def _identity(
-    surface: Surface, config: Config, seed: int, device: str, dtype: str, corners: IntArray | None
+    corners: IntArray | None = None,
 ) -> dict[str, Any]:
-    """Return what the checkpoints of a run are known by."""
+    """Return the identity of a run: the content of its surface and all its options.
+
+    Runs whose identities are equal, see `checkpoint.differing`, make the same map. device: "cpu" or "cuda". corners:
+    (8,), vertex numbers.
+    """
     return {
         "surface": hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest(),
         "config": asdict(config),
