@@ -268,8 +268,8 @@ def build(
         inverses = tuple(map(fast_diagonalization, blocks))
         if isinstance(operator, FormOperator) and inverses[0].singular:
             raise ValueError(
-                f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
-                "solution open: give one face, or a region, a value or an exchange"
+                f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
+                "determine the solution: give a value, or an exchange, on a face or a region"
             )
         loads = load.copy()
         load -= operator.apply(known)

@@ -102,7 +102,7 @@ def test_a_batch_survives_what_happens_to_it(tmp_path):
     os.killpg(interrupted.process.pid, signal.SIGINT)
     assert interrupted.ended() == 130
     last = interrupted.err.read_text().splitlines()[-1]
-    assert last.startswith("iga-nn: interrupted; 2 surfaces: ") and "the same command goes on" in last
+    assert last.startswith("iga-nn: interrupted; 2 surfaces: ") and "run the same command again" in last
     assert (tmp_path / "out" / "held" / "checkpoint" / "training.safetensors").exists()
     assert states(tmp_path)["held"] == "waiting"
 

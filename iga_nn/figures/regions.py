@@ -23,7 +23,7 @@ from .style import panels_of, save, show_around
 
 REST = "0.82"  # the grey of the surface outside of all regions
 SAMPLES = 161  # a direction of a face of the solid
-CELLS = 40_000  # of a surface: large triangles are divided into as many
+CELLS = 40_000  # of a surface: large triangles are divided until there are so many cells
 FINEST = 100  # cells along a side of a triangle
 LINES_UP_TO = 3_000  # triangles: surfaces with more are drawn without outlines
 LONGEST = 60  # letters of a name
@@ -81,7 +81,7 @@ def _first(regions: Sequence[Region], points: Array, normals: Array, face: str =
 
 
 def _palette(count: int) -> Array:
-    """Return as many colours, and that of the rest as the last, (count + 1, 3)."""
+    """Return `count` colours, and last the colour of the rest, (count + 1, 3)."""
     chosen = islice(cycle(colormaps["tab10"].colors), count)  # type: ignore[attr-defined]
     return np.array([*map(to_rgb, chosen), to_rgb(REST)])
 

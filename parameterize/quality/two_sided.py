@@ -1,4 +1,4 @@
-"""The distance between a surface and the boundary of a spline, both ways, at samples that cover all of the two.
+"""The distance between a surface and the boundary of a spline, both ways, at samples all over both.
 
 The vertices of a mesh alone miss the faces between them: a box has eight vertices. So its triangles are cut until every
 span of the spline's boundary has at least two samples a direction, and the spline's spans are sampled, too.
@@ -18,7 +18,7 @@ from ..surface.nearest import distance_to_mesh
 from .distances import Distances, nearest_on_boundary
 
 _PER_SPAN = 2.0  # samples on the mesh a direction, where spans have the mean area
-_LEAST_SAMPLES = 4_000  # about, also for a spline of few spans; halving edges gives two to four times as many
+_LEAST_SAMPLES = 4_000  # about, also for a spline of few spans; halving edges gives two to four times this number
 _MOST_SAMPLES = 100_000  # on the mesh, unless it has more vertices itself
 
 

@@ -24,7 +24,7 @@ def nearest_on_mesh(points: Array, vertices: Array, faces: IntArray) -> tuple[Ar
 def closest_triangles(points: Array, vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Array]:
     """Return the distance (m,) of points (m, 3) to a mesh, the nearest triangles (m,), and barycentric weights (m, 3).
 
-    The weights are those of the nearest point within its triangle.
+    The weights belong to the nearest point within its triangle.
     """
     target = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int64)

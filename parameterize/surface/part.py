@@ -114,7 +114,7 @@ class PartSurface(Brief):
 
     @cached_property
     def normals(self) -> Array:
-        """Return unit normals (m, 3); a triangle too low to have one has that of its neighbour at its longest side."""
+        """Return unit normals (m, 3); a triangle that is too low takes its neighbour's at the longest side."""
         cross = doubled_areas(self.vertices, self.faces)
         double = np.linalg.norm(cross, axis=1)
         corners = self.vertices[self.faces]
@@ -147,7 +147,7 @@ def _best_aligned(
     starts: IntArray,
     around: IntArray,
 ) -> IntArray:
-    """Return the best aligned triangles (k,) within `reach` (k,) among those at the corners of `found` (k,)."""
+    """Return the best aligned triangles (k,) within `reach` (k,) among the triangles at the corners of `found` (k,)."""
     best = found.copy()
     for i in range(len(points)):
         agreement = np.dot(normals[found[i]], given[i])
