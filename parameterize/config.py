@@ -142,8 +142,8 @@ class Config:
             raise ValueError(f"max_control_points must be a whole number, got {max_control_points!r:.80}")
         fewest = self.spline.control_points
         if not fewest <= max_control_points <= MAX_CONTROL_POINTS:
-            given = f"between {fewest} and {MAX_CONTROL_POINTS}, got {max_control_points}"
-            raise ValueError(f"max_control_points must lie {given}")
+            given = f"between {fewest}, the number of the first map, and {MAX_CONTROL_POINTS}"
+            raise ValueError(f"max_control_points must lie {given}, got {max_control_points}")
         return replace(self, refinement=RefinementConfig(tolerance, max_control_points))
 
     def with_control_points(self, n: int) -> Config:

@@ -36,11 +36,7 @@ SHEETS = {
         (
             ("kappa", "Coefficient κ, one formula or six: xx,xy,xz,yy,yz,zz", "1"),
             ("reaction", "Reaction c", "0"),
-            (
-                "exact",
-                "Exact solution u, from which empty data follow",
-                "none; without a source exp(X+Z)*sin(Y)",
-            ),
+            ("exact", "Exact solution u, from which empty data follow", "none; without a source exp(X+Z)*sin(Y)"),
             ("source", "Source f", "that of the exact solution"),
             ("boundary", "Values of u on the faces", "those of the exact solution, or 0"),
         ),

@@ -305,9 +305,8 @@ def _guard(port: Callable[[], int]) -> Any:
             raise web.HTTPForbidden(text=f"this page answers at http://{HOST}:{port()}/ only")
         if len(request.path.encode()) > LONGEST or "\0" in request.path:  # no file can have such a name
             raise web.HTTPNotFound
-        if request.path == "/ws" and not web.WebSocketResponse().can_prepare(
-            request
-        ):  # wslink fails on any other request
+        # wslink fails on other requests
+        if request.path == "/ws" and not web.WebSocketResponse().can_prepare(request):
             raise web.HTTPBadRequest(text="this address takes web sockets only")
         return await handler(request)
 

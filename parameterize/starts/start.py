@@ -125,7 +125,7 @@ def optimized(
     schedule: Schedule,
     task: Task,
     checkpoints: Checkpoints,
-    weights: Weights = Weights(),  # noqa: B008 - frozen
+    weights: Weights = Weights(),
 ) -> Attempt:
     """Return the attempt that the rounds make of a first map, on the knots of `fit`."""
     spline = task.config.spline
