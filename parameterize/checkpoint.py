@@ -1,6 +1,6 @@
 """Checkpoints of a run: arrays and a JSON header in one safetensors file, replaced as a whole.
 
-A checksum over both is kept with them: what is damaged is refused, not computed with.
+A checksum over both is kept with them: a damaged file is refused.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from .files import save_bytes
 FORMAT = 9  # a file of another one is refused by name
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
-_DAMAGED = "remove this file to go on from what was kept before it, or start anew with --force"
+_DAMAGED = "remove this file to continue from an earlier checkpoint, or start anew with --force"
 
 
 class CheckpointError(ValueError):
@@ -30,7 +30,7 @@ class CheckpointError(ValueError):
 class Checkpoints:
     """The checkpoint files of one run in one folder.
 
-    identity: what must be equal for a checkpoint to be continued (surface, options, seed, device); plain JSON values.
+    identity: the surface and all options of the run, as plain JSON values; a checkpoint of another run is refused.
     folder None keeps nothing; `resume` False removes the checkpoints (NAMES) that are there.
     """
 
@@ -50,7 +50,7 @@ class Checkpoints:
     def check(self) -> None:
         """Raise CheckpointError where one of the files in the folder, of any part, is of another version or run.
 
-        Only their headers are read; what is damaged is refused when it is loaded.
+        Only their headers are read; a damaged file is refused when it is loaded.
         """
         for path in sorted(self._folder.glob("*.safetensors")) if self._folder is not None else []:
             try:

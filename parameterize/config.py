@@ -45,14 +45,14 @@ class TrainConfig:
     # nothing is trained; None: every map is trained to the end first.
     easy_loss: float | None = 3.5
     cell: float = 0.12  # edge h of the interior cells (section 4.4.2)
-    triangles: int = 700  # surface triangles sampled in a step; all of them where there are fewer
+    triangles: int = 700  # surface triangles sampled in a step; all where there are fewer
     whiten: bool = True  # start from the affine map that makes the domain equally wide in all directions
     race: float = 0.45  # share of the first stage towards the cube that is trained twice: as G is, and turned
 
 
 @dataclass(frozen=True)
 class SplineConfig:
-    """Fit and control-point optimisation (section 4.3.2); what the terms of the energy read stands beside them."""
+    """Fit and control-point optimisation (section 4.3.2); constants of the energy stand beside its terms."""
 
     control_points: int = 30
     degree: int = 3

@@ -1,6 +1,6 @@
 """Inserts knots where a map needs them and optimises further, until its boundary is close enough to the surface.
 
-Knots that are inserted leave a map as it is, so each further spline stage starts from what the one before has found.
+Knots that are inserted leave a map as it is, so each further spline stage starts from the map of the stage before.
 What it finds is kept where no less is proved of it; else the map before is the result, and that is said.
 """
 
@@ -35,12 +35,12 @@ _log = logging.getLogger(__name__)
 _CHECKPOINT = "knots"
 SHARE = 0.7  # of all that is found lies on the spans that are halved together: fewer would take more refinements
 GROWTH = 2.0  # factor of the number of control points in one refinement, at most: the next one knows better where
-DISTORTION = 0.25  # what the distortion above its limit counts, all squared distances together counting 1
+DISTORTION = 0.25  # the weight of distortion above its limit, where all squared distances together have weight 1
 _NARROWEST = 0.2  # of the first spline's spans: none gets narrower than this share of their length
 _CLOSER = 3.0  # factor of the surface's weight: the boundary counts more once the map is in shape
 _GAIN = 3e-4  # in place of the spline stage's: the first steps on new knots gain little, the later ones more
 ROUNDS = 8  # after a refinement, at most
-POLISH = 3  # of them, while the map is certified, at most
+POLISH = 3  # of these rounds, while the map is certified, at most
 
 Stop = Literal["tolerance met", "limit reached", "no better map"]
 
@@ -125,7 +125,7 @@ def refine(
 
 @dataclass(frozen=True, eq=False)
 class _Spots:
-    """A map at volume 1, and what is found on it and where.
+    """A map at volume 1, with its distances and unproved spans, and their places.
 
     places (n, 3), squares (n,): the parameters of samples on the surface and the spline, and their squared distances
     times the areas they stand for.
@@ -153,7 +153,7 @@ class _Spots:
         return cls(volume, places, squares, unproved, level)
 
     def amounts(self, distortion_share: float) -> list[Array]:
-        """Return for each direction what is found on each of its spans.
+        """Return for each direction the amounts on each of its spans.
 
         Unproved spans, where there are any; else squared distances, and distortion above the limit with a share.
         """

@@ -1,4 +1,4 @@
-"""parameterize: a closed surface to a trivariate B-spline volume, certified where that succeeds."""
+"""parameterize: a closed surface to a trivariate B-spline volume, certified where its proof succeeds."""
 
 import hashlib
 from dataclasses import asdict, dataclass, replace
@@ -59,7 +59,7 @@ class Parameterization(Brief):
     origin : "network", "growth" or "extension"
         Where the map comes from: the trained network, a cube that grew, or an extended layout of the surface.
     attempts : tuple of AttemptReport
-        The starts that were tried, in their order: what each has led to, with rounds and seconds by phase.
+        The starts that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
     refinement : Refinement or None
         With config.refinement, how many control points each direction got, and why no more.
 
@@ -242,7 +242,7 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     if numbers.min() < 0 or numbers.max() >= len(surface.vertices):
         raise ValueError(f"corners: vertex numbers must lie between 0 and {len(surface.vertices) - 1}")
     if len(np.unique(numbers)) != 8:
-        raise ValueError("corners: two of them fall on the same vertex; give eight places farther apart")
+        raise ValueError("corners: two fall on the same vertex; give eight places farther apart")
     return np.asarray(numbers, dtype=np.int64)
 
 

@@ -98,10 +98,10 @@ def run_many(
     mapping: MapOptions = MapOptions(),
     poisson: PoissonOptions = PoissonOptions(),
 ) -> int:
-    """Run many surfaces in worker processes, each into its own folder in --out, with one table of them all.
+    """Run many surfaces in worker processes, each into its own folder in --out, with one table.
 
     batch.csv, batch.json and batch.html are written anew after every surface. The same command again skips finished
-    surfaces, goes on from checkpoints and tries failures once more.
+    surfaces, continues from checkpoints and tries failures once more.
 
     Args:
         surfaces: files, folders, patterns in quotes, names of samples and models, or g1 for the set G1.
