@@ -17,6 +17,13 @@ from small_run import small_surface
 
 from iga_nn.cli.commands import main
 
+PROGRAM = """
+from small_run import tiny_config
+from iga_nn.options import MapOptions
+MapOptions.config = lambda _: tiny_config()  # as in the workers: a result of another config is another run's
+from iga_nn.__main__ import run_and_exit
+run_and_exit()
+"""
 SUPPORT = Path(__file__).resolve().parent / "support"
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 PATIENCE = 900.0  # seconds, on a busy machine
@@ -33,7 +40,7 @@ class Command:
             "DASK_DISTRIBUTED__WORKER__PRELOAD": str(SUPPORT / "batch_worker.py"),
             "TMPDIR": str(scratch),
         }
-        command = [sys.executable, "-P", "-m", "iga_nn", "batch", *arguments, "--refine", "0", "--out", "out"]
+        command = [sys.executable, "-P", "-c", PROGRAM, "batch", *arguments, "--refine", "0", "--out", "out"]
         self.out, self.err = folder / "stdout", folder / "stderr"
         with self.out.open("w") as out, self.err.open("w") as err:
             self.process = subprocess.Popen(

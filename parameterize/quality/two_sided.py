@@ -13,7 +13,7 @@ from ..cube.cutting import subdivide_finely
 from ..spline.bspline import breakpoints
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
-from ..surface.geometry import area_shares, doubled_areas
+from ..surface.geometry import area_shares, normals_and_areas
 from ..surface.nearest import distance_to_mesh
 from .distances import Distances, nearest_on_boundary
 
@@ -74,6 +74,6 @@ def two_sided(volume: BSplineVolume, vertices: Array, faces: IntArray) -> TwoSid
 def _spacing(volume: BSplineVolume, vertices: Array, faces: IntArray) -> float:
     """Return the length above which edges between samples on the mesh are cut."""
     u, v, w = (len(breakpoints(row)) - 1 for row in volume.knots)
-    area = float(np.linalg.norm(doubled_areas(vertices, faces), axis=1).sum()) / 2.0
+    area = float(normals_and_areas(vertices, faces)[1].sum())
     cells = max(_PER_SPAN**2 * 2 * (u * v + v * w + w * u), _LEAST_SAMPLES)
     return float(np.sqrt(area / cells))
