@@ -554,6 +554,20 @@ def test_a_finished_result_belongs_to_the_content_of_its_surface_not_to_the_name
     assert "(different: surface)" in one_line(capsys.readouterr().err)
 
 
+def test_the_device_of_a_finished_result_may_be_that_of_another_machine(formula_training, in_folder, capsys):
+    formula_training()
+    assert main(["parameterize", "cube", "--out", "out"]) == 0
+    report = Path("out/report.json")
+    known = json.loads(report.read_text())
+    known["device"] = known["identity"]["device"] = "cuda"
+    report.write_text(json.dumps(known))
+    assert main(["parameterize", "cube", "--out", "out", "--resume"]) == 0
+    assert main(["parameterize", "cube", "--device", "cuda", "--out", "out", "--resume"]) == 0
+    capsys.readouterr()
+    assert main(["parameterize", "cube", "--device", "cpu", "--out", "out", "--resume"]) == 2
+    assert "(different: device)" in one_line(capsys.readouterr().err)
+
+
 def test_a_finished_result_whose_options_are_not_known_is_not_taken_for_the_same(formula_training, in_folder, capsys):
     formula_training()
     assert main(["parameterize", "cube", "--out", "out"]) == 0

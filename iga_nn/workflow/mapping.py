@@ -60,13 +60,22 @@ class MapInput:
     identity: dict[str, Any]
 
 
-def read_input(mesh: str | Path, mapping: MapOptions) -> MapInput:
-    """Check the options, and read the surface and the corners. Raises MeshError and InputError."""
-    from parameterize.run import corner_vertices, identity_of
-    from parameterize.training.backend import choose_device
+def read_input(mesh: str | Path, mapping: MapOptions, finished: reports.Report | None = None) -> MapInput:
+    """Check the options, and read the surface and the corners. Raises MeshError and InputError.
 
-    with input_errors():
-        config, device = mapping.config(), choose_device(mapping.device)
+    finished: the report of a result that may be that of this run. Then the device need not exist here, and "auto" is
+    the device of that result, because another machine may have computed it.
+    """
+    from parameterize.run import corner_vertices, identity_of
+
+    config = mapping.config()
+    if finished is None:
+        from parameterize.training.backend import choose_device
+
+        with input_errors():
+            device = choose_device(mapping.device)
+    else:
+        device = finished.get("device", "") if mapping.device == "auto" else mapping.device
     with compilation_told():
         surface = resolve(str(mesh), **mapping.reading())
     corners = read_corners(Path(mapping.corners), frame_of(surface)) if mapping.corners else None

@@ -142,7 +142,7 @@ def parameterize_to(
     problem, unknowns = (None, 0) if statement is None else checked(mapping, statement)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
         with state.timed("load"):
-            given = read_input(mesh, mapping)
+            given = read_input(mesh, mapping, state.finished.report if state.finished else None)
         identity = _identity(given, statement)
         if state.finished:
             return _finished_by(identity, state.finished, vector, statement)
@@ -184,7 +184,8 @@ def finished_run(
     report = reports.read(Path(out))
     if report is None or not reports.is_finished(report):
         return None
-    return _finished_by(_identity(read_input(mesh, mapping), statement), Outcome(Path(out), report), vector, statement)
+    identity = _identity(read_input(mesh, mapping, report), statement)
+    return _finished_by(identity, Outcome(Path(out), report), vector, statement)
 
 
 def solve_to(
