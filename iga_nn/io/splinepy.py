@@ -41,7 +41,7 @@ def write_gismo(path: Path, spline: BSplineVolume | SplineField, *_: object) -> 
     """Write a volume or a solution as G+Smo XML, which has no place for more."""
     splinepy = _splinepy()
     patches = splinepy.Multipatch([to_splinepy(spline)])
-    patches.interfaces = np.full((1, 6), -1)  # splinepy cannot search for neighbours of scalar splines
+    patches.interfaces = np.full((1, 6), -1)  # no neighbours: splinepy cannot look for those of scalar splines
     splinepy.io.gismo.export(str(path), patches)
 
 
@@ -135,7 +135,7 @@ def _splinepy() -> Any:
         import splinepy
     except ImportError:
         raise InputError(f"splinepy is needed for this and is missing: {INSTALL}") from None
-    logging.getLogger("splinepy").setLevel("ERROR")  # its warning of a patch without neighbours
+    logging.getLogger("splinepy").setLevel("ERROR")  # it warns that one patch has no neighbours
     return splinepy
 
 

@@ -21,10 +21,10 @@ from .volume import BSplineVolume
 
 CLOSE = 1e-10  # distance from x, over the diagonal of the box of control points, at which F(u, v, w) counts as x
 _STEPS = 20  # of Newton's method, at most
-_HALVINGS = 8  # of a step that does not reduce the distance, at most
-_EXACT = 1e-15  # distance over the diagonal that rounding leaves
+_HALVINGS = 8  # of a step that does not lead closer, at most
+_EXACT = 1e-15  # distance over the diagonal at which nothing is left to gain
 _LEVELS = 120  # of branch and bound, at most
-_VISITS = 20_000  # parts searched for a point, at most: a bound for maps that fold
+_VISITS = 20_000  # parts looked at for a point, at most: a bound for maps that fold
 _PIECE = 4096  # points a task
 
 
@@ -109,7 +109,7 @@ class _Index:
 
 
 def bezier_nets(volume: BSplineVolume) -> Array:
-    """Return the Bezier control points (s, p_u + 1, p_v + 1, p_w + 1, 3) of all spans; spans of w run fastest."""
+    """Return the Bezier control points (s, p_u + 1, p_v + 1, p_w + 1, 3) of all spans, those of w fastest."""
     net = volume.control_points
     for axis, (knots, degree) in enumerate(zip(volume.knots, volume.degrees, strict=True)):
         first, weights = extraction(knots, degree)
@@ -226,7 +226,7 @@ def _holds(low: Array, high: Array, point: Array) -> bool:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _halve(point: Array, stack: Array, boxes: Array, levels: IntArray, top: int, margin: float) -> int:
-    """Replace the part at `top` by its halves whose boxes hold the point; return the new number of parts.
+    """Put those halves of the part at `top` in its place whose boxes hold the point; return the number of parts then.
 
     The part is halved in the direction in which its control points lie farthest apart (de Casteljau).
     """
@@ -278,7 +278,7 @@ def _newton(
     diagonal: float,
     found: Array,
 ) -> bool:
-    """Solve F(u, v, w) = x from `begin` in the cube; write the parameters of a solution into `found`."""
+    """Solve F(u, v, w) = x from `begin` in the cube; write the parameters into `found` where that succeeds."""
     where, trial = begin.copy(), begin.copy()
     value, jacobian = np.empty(3), np.empty((3, 3))
     _evaluate(where, knots, degrees, control, basis, value, jacobian)
