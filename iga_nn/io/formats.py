@@ -167,7 +167,7 @@ def export(
     samples : int, optional
         Of a view: cells a span of the solution and direction; by default 3, fewer where they were more than a million.
     quantity : names, optional
-        Of a view: the quantities in place of those; names of the law, as "principal".
+        Of a view: other quantities of the law, by their names, such as "principal".
     force : bool
         Replace a file that exists.
 

@@ -1,7 +1,7 @@
 """B-splines: knot vectors, basis values and derivatives, collocation, knot insertion, tensor-product evaluation.
 
 A knot vector is *open*: its first and last `degree + 1` knots coincide. The basis has `len(knots) - degree - 1`
-functions. Recurrences are those of Piegl and Tiller, *The NURBS Book* (2nd ed.), chapter 2.
+functions. The recurrences are from Piegl and Tiller, *The NURBS Book* (2nd ed.), chapter 2.
 scipy.interpolate is slow to load: it is imported where it is used.
 """
 
