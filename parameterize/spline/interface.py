@@ -32,6 +32,13 @@ class Interface:
         Whether the first direction of the one face is the second direction of the other.
     flipped : two bool
         Whether the two faces run in opposite ways along the first and the second direction of the first face.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
+    >>> print(iga_nn.MultiPatch(tuple(halves), (iga_nn.Interface((0, "u1"), (1, "u0")),)).interfaces[0])
+    p0_u1 = p1_u0
     """
 
     first: Face
