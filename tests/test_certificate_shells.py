@@ -42,10 +42,23 @@ def test_two_bodies_beside_each_other():
     assert check_boundary(MultiPatch((box(0.0, 1.0), box(1.5, 1.0)))).injective is True
 
 
-def test_a_body_inside_another_one_is_not_called_one_to_one():
+def test_a_body_inside_another_one():
     found = check_boundary(MultiPatch((box(0.0, 3.0), box(1.0, 1.0))))
-    assert found.injective is None and found.overlap is None and found.undecided == 0
+    assert found.injective is False and found.overlap is True and found.undecided == 0
 
 
-def test_a_body_in_the_void_of_another_one_is_not_decided():
-    assert check_boundary(MultiPatch.from_patches([*cells(HOLLOW), box(1.2, 0.6)])).injective is None
+def test_a_body_in_the_void_of_another_one():
+    assert check_boundary(MultiPatch.from_patches([*cells(HOLLOW), box(1.2, 0.6)])).injective is True
+
+
+def test_a_body_around_the_void_of_another_one():
+    """Neither body contains the other: one has a void, which the other one fills, and more around it."""
+    places = [place for place in grid(5, 5, 5).tolist() if place != [2, 2, 2]]
+    assert check_boundary(MultiPatch.from_patches([*cells(places), box(1.5, 2.0)])).injective is False
+
+
+def test_a_body_in_the_corner_of_an_angle():
+    """The second body lies within the box around the first one."""
+    angle = cells([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    moved = patch(lambda u, v, w: (1.25 + 0.5 * u, 1.25 + 0.5 * v, 0.25 + 0.5 * w))
+    assert check_boundary(MultiPatch.from_patches([*angle, moved])).injective is True

@@ -47,7 +47,7 @@ def _draw_around(
 def draw_cut(path: str | Path | None, volume: BSplineVolume) -> Figure:
     """Draw the volume without one octant of the cube (the paper's Fig. 9): parameter lines, and the distortion.
 
-    The octant and the view are those that show most of the cut.
+    Octant and view are chosen so that most of the cut is seen.
     """
     named, field = patches_of(points_of(volume).patches, EVERY), distortion_of(volume)
     octant, view = best_cut(named[:6], orientation(volume))

@@ -1,4 +1,4 @@
-"""Chooses by which factor displacements are drawn enlarged, so that a deformation is seen."""
+"""Chooses the factor of drawn displacements, so that a deformation is seen."""
 
 import math
 
@@ -10,11 +10,11 @@ from .fields import quantities_of, solution_of
 from .style import SMALLEST
 
 SHARE = 0.08  # of the diagonal of the body's box: the largest displacement as drawn
-DIGITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # that a factor may begin with; each at most 1.5 times the one before
+DIGITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # first digits of a factor; each is at most 1.5 times the one before
 
 
 def is_displacement(solution: SplineField) -> bool:
-    """Return whether a solution is a vector of three components whose law gives von Mises' stress, or is not known."""
+    """Return whether a solution has three components, and a law that is unknown or gives von Mises' stress."""
     quantities = quantities_of(solution)
     return solution.coefficients.shape[3:] == (3,) and (quantities is None or "von_mises" in quantities)
 

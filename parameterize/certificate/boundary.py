@@ -51,8 +51,8 @@ class Meeting:
 class BoundaryCheck:
     """Whether a boundary is injective, and a point where it is not.
 
-    injective: True where proved, False where `meeting` was found (up to rounding) or parts of the body `overlap`, None
-    where neither succeeded.
+    injective: True where proved, False where a `meeting` or an `overlap` was found (up to rounding), None where neither
+    succeeded.
     undecided: the number of pairs of pieces left without a proof.
     overlap: whether the body encloses a place twice although its boundary meets nowhere, such as a body inside another
     one; None where that is not known, or the boundary not proved to meet nowhere.

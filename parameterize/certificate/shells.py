@@ -5,39 +5,36 @@ may wind twice around a line between two shells that both face outward (docs/cer
 one part is one-to-one, exactly one shell faces outward.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Mask
 from ..spline.interface import axis_side, face_layer
 from ..spline.multipatch import MultiPatch, shared_numbers
 from ..spline.orientation import exact_rules, face_flux, orientation
+from ..spline.volume import BSplineVolume
 
 _ROUNDING = 1e-9  # of the sum of their magnitudes: more than the integrals over faces can be off
+
+BoundaryFace = tuple[int, int, int]  # the number of a patch, and the constant axis and the side of its face
 
 
 def overlap(body: MultiPatch) -> bool | None:
     """Return whether the shells of a boundary that does not meet itself enclose a place twice; None where not known.
 
-    body: near the origin, of which each patch has a det J of one sign, on both sides of every interface.
+    body: near the origin; its patches have a det J of one sign and lie on opposite sides of their interfaces.
     """
     parts, shells = _parts(body), _shells(body)
     part_of_shell = np.array([parts[faces[0][0]] for faces in shells])
-    alone = np.bincount(part_of_shell, minlength=parts.max() + 1) == 1  # such a shell can but face outward
-    outward = np.ones(len(shells), dtype=np.int64)
-    doubtful = np.flatnonzero(~alone[part_of_shell])
-    signs = [orientation(patch) for patch in body] if len(doubtful) else []
-    for i in doubtful:
-        value, error = _signed_volume(body, signs, shells[i])
-        if abs(value) <= error:
-            return None
-        outward[i] = value > 0.0
-    if np.any(np.bincount(part_of_shell, weights=outward, minlength=len(alone)) != 1):
+    outward = _outward(body, shells, np.bincount(part_of_shell)[part_of_shell] == 1)
+    if outward is None:
+        return None
+    if np.any(np.bincount(part_of_shell[outward], minlength=parts.max() + 1) != 1):
         return True
-    return None if _may_be_nested(body, parts) else False
+    return any(_lies_in_another_part(body, parts, shells[i][0]) for i in np.flatnonzero(outward))
 
 
 def _parts(body: MultiPatch) -> IntArray:
@@ -45,8 +42,8 @@ def _parts(body: MultiPatch) -> IntArray:
     return _groups(len(body), [(one.first[0], one.second[0]) for one in body.interfaces])
 
 
-def _shells(body: MultiPatch) -> list[list[tuple[int, int, int]]]:
-    """Return the shells, each a list of its faces: patch, axis and side. Faces with a common edge are in one shell."""
+def _shells(body: MultiPatch) -> list[list[BoundaryFace]]:
+    """Return the shells, each a list of its faces. Faces with a common edge are in one shell."""
     numbers, count = shared_numbers([(3, 3, 3)] * len(body), body.interfaces)  # a number for the middle of each edge
     faces = [(k, name) for k, names in enumerate(body.outer) for name in names]
     pairs = [
@@ -64,37 +61,38 @@ def _groups(count: int, pairs: Sequence[tuple[int, int]]) -> IntArray:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _signed_volume(
-    body: MultiPatch, signs: Sequence[int], faces: Iterable[tuple[int, int, int]]
-) -> tuple[float, float]:
-    """Return the volume that a shell encloses, negative where it faces a void, and a bound of its rounding error.
+def _outward(body: MultiPatch, shells: Sequence[Sequence[BoundaryFace]], alone: Mask) -> Mask | None:
+    """Return the mask of the shells that face outward; None where rounding hides it.
 
-    signs: of det J of each patch.
+    alone: whether a shell is the only one of its part, which can but face outward.
     """
-    terms = [
-        signs[k] * face_flux(body.patches[k], exact_rules(body.patches[k]), axis, side, np.zeros(3))
-        for k, axis, side in faces
-    ]
-    return sum(terms), _ROUNDING * sum(map(abs, terms))
+    outward = alone.copy()
+    signs = [] if alone.all() else [orientation(patch) for patch in body]
+    for i, faces in enumerate(shells):
+        if alone[i]:
+            continue
+        terms = [signs[face[0]] * _flux(body, face) for face in faces]
+        if abs(sum(terms)) <= _ROUNDING * sum(map(abs, terms)):
+            return None
+        outward[i] = sum(terms) > 0.0
+    return outward
 
 
-def _may_be_nested(body: MultiPatch, parts: IntArray) -> bool:
-    """Return whether all corners of some part's patches lie within the box around another part's control points."""
-    nets = [
-        [patch.control_points for patch, part in zip(body, parts, strict=True) if part == k]
-        for k in range(parts.max() + 1)
-    ]
-    boxes = [np.concatenate([net.reshape(-1, 3) for net in own]) for own in nets]
-    corners = [np.concatenate([_corners(net) for net in own]) for own in nets]
-    return any(
-        bool(np.all((corner >= box.min(axis=0)) & (corner <= box.max(axis=0))))
-        for i, corner in enumerate(corners)
-        for j, box in enumerate(boxes)
-        if i != j
-    )
+def _flux(body: MultiPatch, face: BoundaryFace) -> float:
+    """Return the part of the volume that a face contributes where its patch is right-handed."""
+    k, axis, side = face
+    return face_flux(body.patches[k], exact_rules(body.patches[k]), axis, side, np.zeros(3))
 
 
-def _corners(net: Array) -> Array:
-    """Return the control points (8, 3) of a patch's corners, which lie on the patch."""
-    a, b, c = (n - 1 for n in net.shape[:3])
-    return net[::a, ::b, ::c].reshape(8, 3)
+def _lies_in_another_part(body: MultiPatch, parts: IntArray, face: BoundaryFace) -> bool:
+    """Return whether a corner of a face is a point of another part."""
+    k, axis, side = face
+    corner = body.patches[k].face(axis, side)[0, 0]
+    others = (patch for patch, part in zip(body, parts, strict=True) if part != parts[k])
+    return any(_in_box(corner, patch) and bool(np.all(np.isfinite(patch.locate(corner)))) for patch in others)
+
+
+def _in_box(point: Array, patch: BSplineVolume) -> bool:
+    """Return whether a point (3,) lies in the box of a patch's control points."""
+    net = patch.control_points
+    return bool(np.all((point >= net.min(axis=(0, 1, 2))) & (point <= net.max(axis=(0, 1, 2)))))

@@ -218,7 +218,7 @@ def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float)
             one, other = (_samples(patches[p], name) for p, name in (faces[i], faces[j]))
             if _same_points(one, other, tolerance):
                 raise ValueError(
-                    f"{face_label(*faces[i])} and {face_label(*faces[j])} are the same surface, but with other degrees, "
+                    f"{face_label(*faces[i])} and {face_label(*faces[j])} are the same surface, but of other degrees, "
                     "knots or weights: give both faces the same ones"
                 )
             continue  # two surfaces over the same corners
