@@ -71,6 +71,15 @@ def test_refinement_keeps_the_map(volume):
     np.testing.assert_allclose(fine.jacobian(x), volume.jacobian(x), atol=1e-12)
 
 
+def test_parts_of_a_ring_lie_on_its_circles_and_are_glued():
+    parts = quarter_ring().divided(v=[0.3, 0.5])
+    for part, (low, high) in zip(parts, ((0.0, 0.3), (0.3, 0.5), (0.5, 1.0)), strict=True):
+        places = points_inside()
+        whole = np.stack([places[:, 0], low + (high - low) * places[:, 1], places[:, 2]], axis=1)
+        np.testing.assert_allclose(part(places), quarter_ring()(whole), atol=1e-14)
+    assert len(MultiPatch.from_patches(parts).interfaces) == 2
+
+
 def test_moved_and_mirrored():
     volume, x = bent_bar(), points_inside()
     moved = volume.transformed(2.5, [1.0, -2.0, 3.0])
