@@ -97,7 +97,7 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
                 reason = f"are {apart:.3g} apart, {share:.1e} of the body's size{close}"
             raise ValueError(f"interface {names}: the file says that they are one, but their control points {reason}")
     if declared and (more := found - set(declared)):
-        names = ", ".join(" = ".join(face_label(*face) for face in sorted(pair)) for pair in more)
+        names = ", ".join(" = ".join(face_label(*face) for face in pair) for pair in sorted(map(sorted, more)))
         log.warning("%s: glued, for their control points are the same, though the file does not list them", names)
 
 
