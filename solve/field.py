@@ -10,12 +10,14 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
+from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.quality.distances import nearest_on_boundary
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
+ARRAYS = ("degrees", "knots_u", "knots_v", "knots_w", "coefficients")  # of a patch in solution.npz
 FARTHEST = 1e4  # of the volume's size: from there rounding hides which point of it is nearest
 
 
@@ -193,6 +195,32 @@ class MultiPatchField(Brief):
 
     patches: tuple[SplineField, ...]
 
+    def save(self, path: str | Path) -> None:
+        """Write solution.npz of several patches (p0_degrees, .., p0_coefficients, p1_degrees, ..) atomically."""
+        save_arrays(path, **arrays_of(self.patches, [patch.coefficients for patch in self.patches]))
+
+    @staticmethod
+    def load(path: str | Path) -> "MultiPatchField":
+        """Read the field of a solution.npz of several patches, without its maps and report.
+
+        Raises FileNotFoundError, or a ValueError that names the defect of the file.
+        """
+        count = sum(name.endswith("_degrees") for name in array_names(path))
+        if count == 0:
+            raise ValueError(f"{path}: holds no solution on several patches")
+        arrays = load_arrays(path, tuple(f"p{number}_{name}" for number in range(count) for name in ARRAYS))
+        patches = []
+        for number in range(count):
+            degrees, *knots, coefficients = (arrays[f"p{number}_{name}"] for name in ARRAYS)
+            if coefficients.dtype.kind != "f" or not np.all(np.isfinite(coefficients)):
+                raise ValueError(f"{path}: patch {number}: coefficients must be finite numbers")
+            try:
+                p_u, p_v, p_w = degrees.tolist()
+                patches.append(SplineField((p_u, p_v, p_w), (knots[0], knots[1], knots[2]), coefficients))
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{path}: patch {number}: {error}") from None
+        return MultiPatchField(tuple(patches))
+
     def probe(self, points: ArrayLike) -> Array:
         """Return the values (m,) or (m, c) at points (m, 3) in space, in the body's units; NaN outside of the body.
 
@@ -216,3 +244,12 @@ class MultiPatchField(Brief):
             and len(body) == len(self.patches)
             and all(field.fits(volume) for field, volume in zip(self.patches, body.patches, strict=True))
         )
+
+
+def arrays_of(patches: Sequence[SplineField], coefficients: Sequence[Array]) -> dict[str, Array]:
+    """Return the arrays of an .npz of several patches by their names, such as p0_degrees and p0_coefficients."""
+    found: dict[str, Array] = {}
+    for number, (patch, values) in enumerate(zip(patches, coefficients, strict=True)):
+        parts = (np.array(patch.degrees), *patch.knots, values)
+        found |= {f"p{number}_{name}": array for name, array in zip(ARRAYS, parts, strict=True)}
+    return found

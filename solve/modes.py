@@ -18,7 +18,7 @@ from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 
 from .diagnostics import ConvergenceError
-from .field import MultiPatchField
+from .field import MultiPatchField, arrays_of
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .options import SolveOptions
 from .solver import discretized
@@ -74,10 +74,16 @@ class Modes(Brief):
         }
 
     def save(self, path: str | Path) -> None:
-        """Write degrees, knots_u, knots_v, knots_w, coefficients (n, m_u, m_v, m_w, ..) and frequencies atomically."""
+        """Write degrees, knots_u, knots_v, knots_w, coefficients (n, m_u, m_v, m_w, ..) and frequencies atomically.
+
+        Of several patches there are p0_degrees, .., p0_coefficients, p1_degrees, .. in their place.
+        """
         first = self.shapes[0]
         if isinstance(first, MultiPatchField):
-            raise ValueError("modes of several patches are not saved")
+            each = zip(*(shape.patches for shape in self.shapes), strict=True)
+            stacked = [np.stack([field.coefficients for field in fields]) for fields in each]
+            save_arrays(path, **arrays_of(first.patches, stacked), frequencies=self.frequencies)
+            return
         rows = dict(zip(("knots_u", "knots_v", "knots_w"), first.knots, strict=True))
         coefficients = np.stack([shape.coefficients for shape in self.shapes])
         degrees = np.array(first.degrees)

@@ -245,6 +245,16 @@ class MultiPatchSolution(MultiPatchField, Shown):
         """Return the least and the largest value of a quantity of one number a point, and their places."""
         return _outermost([patch.extremes(what) for patch in self.patches])
 
+    def plot(self, what: str = "values", file: str | Path | None = None) -> "Figure":
+        """Return a figure of the solution; as `Solution.plot`."""
+        return above("figures.solution").plot_solution(self, what, file)
+
+    def to_pyvista(
+        self, samples: int | None = None, quantities: Iterable[str] | Mapping[str, Quantity] | None = None
+    ) -> "pyvista.UnstructuredGrid":
+        """Return the body as a grid of pyvista with the solution, the cell data `patch`; as `Solution.to_pyvista`."""
+        return above("io.view").grid(self.geometry, self, self.problem, samples, quantities)
+
     def all_extremes(self) -> dict[str, Extremes]:
         """Return the extremes of a report, by name (`problem.form.reported`)."""
         each = [patch.all_extremes() for patch in self.patches]

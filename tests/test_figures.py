@@ -91,12 +91,12 @@ def test_no_value_that_is_drawn_lies_outside_the_range():
     ):
         assert max(values.max() for values in field.everywhere) <= field.limits.high
         is_lowest = field.limits.logarithmic or min(values.min() for values in field.everywhere) >= field.limits.low
-        assert is_lowest and field.lattice.shape == (fields.LATTICE,) * 3
+        assert is_lowest and field.lattices[0].shape == (fields.LATTICE,) * 3
 
 
 def test_a_field_is_sampled_once_for_all_its_pictures(monkeypatch):
     volume, other, calls = benchmark_volume(1), benchmark_volume(1), []
-    monkeypatch.setattr(fields, "sampled", lambda found_at: calls.append(found_at) or fields.Samples([], np.zeros(1)))
+    monkeypatch.setattr(fields, "sampled", lambda found_at: calls.append(found_at) or fields.Samples([], []))
     assert fields.points_of(volume) is fields.points_of(volume) and len(calls) == 1
     assert fields.points_of(other) is not fields.points_of(volume) and len(calls) == 2
 
@@ -155,11 +155,11 @@ def test_cut_shows_the_inside(tmp_path, drawing):
 def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
     cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
     volume = replace(cube, control_points=cube.control_points * size)
-    patches = octant.patches_of([sampling.points_on(volume, grid) for grid in sampling.all_grids(9)])
+    patches = octant.patches_of(volume, [sampling.points_on(volume, grid) for grid in sampling.all_grids(9)])
     corner, view = octant.best_cut(patches[:6])
     outward = 2.0 * np.array(corner) - 1.0
     assert np.all(np.sign(view.towards) == outward)
-    shown = octant.without_octant(patches, corner)
+    shown = octant.visible(volume, patches, octant.only(corner))
     offsets = [(patch.points.reshape(-1, 3) / size - 0.5) * outward for patch in shown]
     assert not np.any(np.all(np.concatenate(offsets) > 1e-9, axis=1))  # nothing of the octant's outside
     planes = [np.flatnonzero(np.all(np.abs(offset) < 1e-12, axis=0)) for offset in offsets]

@@ -47,7 +47,7 @@ def test_a_body_is_deformed_and_a_temperature_is_not(stretched):
 def test_the_solution_of_a_body_is_its_stress(stretched):
     """Strain 0.01 along x alone, lambda = mu = 40: the stress is diag(1.2, 0.4, 0.4), von Mises' 0.8."""
     stress = fields.fields_of(stretched[1])[0]
-    assert stress.name == "von Mises" and np.abs(stress.lattice - 0.8).max() < 1e-6
+    assert stress.name == "von Mises" and np.abs(stress.lattices[0] - 0.8).max() < 1e-6
     if not rendering.can_draw():
         pytest.skip(f"VTK cannot draw on this machine; remedy: {rendering.REMEDY}")
     figure = draw_solution(None, *stretched)

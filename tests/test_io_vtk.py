@@ -9,7 +9,7 @@ from glued import POINTS
 from volumes import spans_at
 
 import iga_nn
-from iga_nn.io.vtk import cells_of_patches
+from iga_nn.io.vtk import bezier_cells
 
 WAYS = [((0, 1, 2), (False, False, False)), ((1, 2, 0), (True, False, True)), ((1, 0, 2), (False, False, False))]
 CORNER = row_of([(0, 0, 0), (1, 0, 0), (1, 1, 0)], WAYS)  # the third patch is left-handed
@@ -46,7 +46,7 @@ def test_the_surface_of_the_grid_is_that_of_the_body(body):
         for number, faces in enumerate(body.outer)
         for name in faces
     )
-    grid = cells_of_patches(body)
+    grid = bezier_cells(body, None)
     faces = {}
     for cell in range(grid.n_cells):
         for face in grid.get_cell(cell).faces:

@@ -365,9 +365,9 @@ def test_element_lines_are_those_of_the_solutions_mesh(chromium, tmp_path):
     """A cube of 3 x 3 x 3 elements as seen along x: two dark lines cross a row, at a third and at two thirds."""
     volume = benchmark_volume(3, amplitude=0.0)
     scene = scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="x")))
-    assert scene["spans"] == [pytest.approx([0, 1 / 3, 2 / 3, 1])] * 3
+    assert scene["spans"] == [[pytest.approx([0, 1 / 3, 2 / 3, 1])] * 3]
     finer = scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="x"), refine=1))
-    assert [len(row) for row in finer["spans"]] == [7, 7, 7]
+    assert [len(row) for row in finer["spans"][0]] == [7, 7, 7]
     row = """(() => {
       const gl = document.getElementById("view").getContext("webgl2"), w = gl.drawingBufferWidth;
       const data = new Uint8Array(4 * w);

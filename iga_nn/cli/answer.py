@@ -60,10 +60,18 @@ def _level(level: dict[str, Any]) -> str:
 
 def volume_in_words(facts: reports.Report) -> str:
     """Return the facts of `check` about a volume as text, the verdicts first."""
-    others = {key: value for key, value in facts.items() if key not in ("bijective", "boundary_injective")}
+    others = {key: value for key, value in facts.items() if key not in ("bijective", "boundary_injective", "patches")}
     report = {"parameterization": facts}
     proved = {reports.claim(report): facts["bijective"], "one-to-one": reports.one_to_one(report)}
-    return "\n".join([*(f"{name:16s} {text}" for name, text in proved.items()), facts_in_words(others)])
+    parts = [f"{f'p{number}:':16s} {_patch(part)}" for number, part in enumerate(facts.get("patches", ()))]
+    return "\n".join([*(f"{name:16s} {text}" for name, text in proved.items()), facts_in_words(others), *parts])
+
+
+def _patch(part: reports.Report) -> str:
+    """Return the facts of one patch of several as text."""
+    size, degrees = reports.size_in_words(part), ", ".join(map(str, part["degrees"]))
+    hand = "" if part["orientation"] == "right-handed" else f", {part['orientation']}"
+    return f"{part['bijective']}, {size} control points, degrees {degrees}{hand}"
 
 
 def surface_in_words(facts: dict[str, Any]) -> str:

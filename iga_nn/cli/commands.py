@@ -253,7 +253,7 @@ def check(
         picture: PNG of the surface to write, with the regions in colours.
         force: replace an existing picture.
     """
-    from ..io.formats import is_volume, load_one_patch
+    from ..io.formats import is_volume, load_volume
     from ..models import resolve
     from ..report import document as reports
     from ..workflow.verdict import certified_facts
@@ -273,7 +273,7 @@ def check(
     if surface != SurfaceOptions() or strict or region or picture:
         options = "--component, --max-faces, --decimate, --strict, --region and --picture"
         raise InputError(f"{path}: is a volume; {options} are for surfaces")
-    facts = certified_facts(load_one_patch(path))
+    facts = certified_facts(load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
 

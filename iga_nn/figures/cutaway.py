@@ -1,15 +1,23 @@
-"""Cuts the volume open: images of the cube's faces and mid-sections, with one of the eight octants left out."""
+"""Cuts a body open: images of the cubes' faces and mid-sections without some of each cube's eight octants.
 
-from collections.abc import Sequence
+Of a volume one octant is left out, of several patches the octants on one side of a plane.
+"""
+
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
-from parameterize.arrays import Array
-from parameterize.spline.volume import AXES
+from parameterize.arrays import Array, Mask
+from parameterize.spline.interface import face_layer
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.orientation import orientation
+from parameterize.spline.volume import AXES, FACE_NAMES
 
-from .evaluate import FACE_COLORS
+from .evaluate import Body
+from .fields import Samples
+from .palette import face_colors
 from .render import Patch, View, plain_patch, view_of
 
 Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
@@ -17,17 +25,50 @@ Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u
 INSIDE = "#e9e6df"  # colour of the sections, unlike the six colours of the faces
 
 
-def patches_of(points: Sequence[Array], every: int = 0) -> list[Patch]:
-    """Return the images of the six faces, each in its colour, then those of u, v and w = 1/2, in one colour.
+def patches_of(body: Body, points: Sequence[Array], every: int = 0) -> list[Patch]:
+    """Return the images of each patch's six faces, in their colours, and of u, v and w = 1/2, in one colour.
 
     points: on each (m, n, 3). every: as in Patch.
     """
-    places = zip(points, (*FACE_COLORS, INSIDE, INSIDE, INSIDE), strict=True)
-    return [plain_patch(where, color, every=every) for where, color in places]
+    faces = np.reshape(face_colors(body), (-1, len(FACE_NAMES))).tolist()
+    named = [color for each in faces for color in (*each, INSIDE, INSIDE, INSIDE)]
+    return [plain_patch(where, color, every=every) for where, color in zip(points, named, strict=True)]
+
+
+def cut_of(body: Body, faces: Sequence[Patch], points: Samples) -> tuple[Mask, View]:
+    """Return the octants (patches, 2, 2, 2) that are left out, and the view that shows most of the cut.
+
+    faces: the patches of the outer faces. points: of the body at rest. Of several patches the octants are left out that
+    lie in the upper half and towards the viewer.
+    """
+    if not isinstance(body, MultiPatch):
+        octant, view = best_cut(faces, orientation(body))
+        return only(octant), view
+    view = view_of(faces)
+    return beyond(points, view.towards) & beyond(points, view.up), view
+
+
+def only(octant: Octant) -> Mask:
+    """Return the mask (1, 2, 2, 2) of one octant of a volume."""
+    mask = np.zeros((1, 2, 2, 2), dtype=bool)
+    mask[0][octant] = True
+    return mask
+
+
+def beyond(points: Samples, direction: Array) -> Mask:
+    """Return the octants (patches, 2, 2, 2) whose middles lie in the farther half of all middles along a direction."""
+    heights = np.stack([_middles(lattice) @ direction for lattice in points.lattices])
+    return heights > 0.5 * (heights.min() + heights.max())
+
+
+def _middles(lattice: Array) -> Array:
+    """Return the middles (2, 2, 2, 3) of the octants in a lattice (n, n, n, 3)."""
+    quarter, half = len(lattice) // 4, len(lattice) // 2
+    return lattice[quarter::half, quarter::half, quarter::half]
 
 
 def best_cut(faces: Sequence[Patch], hand: int = 1) -> tuple[Octant, View]:
-    """Return the octant to leave out and the view that together show most of the cut.
+    """Return the octant of a volume to leave out and the view that together show most of the cut.
 
     faces: six patches of m x m points, m odd. hand: the volume's orientation, 1 or -1.
     The boundary of an octant is closed, so the area of its cut planes that
@@ -38,18 +79,45 @@ def best_cut(faces: Sequence[Patch], hand: int = 1) -> tuple[Octant, View]:
     return max(choices, key=lambda choice: hand * float(_outside(points, choice[0]) @ choice[1].towards))
 
 
-def without_octant(patches: Sequence[Patch], octant: Octant) -> list[Patch]:
-    """Return the visible parts of nine patches, the six faces and the three sections, without an octant.
+def visible(body: Body, patches: Sequence[Patch], left_out: Mask) -> list[Patch]:
+    """Return what is seen of a body, of whose patches nine each are given, without some octants (patches, 2, 2, 2).
 
-    Three faces stay whole, three lose their quarter in the octant, and of each section only this quarter is seen.
+    Whole faces come first of each patch; faces and sections of which a part is seen are given in quarters.
     """
-    shown = [patches[2 * axis + 1 - octant[axis]] for axis in range(3)]
-    for axis in range(3):
-        cut, section = patches[2 * axis + octant[axis]], patches[6 + axis]
-        inside = _sides(axis, octant)
-        shown += [_quarter(cut, sides) for sides in product((0, 1), (0, 1)) if sides != inside]
-        shown.append(_quarter(section, inside))
+    shown = []
+    for number, parts in enumerate(seen_quarters(body, left_out)):
+        own = list(zip(patches[9 * number : 9 * number + 9], parts, strict=True))
+        shown += [patch for patch, part in own if part.all()]
+        partly = ((patch, part) for patch, part in own if part.any() and not part.all())
+        shown += [_quarter(patch, sides) for patch, part in partly for sides in np.argwhere(part).tolist()]
     return shown
+
+
+def seen_quarters(body: Body, left_out: Mask) -> Iterator[Mask]:
+    """Yield for each patch which quarters (9, 2, 2) of its six faces and three mid-sections are seen.
+
+    left_out: octants (patches, 2, 2, 2). A quarter of a face is seen where its octant is there and nothing lies behind
+    it: the outside, or an octant of the patch it is glued to that is left out. A quarter of a section is seen between
+    two octants of which one is left out.
+    """
+    behind = _behind(as_multipatch(body), left_out)
+    for number, own in enumerate(left_out):
+        faces = [~face_layer(own, name) & behind.get((number, name), np.bool_(True)) for name in FACE_NAMES]
+        sections = [np.take(own, 0, axis) != np.take(own, 1, axis) for axis in range(3)]
+        yield np.stack([*faces, *sections])
+
+
+def _behind(body: MultiPatch, left_out: Mask) -> dict[tuple[int, str], Mask]:
+    """Return for each glued face whether the octants (2, 2) behind it are left out."""
+    found = {}
+    for interface in body.interfaces:
+        (p, face_p), (q, face_q) = interface.first, interface.second
+        places = interface.turned(np.arange(4).reshape(2, 2))  # of the second face's quarters, in the first's order
+        first, second = face_layer(left_out[p], face_p), face_layer(left_out[q], face_q)
+        found[p, face_p] = second.ravel()[places]
+        found[q, face_q] = np.empty((2, 2), dtype=bool)
+        found[q, face_q].ravel()[places.ravel()] = first.ravel()
+    return found
 
 
 def octant_label(octant: Octant) -> str:
@@ -68,7 +136,7 @@ def _half(samples: int, side: int) -> slice:
     return slice(middle, None) if side else slice(middle + 1)
 
 
-def _quarter(patch: Patch, sides: tuple[int, int]) -> Patch:
+def _quarter(patch: Patch, sides: Sequence[int]) -> Patch:
     rows, columns = (_half(n, side) for n, side in zip(patch.points.shape[:2], sides, strict=True))
     return replace(patch, points=patch.points[rows, columns], colors=patch.colors[rows, columns])
 

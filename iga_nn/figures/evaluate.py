@@ -1,13 +1,20 @@
-"""Evaluates the content of figures: points of a volume on the cube's faces and sections, and the values there."""
+"""Evaluates the content of figures: points of a body on the cubes' faces and sections, and the values there.
+
+A body is a volume or several patches; a volume is treated as a body of one patch. Where something is listed for the
+faces and sections of all patches, each patch has nine entries: six faces, in the order of FACE_NAMES, three sections.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
-from solve.field import Points
+from solve.field import MultiPatchField, Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
+Body = BSplineVolume | MultiPatch
+Solved = SplineField | MultiPatchField  # a solution on a body
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 
 SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
@@ -37,6 +44,25 @@ def all_grids(samples: int) -> list[Grid]:
 def points_on(volume: BSplineVolume, grid: Grid) -> Array:
     """Return the points (samples, samples, 3) of a grid on a face or section."""
     return flat(volume.grid(*grid))
+
+
+def outer_faces(body: Body) -> list[int]:
+    """Return the places of the faces that are not glued among the nine faces and sections of each patch."""
+    each = enumerate(as_multipatch(body).outer)
+    return [9 * i + FACE_NAMES.index(name) for i, names in each for name in names]
+
+
+def fields_on(solution: Solved) -> tuple[SplineField, ...]:
+    """Return the spline of each patch; of a volume the solution itself."""
+    return solution.patches if isinstance(solution, MultiPatchField) else (solution,)
+
+
+def problems_on(problem: BoundaryValueProblem, body: Body) -> list[BoundaryValueProblem]:
+    """Return the problem on each patch, with X, Y, Z measured in the body."""
+    placed = problem.on(body)
+    if not isinstance(body, MultiPatch):
+        return [placed]
+    return [placed.on_patch(i, faces) for i, faces in enumerate(body.outer)]
 
 
 def error_at(found: Array, problem: BoundaryValueProblem, x: Points) -> Array:

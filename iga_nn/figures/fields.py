@@ -1,4 +1,4 @@
-"""Samples fields of a solid once for all their pictures: on its faces, its mid-sections and a lattice through it.
+"""Samples fields of a body once for all their pictures: on the faces, mid-sections and a lattice of each patch.
 
 Figures and the interactive view colour a field by one range, which counts every sample: on the boundary, on the
 mid-sections and inside. Whatever is drawn is among the samples, so no value that is drawn lies outside.
@@ -13,18 +13,19 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.quality.quality import arap_on
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.multipatch import as_multipatch
 from solve.field import Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.forms.frame import UnitFrame
 from solve.quantities import grid_values
 
-from .evaluate import Grid, all_grids, error_at, flat
+from .evaluate import Body, Grid, Solved, all_grids, error_at, fields_on, flat, problems_on
 from .style import ColorRange, error_range, even_range
 
 SAMPLES = 121  # per direction of a face or mid-section
 LATTICE = 41  # per direction of the cube
+OF_SEVERAL = 81, 21  # the same of each of several patches
 KEPT = 2  # results of one function
 
 STRESS = "von Mises"  # the name of the field that a body is drawn in
@@ -32,19 +33,20 @@ STRESS = "von Mises"  # the name of the field that a body is drawn in
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Hold values at the same places of the cube.
+    """Hold values at the same places of each patch's cube.
 
-    patches: nine arrays (SAMPLES, SAMPLES, ...), on the faces in the order of FACE_NAMES, then on u, v, w = 1/2.
-    lattice: (LATTICE, LATTICE, LATTICE, ...), at even steps of u, v and w, both ends included.
+    patches: nine arrays (SAMPLES, SAMPLES, ...) for each patch of the body, on the faces in the order of FACE_NAMES,
+    then on u, v, w = 1/2. lattices: (LATTICE, LATTICE, LATTICE, ...) for each patch, at even steps of u, v and w, both
+    ends included.
     """
 
     patches: Sequence[Array]
-    lattice: Array
+    lattices: Sequence[Array]
 
     @property
     def everywhere(self) -> list[Array]:
-        """Return all arrays, of patches and lattice."""
-        return [*self.patches, self.lattice]
+        """Return all arrays, of patches and lattices."""
+        return [*self.patches, *self.lattices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +61,14 @@ class Field(Samples):
 Result = TypeVar("Result")
 
 
-def sampled(found_at: Callable[[Grid], Array]) -> Samples:
-    """Return the samples of a function of a tensor grid, which gives (n_u, n_v, n_w, ...)."""
-    even = np.linspace(0.0, 1.0, LATTICE)
-    return Samples([flat(found_at(grid)) for grid in all_grids(SAMPLES)], found_at((even, even, even)))
+def sampled(found_on: Sequence[Callable[[Grid], Array]]) -> Samples:
+    """Return the samples of a function on each patch, which takes a tensor grid and gives (n_u, n_v, n_w, ...)."""
+    samples, lattice = (SAMPLES, LATTICE) if len(found_on) == 1 else OF_SEVERAL
+    even, grids = np.linspace(0.0, 1.0, lattice), all_grids(samples)
+    return Samples(
+        [flat(found_at(grid)) for found_at in found_on for grid in grids],
+        [found_at((even, even, even)) for found_at in found_on],
+    )
 
 
 def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
@@ -82,9 +88,14 @@ def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
 
 
 @remembered
-def points_of(volume: BSplineVolume) -> Samples:
-    """Return the points (..., 3) of a volume."""
-    return sampled(lambda grid: volume.grid(*grid))
+def points_of(body: Body) -> Samples:
+    """Return the points (..., 3) of a body."""
+    return sampled([_on_grid(patch) for patch in as_multipatch(body)])
+
+
+def _on_grid(spline: Any) -> Callable[[Grid], Array]:
+    """Return the function that gives the values of a volume or a field on a grid."""
+    return lambda grid: spline.grid(*grid)
 
 
 def diagonal_of(points: Samples) -> float:
@@ -94,76 +105,106 @@ def diagonal_of(points: Samples) -> float:
 
 
 @remembered
-def distortion_of(volume: BSplineVolume) -> Field:
-    """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1."""
-    scale = 1.0 / UnitFrame.of(volume).length
-    found = sampled(lambda grid: np.tanh(np.sqrt(arap_on(volume, *grid, scale)) / 2.0))
-    return Field(found.patches, found.lattice, "distortion", "tanh(√ARAP / 2), at volume 1", ColorRange(0.0, 1.0))
+def distortion_of(body: Body) -> Field:
+    """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1; of several patches, each at its own."""
+    several = as_multipatch(body)
+    scales = [1.0 / UnitFrame.of(patch).length for patch in several]
+
+    def found_on(number: int) -> Callable[[Grid], Array]:
+        return lambda grid: np.tanh(np.sqrt(arap_on(several.patches[number], *grid, scales[number])) / 2.0)
+
+    found = sampled([found_on(number) for number in range(len(several))])
+    title = "tanh(√ARAP / 2), at volume 1" if len(several) == 1 else "tanh(√ARAP / 2), each patch at volume 1"
+    return Field(found.patches, found.lattices, "distortion", title, ColorRange(0.0, 1.0))
 
 
 @remembered
-def vectors_of(solution: SplineField) -> Samples:
+def vectors_of(solution: Solved) -> Samples:
     """Return the vectors (..., c) of a solution of several components."""
-    return sampled(lambda grid: solution.grid(*grid))
+    return sampled([_on_grid(field) for field in fields_on(solution)])
 
 
 @remembered
-def solution_of(solution: SplineField) -> Field:
+def solution_of(solution: Solved) -> Field:
     """Return u_h, or the length of a vector u_h."""
-    if solution.coefficients.ndim == 3:
-        found, name, title = sampled(lambda grid: solution.grid(*grid)), "solution", "u"
+    if is_scalar(solution):
+        found, name, title = sampled([_on_grid(field) for field in fields_on(solution)]), "solution", "u"
     else:
         found, name, title = _each(vectors_of(solution), lambda values: np.linalg.norm(values, axis=-1)), "|u|", "|u|"
-    return Field(found.patches, found.lattice, name, title, even_range(found.everywhere))
+    return Field(found.patches, found.lattices, name, title, even_range(found.everywhere))
 
 
-def components_of(solution: SplineField) -> list[Field]:
+def is_scalar(solution: Solved) -> bool:
+    """Return whether a solution has one number a point, without an axis of components."""
+    return fields_on(solution)[0].coefficients.ndim == 3
+
+
+def is_spatial(solution: Solved) -> bool:
+    """Return whether a solution is a vector of three components."""
+    return fields_on(solution)[0].coefficients.shape[3:] == (3,)
+
+
+def components_of(solution: Solved) -> list[Field]:
     """Return u_x, u_y and u_z of a vector of three components."""
     return [_component(vectors_of(solution), k, f"u_{axis}") for k, axis in enumerate("xyz")]
 
 
 def _component(vectors: Samples, k: int, name: str) -> Field:
     found = _each(vectors, lambda values: values[..., k])
-    return Field(found.patches, found.lattice, name, name, even_range(found.everywhere))
+    return Field(found.patches, found.lattices, name, name, even_range(found.everywhere))
 
 
-def quantity_of(solution: SplineField, quantity: Quantity, name: str, title: str) -> Field | None:
-    """Return a quantity of one number a point, a function of u, grad and x; None where it is not finite everywhere."""
+def quantity_of(solution: Solved, quantity: Quantity | Sequence[Quantity], name: str, title: str) -> Field | None:
+    """Return a quantity of one number a point, a function of u, grad and x; None where it is not finite everywhere.
+
+    quantity: of several patches also a function for each, where their materials differ.
+    """
+    fields = fields_on(solution)
+    laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(fields)
+
+    def found_on(field: SplineField, law: Quantity) -> Callable[[Grid], Array]:
+        return lambda grid: grid_values(field, law, *grid)
+
     try:
-        found = sampled(lambda grid: grid_values(solution, quantity, *grid))
+        found = sampled([found_on(field, law) for field, law in zip(fields, laws, strict=True)])
     except np.linalg.LinAlgError:  # det J = 0
         return None
     if not all(np.all(np.isfinite(values)) for values in found.everywhere):
         return None
-    return Field(found.patches, found.lattice, name, title, even_range(found.everywhere))
+    return Field(found.patches, found.lattices, name, title, even_range(found.everywhere))
 
 
 @remembered
-def fields_of(solution: SplineField) -> list[Field]:
+def fields_of(solution: Solved) -> list[Field]:
     """Return the fields that show a solution, first the field of its picture; of a body that is von Mises' stress."""
     fields = [solution_of(solution)]
-    if solution.coefficients.shape[3:] == (3,):
+    if is_spatial(solution):
         fields += components_of(solution)
-    if law := (quantities_of(solution) or {}).get("von_mises"):
-        stress = quantity_of(solution, law, STRESS, "von Mises stress")
+    laws = [(quantities_of(field) or {}).get("von_mises") for field in fields_on(solution)]
+    if None not in laws:
+        stress = quantity_of(solution, [law for law in laws if law], STRESS, "von Mises stress")
         return fields if stress is None else [stress, *fields]
     return fields
 
 
 @remembered
-def error_of(volume: BSplineVolume, solution: SplineField, problem: BoundaryValueProblem) -> Field:
+def error_of(body: Body, solution: Solved, problem: BoundaryValueProblem) -> Field:
     """Return |u - u_h|, whose range is logarithmic. problem: its exact solution is known."""
-    problem = problem.on(volume)
-    found = sampled(lambda grid: error_at(solution.grid(*grid), problem, Points.on(volume, *grid)))
+    parts = zip(as_multipatch(body), fields_on(solution), problems_on(problem, body), strict=True)
+
+    def found_on(patch: Any, field: SplineField, own: BoundaryValueProblem) -> Callable[[Grid], Array]:
+        return lambda grid: error_at(field.grid(*grid), own, Points.on(patch, *grid))
+
+    found = sampled([found_on(*part) for part in parts])
     limits = error_range([found.everywhere])
-    return Field(found.patches, found.lattice, "error", "|u − uₕ|", limits)
+    return Field(found.patches, found.lattices, "error", "|u − uₕ|", limits)
 
 
-def quantities_of(solution: SplineField) -> Mapping[str, Quantity] | None:
+def quantities_of(solution: Solved) -> Mapping[str, Quantity] | None:
     """Return the quantities of the law that is solved, None where it is not known."""
     problem = getattr(solution, "problem", None)
     return None if problem is None else problem.form.quantities
 
 
 def _each(samples: Samples, change: Callable[[Array], Array]) -> Samples:
-    return Samples([change(values) for values in samples.patches], change(samples.lattice))
+    return Samples([change(values) for values in samples.patches], [change(values) for values in samples.lattices])

@@ -1,5 +1,6 @@
 """Draws a map: faces, parameter lines, cut, distortion, and where it is not proved or meets itself."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,70 +9,104 @@ from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
-from parameterize.spline.orientation import orientation
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.interface import face_label
+from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .cutaway import best_cut, octant_label, patches_of, without_octant
-from .evaluate import SECTIONS, face_window, points_on
+from .cutaway import cut_of, octant_label, patches_of, visible
+from .evaluate import Body, face_window, outer_faces, points_on
 from .fields import SAMPLES, distortion_of, points_of
-from .render import Patch, check_drawable, draw, plain_patch, view_of
-from .style import PANEL, color_bar, colors, name_faces, panels_of, save, show_around, show_section
+from .inside import show_inside
+from .render import NAMELESS, Patch, check_drawable, draw, plain_patch, view_of
+from .style import PANEL, color_bar, colors, name_colors, panels_of, save, show_around
 
-EVERY = 12  # samples between two parameter lines: a tenth of the cube
+LINES = 10  # from one side of the cube to the other, with the last
 WINDOW = 0.15  # of the cube, on every side of a meeting place
 MEETING_COLORS = ("#4477aa", "#ee6677")
 
 
-def draw_faces(path: str | Path | None, volume: BSplineVolume, marks: Array | None = None) -> Figure:
+def draw_faces(path: str | Path | None, body: Body, marks: Array | None = None) -> Figure:
     """Draw the images of the six faces of the cube, each in its colour, from the front and from behind.
 
-    marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
+    Of several patches the outer faces are drawn, in the colour of their patch and with their names. marks: points (k,
+    3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    return _draw_around(path, volume, 0, "Images of the six faces of the unit cube", marks)
+    if not isinstance(body, MultiPatch):
+        return _draw_around(path, body, 0, "Images of the six faces of the unit cube", marks)
+    return _draw_around(path, body, 0, "The patches and their outer faces", marks, _names_of(body))
 
 
-def draw_lines(path: str | Path | None, volume: BSplineVolume) -> Figure:
-    """Draw lines of constant parameters, a tenth apart, on the images of the six faces, from the front and behind."""
-    return _draw_around(path, volume, EVERY, "Lines of constant u, v, w, a tenth apart")
+def _names_of(body: MultiPatch) -> dict[str, Array]:
+    """Return the names of the outer faces of patches, each with the point in the middle of the face."""
+    patches = points_of(body).patches
+    named = {face_label(k // 9, FACE_NAMES[k % 9]): patches[k] for k in outer_faces(body)}
+    return {name: points[len(points) // 2, len(points) // 2] for name, points in named.items()}
+
+
+def draw_lines(path: str | Path | None, body: Body) -> Figure:
+    """Draw lines of constant parameters, a tenth apart, on the outer faces, from the front and from behind."""
+    return _draw_around(path, body, LINES, "Lines of constant u, v, w, a tenth apart")
 
 
 def _draw_around(
-    path: str | Path | None, volume: BSplineVolume, every: int, title: str, marks: Array | None = None
+    path: str | Path | None,
+    body: Body,
+    lines: int,
+    title: str,
+    marks: Array | None = None,
+    names: Mapping[str, Array] = NAMELESS,
 ) -> Figure:
     figure, (panels,) = panels_of(1, 2)
-    show_around(panels, patches_of(points_of(volume).patches, every)[:6], marks)
-    name_faces(figure)
+    patches = _patches_with(body, lines)
+    show_around(panels, [patches[k] for k in outer_faces(body)], marks, names)
+    name_colors(figure, body)
     return save(figure, path, title)
 
 
-def draw_cut(path: str | Path | None, volume: BSplineVolume) -> Figure:
+def _patches_with(body: Body, lines: int) -> list[Patch]:
+    """Return the faces and sections of a body with as many spaces between parameter lines, 0 for no lines."""
+    points = points_of(body).patches
+    return patches_of(body, points, (len(points[0]) - 1) // lines if lines else 0)
+
+
+def draw_cut(path: str | Path | None, body: Body) -> Figure:
     """Draw the volume without one octant of the cube (the paper's Fig. 9): parameter lines, and the distortion.
 
-    Octant and view are chosen so that most of the cut is seen.
+    The octant and the view are those that show most of the cut. Of several patches the octants that lie in the upper
+    half and towards the viewer are left out.
     """
-    named, field = patches_of(points_of(volume).patches, EVERY), distortion_of(volume)
-    octant, view = best_cut(named[:6], orientation(volume))
+    named, field = _patches_with(body, LINES), distortion_of(body)
+    left_out, view = cut_of(body, [named[k] for k in outer_faces(body)], points_of(body))
     distorted = [
         replace(patch, colors=colors(values, field.limits), lit=False)
         for patch, values in zip(named, field.patches, strict=True)
     ]
     figure, (panels,) = panels_of(1, 2)
     for panel, patches in zip(panels, (named, distorted), strict=True):
-        panel.imshow(draw(without_octant(patches, octant), view, PANEL))
-    name_faces(figure)
+        panel.imshow(draw(visible(body, patches, left_out), view, PANEL))
+    name_colors(figure, body)
     color_bar(figure, panels, field.limits, field.title)
-    return save(figure, path, f"Cut open: the octant {octant_label(octant)} is left out")
+    if isinstance(body, MultiPatch):
+        return save(figure, path, "Cut open: the upper octants of the patches, towards the viewer, are left out")
+    u, v, w = np.argwhere(left_out[0])[0].tolist()
+    return save(figure, path, f"Cut open: the octant {octant_label((u, v, w))} is left out")
 
 
-def draw_distortion(path: str | Path | None, volume: BSplineVolume) -> Figure:
-    """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2."""
+def draw_distortion(path: str | Path | None, body: Body) -> Figure:
+    """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2.
+
+    Of several patches each is measured at its own volume 1, and drawn where the body is cut open in three ways.
+    """
     figure, (panels,) = panels_of(1, 3)
-    field = distortion_of(volume)
-    shown = zip(panels, SECTIONS, points_of(volume).patches[6:], field.patches[6:], strict=True)
-    for panel, title, points, values in shown:
-        show_section(panel, title, points, colors(values, field.limits))
+    field, points = distortion_of(body), points_of(body)
+    patches = [
+        Patch(where, colors(values, field.limits), lit=False)
+        for where, values in zip(points.patches, field.patches, strict=True)
+    ]
+    show_inside(panels, body, points, patches)
     color_bar(figure, panels, field.limits, field.title)
-    return save(figure, path, "Distortion on the mid-sections")
+    several = isinstance(body, MultiPatch)
+    return save(figure, path, "Distortion of the patches inside" if several else "Distortion on the mid-sections")
 
 
 def draw_folds(path: str | Path | None, volume: BSplineVolume, places: Array) -> Figure:
@@ -102,7 +137,7 @@ def _glass(volume: BSplineVolume) -> list[Patch]:
 PLOTS = {"faces": draw_faces, "lines": draw_lines, "cut": draw_cut, "distortion": draw_distortion}
 
 
-def plot_volume(volume: BSplineVolume, what: str, file: str | Path | None) -> Figure:
-    """Return one of the figures PLOTS of a volume, written to `file`, too, where one is named."""
+def plot_body(body: Body, what: str, file: str | Path | None) -> Figure:
+    """Return one of the figures PLOTS of a body, written to `file`, too, where one is named."""
     check_drawable(what, PLOTS)
-    return PLOTS[what](file, volume)
+    return PLOTS[what](file, body)

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.multipatch import as_multipatch
 from solve import Modes
 
-from .evaluate import all_grids, flat
+from .evaluate import Body, all_grids, fields_on, flat, outer_faces
 from .render import Patch, draw, view_of
 from .style import PANEL, ColorRange, colors, panels_of, save
 
@@ -17,15 +17,16 @@ SAMPLES = 61  # a direction of a face
 SWING = 0.15  # of the body's size: the largest displacement as drawn
 
 
-def draw_modes(path: str | Path | None, volume: BSplineVolume, modes: Modes) -> Figure:
+def draw_modes(path: str | Path | None, body: Body, modes: Modes) -> Figure:
     """Draw the first modes, displacements, and their frequencies; the size of each is free, and the same in all."""
     shown = list(zip(modes.frequencies, modes.shapes, strict=True))[:MOST]
     figure, axes = panels_of(-(-len(shown) // COLUMNS), min(COLUMNS, len(shown)))
-    size = float(np.ptp(volume.control_points.reshape(-1, 3), axis=0).max())
-    faces = all_grids(SAMPLES)[:6]
-    still = [flat(volume.grid(*grid)) for grid in faces]
+    volumes, grids = as_multipatch(body).patches, all_grids(SAMPLES)
+    size = float(np.ptp(np.concatenate([patch.control_points.reshape(-1, 3) for patch in volumes]), axis=0).max())
+    faces = [(k // len(grids), grids[k % len(grids)]) for k in outer_faces(body)]
+    still = [flat(volumes[number].grid(*grid)) for number, grid in faces]
     for panel, (frequency, shape) in zip(axes.flat, shown, strict=False):
-        moved = [shape.grid(*grid) for grid in faces]
+        moved = [fields_on(shape)[number].grid(*grid) for number, grid in faces]
         far = [flat(np.linalg.norm(by, axis=-1)) for by in moved]
         largest = max(float(values.max()) for values in far)
         limits = ColorRange(0.0, largest)

@@ -11,37 +11,40 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.orientation import FACES
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
-from parameterize.surface.geometry import normals_and_areas
+from parameterize.spline.interface import axis_side, face_label
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.surface.surface import Surface
 from solve.forms.condition import Condition
 from solve.forms.frame import face_geometry
 from solve.forms.region import Region
 
+from .evaluate import Body
 from .render import Patch
 from .style import panels_of, save, show_around
 
 REST = "0.82"  # the grey of the surface outside of all regions
-SAMPLES = 161  # a direction of a face of the solid
-CELLS = 40_000  # of a surface: large triangles are divided until there are so many cells
+SAMPLES = 161  # a direction of a face of the body
+CELLS = 40_000  # of a surface: large triangles are divided into as many
 FINEST = 100  # cells along a side of a triangle
 LINES_UP_TO = 3_000  # triangles: surfaces with more are drawn without outlines
 LONGEST = 60  # letters of a name
 
 
-def draw_conditions(path: str | Path | None, volume: BSplineVolume, conditions: Sequence[Condition]) -> Figure:
-    """Draw where a problem's conditions hold on the solid, from the front and from behind.
+def draw_conditions(path: str | Path | None, body: Body, conditions: Sequence[Condition]) -> Figure:
+    """Draw where a problem's conditions hold on the body, from the front and from behind.
 
     conditions: with their regions placed. Where two meet, the first is shown.
     """
     palette, rows = _palette(len(conditions)), np.linspace(0.0, 1.0, SAMPLES)
     patches = []
-    for (axis, side), name in zip(FACES, FACE_NAMES, strict=True):
-        x, normal = face_geometry(volume, [rows] * 3, axis, side)
+    several = as_multipatch(body)
+    faces = [(i, name) for i, names in enumerate(several.outer) for name in names]
+    for number, name in faces:
+        x, normal = face_geometry(several.patches[number], [rows] * 3, *axis_side(name))
         points = np.asarray(x)
+        own = face_label(number, name) if isinstance(body, MultiPatch) else name
         units = normal / np.linalg.norm(normal, axis=0)
-        first = _first([condition.region for condition in conditions], points, units, name)
+        first = _first([condition.region for condition in conditions], points, units, own)
         patches.append(Patch(np.moveaxis(points, 0, -1), palette[first], every=SAMPLES - 1))
     names = [f"{condition.kind}: {condition.region}" for condition in conditions]
     return _draw(path, patches, palette, names, "Where data are given")

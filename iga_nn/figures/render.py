@@ -4,9 +4,10 @@ import logging
 import os
 import subprocess
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
@@ -20,6 +21,8 @@ log = logging.getLogger(__name__)
 TILT = 0.45  # radians: shows more than one side of a solid
 LINE_WIDTH = 1.6  # pixels
 NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: keeps them before a surface
+NAMELESS: Mapping[str, Array] = MappingProxyType({})
+LETTERS = 15  # pixels
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
 CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
 PROBE = """
@@ -111,11 +114,15 @@ def view_of(patches: Sequence[Patch]) -> View:
 
 
 def draw(
-    patches: Sequence[Patch], view: View, pixels: tuple[int, int], marks: Array | None = None
+    patches: Sequence[Patch],
+    view: View,
+    pixels: tuple[int, int],
+    marks: Array | None = None,
+    names: Mapping[str, Array] = NAMELESS,
 ) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3) of the patches in parallel projection that fills `pixels` = (width, height).
 
-    marks: points (k, 3), drawn as black balls.
+    marks: points (k, 3), drawn as black balls. names: texts that are written at points (3,), where these are seen.
     """
     import pyvista
 
@@ -138,6 +145,16 @@ def draw(
     if marks is not None:
         plotter.add_points(marks + NEARER_MARKS * nearer, color="black", point_size=32, render_points_as_spheres=True)
     _aim(plotter, cloud, view, pixels)
+    if names:
+        plotter.add_point_labels(
+            np.stack(list(names.values())) + NEARER_MARKS * nearer,
+            list(names),
+            font_size=LETTERS,
+            show_points=False,
+            shape_color="white",
+            shape_opacity=0.7,
+            margin=1,
+        )
     plotter.add_light(pyvista.Light(light_type="headlight", intensity=0.9))
     image: NDArray[np.uint8] = plotter.screenshot(return_img=True)
     plotter.close()

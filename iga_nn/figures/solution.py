@@ -8,100 +8,104 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.multipatch import MultiPatch
 from solve import Solution
-from solve.field import SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
+from solve.solution import MultiPatchSolution
 
 from ..level_table import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units
-from .cutaway import best_cut, without_octant
-from .evaluate import SECTIONS
+from .cutaway import cut_of, visible
+from .evaluate import Body, Solved, outer_faces
 from .fields import STRESS, Field, Samples, diagonal_of, error_of, fields_of, points_of, solution_of, vectors_of
+from .inside import show_inside
 from .render import Patch, check_drawable, draw
-from .style import PANEL, color_bar, colors, panels_of, save, show_around, show_section, with_unit
+from .style import PANEL, color_bar, colors, panels_of, save, show_around, with_unit
 from .warp import in_words, warp_of
 
 
 def draw_error(
     path: str | Path | None,
-    volume: BSplineVolume,
-    solution: Solution,
+    body: Body,
+    solution: Solution | MultiPatchSolution,
     problem: BoundaryValueProblem,
     units: Units = NO_UNITS,
 ) -> Figure:
-    """Draw |u - u_h| on the boundary and on the three mid-sections in logarithmic colours, and write its norms.
+    """Draw |u - u_h| on the boundary and inside (`show_inside`) in logarithmic colours, and write its norms.
 
     units: texts that stand beside the colour bar, as in all figures here.
     """
-    field = error_of(volume, solution, problem)
+    field, points = error_of(body, solution, problem), points_of(body)
     figure, rows = panels_of(2, 3)
-    patches = _colored(points_of(volume).patches, field)
-    show_around(rows[0][:2], patches[:6])
+    patches = _colored(points.patches, field)
+    show_around(rows[0][:2], [patches[k] for k in outer_faces(body)])
     _write_numbers(rows[0][2], solution)
-    _show_sections(rows[1], patches[6:])
+    show_inside(rows[1], body, points, patches)
     color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
-    return save(figure, path, "Error on the boundary and on the mid-sections")
+    where = "inside" if isinstance(body, MultiPatch) else "on the mid-sections"
+    return save(figure, path, f"Error on the boundary and {where}")
 
 
-def draw_solution(
-    path: str | Path | None, volume: BSplineVolume, solution: SplineField, units: Units = NO_UNITS
-) -> Figure:
-    """Draw u_h on the boundary, in the volume cut open and on the mid-sections; of a body, von Mises' stress.
+def draw_solution(path: str | Path | None, body: Body, solution: Solved, units: Units = NO_UNITS) -> Figure:
+    """Draw u_h on the boundary, in the body cut open and inside (`show_inside`); of an elastic body, the stress.
 
-    A body is drawn as its displacements deform it, enlarged by a factor that the title states.
+    An elastic body is drawn as its displacements deform it, enlarged by a factor that the title states.
     """
-    field, points = fields_of(solution)[0], points_of(volume)
+    field, points = fields_of(solution)[0], points_of(body)
     label = with_unit(field.title, units.stress if field.name == STRESS else units.displacement)
     if not (factor := warp_of(solution, diagonal_of(points))):
-        return _draw_values(path, points.patches, field, label)
+        return _draw_values(path, body, points.patches, field, label)
     largest = max(float(values.max()) for values in solution_of(solution).everywhere)
     most = with_unit(f"at most {largest:.3g}", units.displacement)
     title = f"The deformed body: displacements, {most}, are drawn {in_words(factor)} times as large"
     moved = moved_by(points, solution, factor)
-    return _draw_values(path, moved, field, label, title)
+    return _draw_values(path, body, moved, field, label, title)
 
 
 def draw_values(
     path: str | Path | None,
-    volume: BSplineVolume,
-    solution: SplineField,
+    body: Body,
+    solution: Solved,
     title: str,
     *,
     exaggerate: float | None = None,
 ) -> Figure:
-    """Draw u_h, or the length of a vector u_h, on the boundary, in the volume cut open, and on the mid-sections.
+    """Draw u_h, or the length of a vector u_h, on the boundary, in the body cut open, and inside (`show_inside`).
 
     The colours range over the whole solid. exaggerate: draw the body displaced by that many times u_h, a vector.
     """
-    points = points_of(volume)
+    points = points_of(body)
     moved = points.patches if exaggerate is None else moved_by(points, solution, exaggerate)
-    return _draw_values(path, moved, solution_of(solution), title)
+    return _draw_values(path, body, moved, solution_of(solution), title)
 
 
-def moved_by(points: Samples, solution: SplineField, factor: float) -> list[Array]:
-    """Return the nine patches of points, displaced by a factor times the solution."""
+def moved_by(points: Samples, solution: Solved, factor: float) -> list[Array]:
+    """Return the patches of points, displaced by a factor times the solution."""
     return [where + factor * by for where, by in zip(points.patches, vectors_of(solution).patches, strict=True)]
 
 
 def _draw_values(
-    path: str | Path | None, points: Sequence[Array], field: Field, label: str, heading: str = ""
+    path: str | Path | None, body: Body, points: Sequence[Array], field: Field, label: str, heading: str = ""
 ) -> Figure:
-    """Draw a field on nine patches of points (m, m, 3). label: of the colour bar. heading: of the figure."""
-    patches = _colored(points, field)
+    """Draw a field on the faces and sections of all patches at points (m, m, 3).
+
+    label: of the colour bar. heading: of the figure.
+    """
+    patches, at_rest = _colored(points, field), points_of(body)
     figure, rows = panels_of(2, 3)
-    show_around(rows[0][:2], patches[:6])
-    octant, view = best_cut(patches[:6])
+    faces = [patches[k] for k in outer_faces(body)]
+    show_around(rows[0][:2], faces)
+    left_out, view = cut_of(body, faces, at_rest)
     halved = [replace(patch, every=len(patch.points) // 2) for patch in patches]  # lines along the cut, too
-    rows[0][2].imshow(draw(without_octant(halved, octant), view, PANEL))
+    rows[0][2].imshow(draw(visible(body, halved, left_out), view, PANEL))
     rows[0][2].set_title("cut open", fontsize=13)
-    _show_sections(rows[1], patches[6:])
+    show_inside(rows[1], body, at_rest, patches)
     color_bar(figure, rows, field.limits, label)
     return save(figure, path, heading)
 
 
 def _colored(points: Sequence[Array], field: Field) -> list[Patch]:
-    """Return the nine patches at points (m, m, 3) in the colours of a field, without shading: they match its bar.
+    """Return the patches at points (m, m, 3) in the colours of a field, without shading: they match its bar.
 
     Lines along the borders show their shape.
     """
@@ -111,12 +115,7 @@ def _colored(points: Sequence[Array], field: Field) -> list[Patch]:
     ]
 
 
-def _show_sections(panels: Any, patches: Sequence[Patch]) -> None:
-    for panel, title, patch in zip(panels, SECTIONS, patches, strict=True):
-        show_section(panel, title, patch.points, patch.colors)
-
-
-def plot_solution(solution: Solution, what: str, file: str | Path | None) -> Figure:
+def plot_solution(solution: Solution | MultiPatchSolution, what: str, file: str | Path | None) -> Figure:
     """Return the values of a solution, or its error, on the boundary and inside."""
     check_drawable(what, ("values", "error"))
     if what == "error":
@@ -126,7 +125,7 @@ def plot_solution(solution: Solution, what: str, file: str | Path | None) -> Fig
     return draw_solution(file, solution.geometry, solution)
 
 
-def _write_numbers(panel: Any, solution: Solution) -> None:
+def _write_numbers(panel: Any, solution: Solution | MultiPatchSolution) -> None:
     report = solution.report
     errors = [(TITLES[key], getattr(report, key)) for key in EXACT_ERRORS]
     lines = [f"{report.dofs:,} unknowns"]

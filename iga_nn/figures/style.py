@@ -1,7 +1,7 @@
 """Holds the parts that figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.files import replacing
 
-from .evaluate import FACE_COLORS, MAP, face_labels
-from .render import Patch, draw, view_of, widest_view
+from .evaluate import MAP, Body
+from .palette import color_labels
+from .render import NAMELESS, Patch, draw, view_of, widest_view
 
 PANEL = (720, 560)  # pixels of one view
 NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
@@ -50,11 +51,13 @@ def panels_of(rows: int, columns: int) -> tuple[Figure, Any]:
     return figure, axes
 
 
-def show_around(panels: Any, patches: list[Patch], marks: Array | None = None) -> None:
-    """Draw the same patches from the front and from behind on two panels."""
+def show_around(
+    panels: Any, patches: list[Patch], marks: Array | None = None, names: Mapping[str, Array] = NAMELESS
+) -> None:
+    """Draw the same patches from the front and from behind on two panels. marks, names: as in `draw`."""
     view = view_of(patches)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
-        panel.imshow(draw(patches, direction, PANEL, marks))
+        panel.imshow(draw(patches, direction, PANEL, marks, names))
         panel.set_title(title, fontsize=13)
 
 
@@ -65,13 +68,13 @@ def show_section(panel: Any, title: str, points: Array, colors: Array) -> None:
     panel.set_title(title, fontsize=13)
 
 
-def name_faces(figure: Figure) -> None:
-    """Write the legend of the six colours below the panels."""
-    swatches = [Swatch(color=color, label=label) for label, color in zip(face_labels(), FACE_COLORS, strict=True)]
+def name_colors(figure: Figure, body: Body) -> None:
+    """Write the legend of the colours of a volume's faces, or of several patches, below the panels."""
+    swatches = [Swatch(color=color, label=label) for color, label in color_labels(body)]
     figure.legend(
         handles=swatches,
         loc="outside lower center",
-        ncols=6,
+        ncols=6 if len(swatches) <= 6 else 10,
         frameon=False,
         fontsize=12,
         columnspacing=1.2,

@@ -4,22 +4,21 @@ import math
 
 import numpy as np
 
-from solve.field import SplineField
-
-from .fields import quantities_of, solution_of
+from .evaluate import Solved
+from .fields import is_spatial, quantities_of, solution_of
 from .style import SMALLEST
 
 SHARE = 0.08  # of the diagonal of the body's box: the largest displacement as drawn
 DIGITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # first digits of a factor; each is at most 1.5 times the one before
 
 
-def is_displacement(solution: SplineField) -> bool:
-    """Return whether a solution has three components, and a law that is unknown or gives von Mises' stress."""
+def is_displacement(solution: Solved) -> bool:
+    """Return whether a solution is a vector of three components whose law gives von Mises' stress, or is not known."""
     quantities = quantities_of(solution)
-    return solution.coefficients.shape[3:] == (3,) and (quantities is None or "von_mises" in quantities)
+    return is_spatial(solution) and (quantities is None or "von_mises" in quantities)
 
 
-def warp_of(solution: SplineField, size: float) -> float:
+def warp_of(solution: Solved, size: float) -> float:
     """Return the factor at which the largest displacement is drawn as 5 to 8 % of a size, 0 for no displacement.
 
     size: the diagonal of the body's box.

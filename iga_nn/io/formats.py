@@ -8,7 +8,7 @@ point data `u`, the others as a second file beside the volume's. `io.gismo`, `io
 for ParaView. IGES and STEP have no trivariate splines.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 
 from parameterize.files import replacing
-from parameterize.spline.multipatch import TOLERANCE, MultiPatch, as_multipatch
+from parameterize.spline.multipatch import TOLERANCE, MultiPatch, as_multipatch, shared_numbers
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
-from solve.field import SplineField
+from solve.field import MultiPatchField, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, did_you_mean, input_errors
+from ..figures.evaluate import Body, Solved, fields_on
 from ..new_file import check_new
 from ..options import PROBLEMS
 from ..report import document as reports
@@ -45,12 +46,12 @@ class Format:
 
     ending: str
     write: Callable[..., None]
-    beside: tuple[str, Callable[[Path, SplineField, BSplineVolume], None]] | None = None
+    beside: tuple[str, Callable[[Path, Any, Any], None]] | None = None
 
 
 FORMATS = {
-    "gismo": Format(".xml", gismo.write_gismo, ("_u.xml", gismo.write_gismo)),
-    "mfem": Format(".mesh", mfem_writer.write_mfem, (".gf", mfem_writer.write_mfem_field)),
+    "gismo": Format(".xml", gismo.write_gismo, ("_u.xml", gismo.write_gismo_field)),
+    "mfem": Format(".mesh", mfem.write_mfem, (".gf", mfem.write_mfem_field)),
     "vtk": Format("_bezier.vtu", vtk.write_bezier),
     "view": Format("_view.vtu", view.write_view),
     "json": Format(".json", splinepy.write_json, ("_u.json", splinepy.write_json)),
@@ -128,18 +129,6 @@ def _load_archive(path: Path) -> BSplineVolume | MultiPatch:
     return body if len(body) > 1 or body.interfaces else body.patches[0]
 
 
-def load_one_patch(path: str | Path) -> BSplineVolume:
-    """Return the volume of a file as `load_volume` does. Raises InputError where it has several patches, too."""
-    return _one_patch(load_volume(path), path)
-
-
-def _one_patch(body: BSplineVolume | MultiPatch, path: str | Path) -> BSplineVolume:
-    if isinstance(body, MultiPatch):
-        held = f"{len(body)} patch{'' if len(body) == 1 else 'es'} with {len(body.interfaces)} interfaces"
-        raise InputError(f"{path}: has {held}; this takes a volume of one patch that is not glued")
-    return body
-
-
 def export(
     volume: str | Path,
     to: str,
@@ -202,44 +191,49 @@ def export(
     for file in (target, beside):
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
-    if solution is None and to != "view":
-        loaded = load_volume(volume)
-        field, problem = None, None
-    else:
-        loaded = one = load_one_patch(volume)
-        field, problem = (None, None) if solution is None else _load_solution(Path(solution), one)
+    loaded = load_volume(volume)
+    if solution is not None and to == "mfem" and isinstance(loaded, MultiPatch):
+        raise InputError(f"{volume}: has several patches; a solution on these goes to vtk, view, gismo or json")
+    field, problem = (None, None) if solution is None else _load_solution(Path(solution), loaded)
     try:
         with replacing(target) as temporary:
             chosen.write(temporary, loaded, field, problem, samples, tuple(quantity) or None)
             if field is not None and write_field is not None:
                 with replacing(beside) as temporary_beside:
-                    write_field(temporary_beside, field, one)
+                    write_field(temporary_beside, field, loaded)
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}): choose another with --out") from None
     return target
 
 
-def _load_solution(path: Path, volume: BSplineVolume) -> tuple[SplineField, BoundaryValueProblem | None]:
+def _load_solution(path: Path, body: Body) -> tuple[Solved, BoundaryValueProblem | None]:
     """Return a solution and the problem in the report beside it, None for a problem that is not known.
 
-    Raises InputError where the solution does not belong to the volume: by its knots, or by the h of its report.
+    Raises InputError where the solution does not belong to the body: by its knots, or by the h of its report.
     """
+    several = as_multipatch(body)
     with input_errors():
-        field = SplineField.load(path)
-    if field.coefficients.shape[3:] not in ((), (3,)):
+        found: Solved = MultiPatchField.load(path) if isinstance(body, MultiPatch) else SplineField.load(path)
+    fields = fields_on(found)
+    if any(field.coefficients.shape[3:] not in ((), (3,)) for field in fields):
         raise InputError(f"{path}: coefficients must have shape (m_u, m_v, m_w) or (.., 3)")
-    if not all(np.isin(own, finer).all() for own, finer in zip(volume.knots, field.knots, strict=True)):
+    if len(fields) != len(several) or not all(map(_is_refined, several, fields)):
         raise InputError(f"{path}: belongs to another volume: its knots are not those of the map, refined")
     report = reports.read(path.parent) or {}
     name = next((name for name in PROBLEMS if isinstance(report.get(name), dict)), "")
     section = report.get(name, {})
-    if (there := _mesh_size(section, field)) is not None:
-        here = longest_edge(volume, TrialSpace(field.degrees, field.knots))
+    if (there := _mesh_size(section, several, fields)) is not None:
+        spaces = (TrialSpace(field.degrees, field.knots) for field in fields)
+        here = max(map(longest_edge, several, spaces))
         if not np.isclose(here, there, rtol=1e-9):
             raise InputError(
                 f"{path}: belongs to another volume: the longest edge of its elements is {there:.6g}, here {here:.6g}"
             )
-    return field, _stated(name, section) if name else None
+    return found, _stated(name, section) if name else None
+
+
+def _is_refined(volume: BSplineVolume, field: SplineField) -> bool:
+    return all(np.isin(own, finer).all() for own, finer in zip(volume.knots, field.knots, strict=True))
 
 
 def _stated(name: str, section: dict[str, Any]) -> BoundaryValueProblem | None:
@@ -255,10 +249,11 @@ def _stated(name: str, section: dict[str, Any]) -> BoundaryValueProblem | None:
         return None
 
 
-def _mesh_size(section: dict[str, Any], field: SplineField) -> float | None:
-    """Return h of the finest level, None where the section is not the field's, is empty or was edited."""
+def _mesh_size(section: dict[str, Any], body: MultiPatch, fields: Sequence[SplineField]) -> float | None:
+    """Return h of the finest level, None where the section is not the fields', is empty or was edited."""
     try:
+        count = shared_numbers([field.coefficients.shape for field in fields], body.interfaces)[1]
         finest = section["levels"][-1]
-        return float(finest["h"]) if finest["dofs"] == field.coefficients.size else None
+        return float(finest["h"]) if finest["dofs"] == count else None
     except (LookupError, TypeError, ValueError):
         return None

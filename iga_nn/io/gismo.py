@@ -20,7 +20,7 @@ from parameterize.arrays import Array
 from parameterize.spline.interface import Face, Interface, axis_side, varying
 from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
-from solve.field import SplineField
+from solve.field import MultiPatchField, SplineField
 
 from .patches import as_text, fastest_first, patch_of
 from .words import finite_numbers
@@ -159,28 +159,39 @@ def _numbers(node: Element, what: str) -> Array:
     return finite_numbers([numerator for numerator, _, _ in parts], what) / below
 
 
-def write_gismo(path: Path, spline: BSplineVolume | MultiPatch | SplineField, *_: object) -> None:
-    """Write a volume, a body or a solution as G+Smo XML, which has no place for more."""
-    root = Element("xml")
-    if isinstance(spline, SplineField):
-        _add_topology(root, 1, (), [FACE_NAMES])
-        _add_patch(root, 0, spline, spline.coefficients, None)
-    else:
-        body = as_multipatch(spline)
-        _add_topology(root, len(body), body.interfaces, body.outer)
-        for number, patch in enumerate(body):
-            _add_patch(root, number, patch, patch.control_points, patch.weights)
+def write_gismo(path: Path, spline: BSplineVolume | MultiPatch, *_: object) -> None:
+    """Write a body as G+Smo XML, which has no place for more."""
+    body = as_multipatch(spline)
+    root = _with_topology(body)
+    for number, patch in enumerate(body):
+        _add_patch(root, number, patch, patch.control_points, patch.weights)
+    _save(path, root)
+
+
+def write_gismo_field(path: Path, solution: SplineField | MultiPatchField, spline: BSplineVolume | MultiPatch) -> None:
+    """Write a solution on a body as G+Smo XML."""
+    root = _with_topology(as_multipatch(spline))
+    for number, field in enumerate(solution.patches if isinstance(solution, MultiPatchField) else [solution]):
+        _add_patch(root, number, field, field.coefficients, None)
+    _save(path, root)
+
+
+def _save(path: Path, root: Element) -> None:
     ElementTree.indent(root, " ")
     text = ElementTree.tostring(root, encoding="unicode")
     path.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n', encoding="utf-8")
 
 
-def _add_topology(root: Element, patches: int, interfaces: Sequence[Interface], outer: Sequence[Sequence[str]]) -> None:
-    body = SubElement(root, "MultiPatch", parDim="3", id="0")
-    SubElement(body, "patches", type="id_range").text = f"{FIRST_ID} {FIRST_ID + patches - 1}"
-    SubElement(body, "interfaces").text = "\n".join(" ".join(map(str, _row(interface))) for interface in interfaces)
-    sides = [f"{FIRST_ID + patch} {FACE_NAMES.index(face) + 1}" for patch, faces in enumerate(outer) for face in faces]
-    SubElement(body, "boundary").text = "\n".join(sides)
+def _with_topology(body: MultiPatch) -> Element:
+    """Return a file's root with the numbers of the patches, their interfaces and their outer faces."""
+    root = Element("xml")
+    node = SubElement(root, "MultiPatch", parDim="3", id="0")
+    SubElement(node, "patches", type="id_range").text = f"{FIRST_ID} {FIRST_ID + len(body) - 1}"
+    SubElement(node, "interfaces").text = "\n".join(" ".join(map(str, _row(one))) for one in body.interfaces)
+    outer = [(patch, face) for patch, faces in enumerate(body.outer) for face in faces]
+    sides = [f"{FIRST_ID + patch} {FACE_NAMES.index(face) + 1}" for patch, face in outer]
+    SubElement(node, "boundary").text = "\n".join(sides)
+    return root
 
 
 def _row(interface: Interface) -> list[int]:

@@ -1,16 +1,17 @@
-"""Samples a volume, and a solution on it, on linear cells, which ParaView slices, clips and contours rightly.
+"""Samples a body, and a solution on it, on linear cells, which ParaView slices, clips and contours rightly.
 
 The nodes of the hexahedra lie on the spline, some a span of the solution and direction, with the values there of `arap`
 (distortion at volume 1), `det J`, and, with a solution, `u`, (the exact solution being known) `error` = |u - u_h|, and
 quantities of its law. Displacements are vectors `u`, and their `error` is a length. Symmetric tensors have six
-components, in VTK's order. Of a left-handed volume bottom and top of each cell change places.
+components, in VTK's order. Of a left-handed volume bottom and top of each cell change places. The cells of several
+patches are in one grid, a block of cells after the other, with the cell data `patch`: the number of each cell's patch.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,18 +20,19 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.quality.quality import arap_on
 from parameterize.spline.bspline import divided_spans
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
-from solve import Solution
 from solve.field import Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.forms.frame import UnitFrame
 from solve.quantities import on_grid
+from solve.solution import MultiPatchSolution, Solution
 
 from ..errors import InputError, one_line
-from ..figures.evaluate import error_at
-from .vtk import breaks_of, exact_cells, save
+from ..figures.evaluate import Body, Solved, error_at, fields_on, problems_on
+from .vtk import bezier_cells, breaks_of, save
 
 if TYPE_CHECKING:
     import pyvista
@@ -48,8 +50,8 @@ TENSOR = {"XX": (0, 0), "YY": (1, 1), "ZZ": (2, 2), "XY": (0, 1), "YZ": (1, 2), 
 
 def write_view(
     path: Path,
-    volume: BSplineVolume,
-    solution: SplineField | None = None,
+    body: Body,
+    solution: Solved | None = None,
     problem: BoundaryValueProblem | None = None,
     samples: int | None = None,
     quantities: Quantities | None = None,
@@ -58,42 +60,82 @@ def write_view(
 
     samples: cells a span and direction, chosen by default. Raises InputError for quantities that are not known.
     """
-    shown = breaks_of(volume, solution)
-    rows = _fitting(shown, MOST_VIEWED)[0] if samples is None else [divided_spans(row, samples) for row in shown]
-    save(path, _sampled(volume, rows, _of_map(volume, rows) | _of(volume, solution, problem, rows, quantities)))
+    parts = _parts(body, solution, problem)
+    grids = []
+    for part in parts:
+        shown = breaks_of(part.volume, part.solution)
+        most = MOST_VIEWED // len(parts)
+        rows = _fitting(shown, most)[0] if samples is None else [divided_spans(row, samples) for row in shown]
+        grids.append(_sampled(part.volume, rows, _of_map(part.volume, rows) | _of(part, rows, quantities)))
+    save(path, _joined(body, grids))
 
 
-def write_solution(path: Path, solution: Solution) -> int:
+def write_solution(path: Path, solution: Solution | MultiPatchSolution) -> int:
     """Write a solution and the quantities of its law in single precision, and return how many spans a cell takes a
     direction: more than one where the file would be large.
     """
-    rows, spans = _fitting(breaks_of(solution.geometry, solution), MOST_KEPT)
-    fields = _of(solution.geometry, solution, solution.problem, rows, None)
-    grid = _sampled(solution.geometry, rows, {name: values.astype(np.float32) for name, values in fields.items()})
-    grid.points = grid.points.astype(np.float32)
-    save(path, grid)
-    return spans
+    parts = _parts(solution.geometry, solution, solution.problem)
+    grids, most = [], 1
+    for part in parts:
+        rows, spans = _fitting(breaks_of(part.volume, part.solution), MOST_KEPT // len(parts))
+        fields = _of(part, rows, None)
+        grid = _sampled(part.volume, rows, {name: values.astype(np.float32) for name, values in fields.items()})
+        grid.points = grid.points.astype(np.float32)
+        grids.append(grid)
+        most = max(most, spans)
+    save(path, _joined(solution.geometry, grids))
+    return most
 
 
 def grid(
-    volume: BSplineVolume,
-    solution: SplineField | None = None,
+    body: Body,
+    solution: Solved | None = None,
     problem: BoundaryValueProblem | None = None,
     samples: int | None = None,
     quantities: Quantities | None = None,
 ) -> pyvista.UnstructuredGrid:
-    """Return a volume, and a solution on it, as a grid of pyvista: exact cells, or `samples` linear ones a span.
+    """Return a body, and a solution on it, as a grid of pyvista: exact cells, or `samples` linear ones a span.
 
     quantities: names of the law's quantities, or functions by name; by default the names that `_default` returns.
     """
     if samples is None:
         if quantities:
             raise ValueError("quantities need linear cells: give samples, such as 2")
-        return exact_cells(volume, solution)
+        return bezier_cells(body, solution)
     if samples < 1:
         raise ValueError(f"samples {samples}: must be 1 or larger, or None for exact Bezier cells")
-    rows = [divided_spans(row, samples) for row in breaks_of(volume, solution)]
-    return _sampled(volume, rows, _of_map(volume, rows) | _of(volume, solution, problem, rows, quantities))
+    grids = []
+    for part in _parts(body, solution, problem):
+        rows = [divided_spans(row, samples) for row in breaks_of(part.volume, part.solution)]
+        grids.append(_sampled(part.volume, rows, _of_map(part.volume, rows) | _of(part, rows, quantities)))
+    return _joined(body, grids)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Hold a patch of a body, the solution on it, and the problem there, with X, Y, Z measured in the body."""
+
+    volume: BSplineVolume
+    solution: SplineField | None
+    problem: BoundaryValueProblem | None
+
+
+def _parts(body: Body, solution: Solved | None, problem: BoundaryValueProblem | None) -> list[_Part]:
+    volumes = as_multipatch(body).patches
+    fields = [None] * len(volumes) if solution is None else fields_on(solution)
+    problems = [None] * len(volumes) if problem is None else problems_on(problem, body)
+    return [_Part(*part) for part in zip(volumes, fields, problems, strict=True)]
+
+
+def _joined(body: Body, grids: Sequence[pyvista.UnstructuredGrid]) -> pyvista.UnstructuredGrid:
+    """Return the grids of all patches as one, with the number of each cell's patch."""
+    if not isinstance(body, MultiPatch):
+        return grids[0]
+    import pyvista
+
+    for number, grid in enumerate(grids):
+        grid.cell_data["patch"] = np.full(grid.n_cells, number)
+    return pyvista.merge(grids, merge_points=False) if len(grids) > 1 else grids[0]
 
 
 def _fitting(breaks: Rows, most: int) -> tuple[Rows, int]:
@@ -133,17 +175,12 @@ def _of_map(volume: BSplineVolume, rows: Rows) -> dict[str, Array]:
     return {"arap": distortion, "det J": np.linalg.det(volume.grid_jacobian(u, v, w))}
 
 
-def _of(
-    volume: BSplineVolume,
-    solution: SplineField | None,
-    problem: BoundaryValueProblem | None,
-    rows: Rows,
-    quantities: Quantities | None,
-) -> dict[str, Array]:
-    """Return a solution on a grid, with its error where the exact solution is known, and quantities of its law.
+def _of(part: _Part, rows: Rows, quantities: Quantities | None) -> dict[str, Array]:
+    """Return a solution on a grid of a patch, its error where the exact solution is known, and quantities of its law.
 
     Raises InputError for quantities without a law, and for names that it does not give.
     """
+    volume, solution, problem = part.volume, part.solution, part.problem
     if (solution is None or problem is None) and quantities:
         raise InputError("quantities need a solution whose law is known, by the report.json beside it")
     if solution is None:
@@ -152,14 +189,13 @@ def _of(
     fields = {"u": solution.grid(u, v, w)}
     if problem is None:
         return fields
-    placed = problem.on(volume)
-    if placed.exact is not None:
-        fields["error"] = error_at(fields["u"], placed, Points.on(volume, u, v, w))
-    chosen = _default(placed.form.quantities) if quantities is None else quantities
+    if problem.exact is not None:
+        fields["error"] = error_at(fields["u"], problem, Points.on(volume, u, v, w))
+    chosen = _default(problem.form.quantities) if quantities is None else quantities
     asked = chosen if isinstance(chosen, Mapping) else {name: name for name in chosen}
     field = replace(solution, geometry=volume)
     try:
-        return fields | {name: on_grid(field, placed.form, what, u, v, w) for name, what in asked.items()}
+        return fields | {name: on_grid(field, problem.form, what, u, v, w) for name, what in asked.items()}
     except ValueError as error:
         if quantities is not None:
             raise InputError(one_line(error)) from None

@@ -38,11 +38,11 @@ from parameterize.spline.bspline import (
     sparse_rows,
 )
 from parameterize.spline.interface import WEIGHT_TOLERANCE, Interface, face_layer
-from parameterize.spline.multipatch import MultiPatch, shared_numbers
+from parameterize.spline.multipatch import MultiPatch, as_multipatch, shared_numbers
 from parameterize.spline.orientation import orientation
 from parameterize.spline.rational import projected
 from parameterize.spline.volume import BSplineVolume
-from solve.field import SplineField
+from solve.field import MultiPatchField, SplineField
 
 if TYPE_CHECKING:
     import pyvista
@@ -51,20 +51,30 @@ BEZIER_HEXAHEDRON = 79
 
 
 def write_bezier(
-    path: Path, volume: BSplineVolume | MultiPatch, solution: SplineField | None = None, *_: object
+    path: Path,
+    body: BSplineVolume | MultiPatch,
+    solution: SplineField | MultiPatchField | None = None,
+    *_: object,
 ) -> None:
     """Write the exact cells; a solution becomes the point data `u`."""
-    save(path, exact_cells(volume, solution) if isinstance(volume, BSplineVolume) else cells_of_patches(volume))
+    save(path, bezier_cells(body, solution))
 
 
-def cells_of_patches(body: MultiPatch) -> pyvista.UnstructuredGrid:
-    """Return the cells of all patches, with the number of each cell's patch as the cell data `patch`.
+def bezier_cells(
+    body: BSplineVolume | MultiPatch, solution: SplineField | MultiPatchField | None
+) -> pyvista.UnstructuredGrid:
+    """Return the cells of all patches; of several also the number of each cell's patch as the cell data `patch`.
 
     Neighbours share the points of their interface where these have the same weights, so that the surface of the grid is
     that of the body. Where the weights of two faces differ by a factor, each patch keeps points of its own.
     """
-    grids = [exact_cells(patch, None) for patch in body]
-    shapes = [tuple(1 + p * (len(np.unique(k)) - 1) for p, k in zip(v.degrees, v.knots, strict=True)) for v in body]
+    fields = solution.patches if isinstance(solution, MultiPatchField) else (solution,) * len(as_multipatch(body))
+    grids = [exact_cells(patch, field) for patch, field in zip(as_multipatch(body), fields, strict=True)]
+    if not isinstance(body, MultiPatch):
+        return grids[0]
+    degrees = [grid.cell_data["HigherOrderDegrees"][0].astype(int).tolist() for grid in grids]
+    spans = [[len(row) - 1 for row in breaks_of(*pair)] for pair in zip(body, fields, strict=True)]
+    shapes = [tuple(1 + p * n for p, n in zip(*pair, strict=True)) for pair in zip(degrees, spans, strict=True)]
     own = [grid.point_data["RationalWeights"].reshape(shape) for grid, shape in zip(grids, shapes, strict=True)]
     labels, count = shared_numbers(shapes, [interface for interface in body.interfaces if _are_alike(own, interface)])
     points, weights = np.empty((count, 3)), np.empty(count)
@@ -74,16 +84,23 @@ def cells_of_patches(body: MultiPatch) -> pyvista.UnstructuredGrid:
         rows = grid.cells.reshape(grid.n_cells, -1)
         cells.append(np.column_stack([rows[:, :1], label.ravel()[rows[:, 1:]]]).ravel())
         sizes.append(np.full(grid.n_cells, number))
-    degrees = np.concatenate([grid.cell_data["HigherOrderDegrees"] for grid in grids])
-    joined = _grid(np.concatenate(cells), points, weights, degrees)
+    raised = np.concatenate([grid.cell_data["HigherOrderDegrees"] for grid in grids])
+    joined = _grid(np.concatenate(cells), points, weights, raised)
     joined.cell_data["patch"] = np.concatenate(sizes)
+    if solution is not None:
+        found = [grid.point_data["u"].reshape(grid.n_points, -1) for grid in grids]
+        values = np.empty((count, found[0].shape[1]))
+        for own_values, label in zip(found, labels, strict=True):
+            values[label.ravel()] = own_values
+        joined.point_data["u"] = values[:, 0] if values.shape[1] == 1 else values
     return joined
 
 
 def _are_alike(weights: Sequence[Array], interface: Interface) -> bool:
-    """Return whether the weights (m_u, m_v, m_w) of two patches' points are the same at an interface."""
+    """Return whether the points of two patches have the same degree and weights (m_u, m_v, m_w) at an interface."""
     first, second = (face_layer(weights[patch], face) for patch, face in (interface.first, interface.second))
-    return np.allclose(first, interface.turned(second), rtol=WEIGHT_TOLERANCE, atol=0.0)
+    second = interface.turned(second)
+    return first.shape == second.shape and np.allclose(first, second, rtol=WEIGHT_TOLERANCE, atol=0.0)
 
 
 def exact_cells(volume: BSplineVolume, solution: SplineField | None) -> pyvista.UnstructuredGrid:

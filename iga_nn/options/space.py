@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from parameterize.spline.multipatch import MultiPatch
     from parameterize.spline.volume import BSplineVolume
 
 MAX_REFINE = 6
@@ -33,14 +34,17 @@ def check_level(level: int) -> None:
         raise InputError(f"refine {level}: at most {MAX_REFINE}; each level has 8 times the unknowns")
 
 
-def check_size(volume: BSplineVolume, refine: int, degree: int | None, components: int = 1, processes: int = 1) -> int:
-    """Return the number of unknowns on a mesh of the volume.
+def check_size(
+    body: BSplineVolume | MultiPatch, refine: int, degree: int | None, components: int = 1, processes: int = 1
+) -> int:
+    """Return the number of unknowns on a mesh of the body, those at interfaces counted for each patch.
 
     Raises InputError where there are too many unknowns for this number of processes.
     """
+    from parameterize.spline.multipatch import as_multipatch
     from solve.discretization.space import trial_space
 
-    dofs = components * trial_space(volume, refine, degree).dofs
+    dofs = components * sum(trial_space(patch, refine, degree).dofs for patch in as_multipatch(body))
     if dofs > (most := MAX_DOFS * processes):
         raise InputError(f"refine {refine} gives {dofs:,} unknowns, more than {most:,}: lower refine or degree")
     return dofs

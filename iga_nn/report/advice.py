@@ -46,7 +46,7 @@ def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
 
     mapping: the options of the map, where they are known.
     """
-    if is_certified(report):
+    if is_certified(report) or "patches" in report["parameterization"]:  # several patches come from another program
         return []
     quality, remedies = report["parameterization"], []
     if mapping is not None and mapping.steps_factor < 1.0:
@@ -73,6 +73,7 @@ def in_words(report: Report) -> list[str]:
     if found := quality.get("unproved"):
         places = ", ".join(map(in_brackets, found["places"]))
         lines.append(f"not proved       on {found['spans']} spans, near {places}")
+    lines += [f"folded back      at {interface}" for interface in quality.get("misglued", ())]
     if meeting := quality.get("boundary_meeting"):
         lines.append(f"meets itself     at {in_brackets(meeting['point'])}")
     return lines + [f"try              {remedy}" for remedy in report.get("advice", [])]

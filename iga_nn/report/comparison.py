@@ -53,7 +53,7 @@ class Run:
 
 def _of_map(report: reports.Report) -> dict[str, Cell]:
     quality = report["parameterization"]
-    found: dict[str, Cell] = {"control points": (None, " × ".join(map(str, quality["control_points"])))}
+    found: dict[str, Cell] = {"control points": (None, reports.size_in_words(quality))}
     if arap := quality.get("arap", {}).get("unit_volume"):
         found |= {f"ARAP distortion, {name}": (arap[name], f"{arap[name]:.4g}") for name in ("mean", "max")}
     distance = reports.surface_distance(report)

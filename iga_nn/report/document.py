@@ -82,8 +82,19 @@ def is_certified(report: Report) -> bool:
 
 
 def claim(report: Report) -> str:
-    """Return the claim of a certificate: "det J > 0", of a left-handed volume "det J < 0"."""
-    return CLAIMS[report["parameterization"].get("orientation", "right-handed")]
+    """Return the claim of a certificate: "det J > 0", of a left-handed volume "det J < 0".
+
+    Of patches of which some are left-handed it is "one sign of det J".
+    """
+    quality = report["parameterization"]
+    hands = {part.get("orientation", "right-handed") for part in quality.get("patches", [quality])}
+    return CLAIMS[hands.pop()] if len(hands) == 1 else "one sign of det J"
+
+
+def size_in_words(quality: Report) -> str:
+    """Return the number of control points: of a volume in each direction, of several patches in all."""
+    found = quality["control_points"]
+    return f"{found:,}" if isinstance(found, int) else " × ".join(map(str, found))
 
 
 def is_converged(report: Report) -> bool:
@@ -162,7 +173,7 @@ def verdict(report: Report, folder: Path) -> Report:
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
     if distance := surface_distance(report):
         short["surface_distance"] = distance
-    defects = {name: quality[name] for name in ("unproved", "boundary_meeting") if quality.get(name)}
+    defects = {name: quality[name] for name in ("unproved", "boundary_meeting", "misglued") if quality.get(name)}
     short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
     if refinement := quality.get("refinement"):
         short["refinement"] = refinement

@@ -32,9 +32,9 @@ ERRORS = (  # keys of a level: the absolute error, and the relative one that sta
 )
 
 MEANINGS = {
-    "certified": "{claim} is proved on the whole cube, rounding errors included.",
+    "certified": "{claim} is proved on {whole}, rounding errors included.",
     "folded": "The map folds: det J has the wrong sign somewhere. Do not trust a solution on it.",
-    "undecided": "Neither {claim} on the whole cube nor a fold could be proved.",
+    "undecided": "Neither {claim} on {whole} nor a fold could be proved.",
 }
 ORIGINS = {
     "network": ("the network", "trained on the surface"),
@@ -103,7 +103,12 @@ def verdicts(report: Report) -> list[tuple[str, str, str]]:
     """Return the verdicts that decide whether the result can be used: colour, heading and meaning of each."""
     quality, answer = report["parameterization"], reports.one_to_one(report)
     claim = reports.claim(report)
-    meaning = MEANINGS[quality["bijective"]].format(claim=claim)
+    whole = "every patch" if "patches" in quality else "the whole cube"
+    meaning = MEANINGS[quality["bijective"]].format(claim=claim, whole=whole)
+    if misglued := quality.get("misglued"):
+        meaning += f" Two patches lie on the same side of {', '.join(misglued)}."
+    if quality.get("overlap"):
+        meaning += " Parts of the body overlap."
     if quality.get("orientation") == "left-handed":
         meaning += " The parameters u, v, w are a left-handed system, which changes no result."
     if meeting := quality.get("boundary_meeting"):
@@ -143,13 +148,23 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
         facts.append(("Unknowns", f"{finest['dofs']:,}", f"{finest['iterations']} iterations"))
     if vibration := report.get("modes"):
         facts += [(f"Mode {i}", f"{f:.4g}", "frequency") for i, f in enumerate(vibration["frequencies"], start=1)]
-    points = " × ".join(map(str, quality["control_points"]))
-    facts.append(("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"]))))
+    facts += _sizes(quality)
     if "origin" in quality:
         facts.append(("The map comes from", *ORIGINS[quality["origin"]]))
     if refinement := quality.get("refinement"):
         facts.append(("Control points chosen", refinement["stopped"], reports.control_points_in_words(report)))
     return facts
+
+
+def _sizes(quality: Report) -> list[tuple[str, str, str]]:
+    """Return the numbers of patches and of control points."""
+    points, parts = reports.size_in_words(quality), quality.get("patches")
+    if parts is None:
+        return [("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"])))]
+    glued = f"{len(quality['interfaces'])} interfaces, {quality['outer_faces']} outer faces"
+    degrees = sorted({degree for part in parts for degree in part["degrees"]})
+    said = f"shared ones once; degrees {', '.join(map(str, degrees))}"
+    return [("Patches", str(len(parts)), glued), ("Control points", points, said)]
 
 
 def _error_fact(level: Report, absolute: str, relative: str) -> tuple[str, str, str]:

@@ -1,8 +1,9 @@
-"""Makes the interactive scene of report.html: a volume and the fields on it as compact arrays for the page's script.
+"""Makes the interactive scene of report.html: a body and the fields on it as compact arrays for the page's script.
 
-The six faces are sampled on lattices of points, and the inside on one lattice through the cube, from which the page
-takes its sections. Places are 16-bit numbers between two corners of the scene, values 16-bit numbers between the ends
-of their range, all in Base64: some 0.7 MB for the places and for displacements, 0.25 MB for every other field.
+The faces of the boundary are sampled on lattices of points, and the inside on one lattice through the cube of each
+patch, from which the page takes its sections. Places are 16-bit numbers between two corners of the scene, values 16-bit
+numbers between the ends of their range, all in Base64: of a volume some 0.7 MB for the places and for displacements,
+0.25 MB for every other field.
 
 A scene has one frame, or several: modes, or steps in time. A frame holds the values of its fields by their names;
 fields that a frame does not have are taken from the first frame.
@@ -17,15 +18,17 @@ import numpy as np
 from matplotlib import colormaps
 from numpy.typing import NDArray
 
-from parameterize.arrays import Array, Knots
+from parameterize.arrays import Array, Knots, Mask
 from parameterize.spline.bspline import breakpoints
-from parameterize.spline.volume import AXES, BSplineVolume
-from solve import SplineField
+from parameterize.spline.interface import face_label
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.volume import AXES, FACE_NAMES
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
 from ..figures import evaluate
-from ..figures.cutaway import best_cut, patches_of
+from ..figures.cutaway import cut_of, patches_of, seen_quarters
+from ..figures.evaluate import Body, Solved, fields_on, outer_faces
 from ..figures.fields import (
     STRESS,
     Field,
@@ -34,10 +37,12 @@ from ..figures.fields import (
     distortion_of,
     error_of,
     fields_of,
+    is_spatial,
     points_of,
     quantity_of,
     vectors_of,
 )
+from ..figures.palette import color_labels, face_colors
 from ..figures.style import even_range, with_unit
 from ..figures.warp import factor_for, is_displacement, warp_of
 from ..options import NO_UNITS, Units
@@ -46,6 +51,8 @@ Scene = dict[str, Any]
 
 LENGTH = 3  # in place of a component: the length of the vector
 COMPONENTS = {"|u|": LENGTH, "u_x": 0, "u_y": 1, "u_z": 2}  # fields that the page finds from the vectors
+PLANES = [(axis, side) for axis in range(3) for side in (0.0, 1.0)] + [(axis, 0.5) for axis in range(3)]
+MANY = 8  # patches: those of more have half as many points a direction, for the size of the page
 EVEN = 0.01  # of a field's range: where half of the boundary varies less, the view opens on the inside
 
 
@@ -54,19 +61,19 @@ class Frame:
     """Hold one mode, or one step in time: its fields, and its name beside the slider.
 
     label: a text such as "mode 1: 12.5 Hz" or "t = 0.1 s". fields: the first field is shown at first. vectors: (...,
-    3), or None. displaces: whether the vectors displace the body. knots: the knots of the mesh that is drawn, by
-    default the knots of the volume.
+    3), or None. displaces: whether the vectors displace the body. knots: of each patch the knots of the mesh that is
+    drawn, by default those of the body.
     """
 
     label: str
     fields: Sequence[Field]
     vectors: Samples | None = None
     displaces: bool = False
-    knots: Knots | None = None
+    knots: Sequence[Knots] | None = None
 
     @classmethod
-    def of(cls, label: str, solution: SplineField, quantities: Mapping[str, Quantity] | None = None) -> Self:
-        """Return the frame of a solution on its volume.
+    def of(cls, label: str, solution: Solved, quantities: Mapping[str, Quantity] | None = None) -> Self:
+        """Return the frame of a solution on its body.
 
         quantities: further fields by their names, functions of u (c, ...), grad (c, 3, ...) and x (3, ...) that return
         (...); they stand first. Those that are not finite are left out.
@@ -82,13 +89,14 @@ class Frame:
         """
         named = [quantity_of(solution, quantity, name, name) for name, quantity in (quantities or {}).items()]
         fields = [field for field in named if field is not None] + fields_of(solution)
-        vectors = vectors_of(solution) if solution.coefficients.shape[3:] == (3,) else None
-        return cls(label, fields, vectors, is_displacement(solution), solution.knots)
+        vectors = vectors_of(solution) if is_spatial(solution) else None
+        knots = [field.knots for field in fields_on(solution)]
+        return cls(label, fields, vectors, is_displacement(solution), knots)
 
 
 def scene_of(
-    volume: BSplineVolume,
-    solution: SplineField | None = None,
+    body: Body,
+    solution: Solved | None = None,
     problem: BoundaryValueProblem | None = None,
     *,
     units: Units = NO_UNITS,
@@ -98,13 +106,13 @@ def scene_of(
 
     units: the units in the titles of the bars. coarser: 1 for all points, 2 for every second point.
     """
-    if solution is None or not np.all(np.isfinite(solution.coefficients)):
-        return _scene(volume, [Frame("", [])], coarser)
+    if solution is None or not all(np.all(np.isfinite(field.coefficients)) for field in fields_on(solution)):
+        return _scene(body, [Frame("", [])], coarser)
     frame = Frame.of("", solution)
     if problem is not None and problem.exact is not None:
-        frame = replace(frame, fields=[*frame.fields, error_of(volume, solution, problem)])
+        frame = replace(frame, fields=[*frame.fields, error_of(body, solution, problem)])
     frame = replace(frame, fields=[_with_unit(field, units) for field in frame.fields])
-    return _scene(volume, [frame], coarser) | {"warp": warp_of(solution, diagonal_of(points_of(volume)))}
+    return _scene(body, [frame], coarser) | {"warp": warp_of(solution, diagonal_of(points_of(body)))}
 
 
 def _with_unit(field: Field, units: Units) -> Field:
@@ -113,7 +121,7 @@ def _with_unit(field: Field, units: Units) -> Field:
 
 
 def scene_of_frames(
-    volume: BSplineVolume,
+    body: Body,
     frames: Sequence[Frame],
     *,
     oscillates: bool = False,
@@ -149,37 +157,95 @@ def scene_of_frames(
     ]
     moved = [frame.vectors for frame in alike if frame.displaces and frame.vectors is not None]
     lengths = [np.linalg.norm(values, axis=-1).max() for vectors in moved for values in vectors.everywhere]
-    factor = factor_for(diagonal_of(points_of(volume)), float(max(lengths, default=0.0)))
-    return _scene(volume, alike, coarser) | {"warp": factor, "oscillates": oscillates}
+    factor = factor_for(diagonal_of(points_of(body)), float(max(lengths, default=0.0)))
+    return _scene(body, alike, coarser) | {"warp": factor, "oscillates": oscillates}
 
 
-def _scene(volume: BSplineVolume, frames: Sequence[Frame], coarser: int) -> Scene:
-    """Return a scene of frames with the same fields; the distortion of the volume joins the first frame's fields."""
-    points = points_of(volume)
+@dataclass(frozen=True)
+class Drawn:
+    """Say which samples of a body the page has: those on some faces, and in the lattices, every second for `coarser` 2.
+
+    faces: the places of the outer faces among the nine faces and sections of each patch.
+    """
+
+    faces: Sequence[int]
+    coarser: int
+
+    def thinned(self, samples: Samples) -> tuple[Array, Array]:
+        """Return every second point on the faces (f, m, m, ...) and all points in the lattices (patches, n, n, n, ...).
+
+        With `coarser` 2 both have half as many points a direction.
+        """
+        step, twice = slice(None, None, self.coarser), slice(None, None, 2 * self.coarser)
+        faces = np.stack([samples.patches[k][twice, twice] for k in self.faces])
+        return faces, np.stack([lattice[step, step, step] for lattice in samples.lattices])
+
+    def packed(self, samples: Samples, shares: Callable[[Array], Array]) -> dict[str, str]:
+        """Return the packed shares of samples, on the faces and in the lattices."""
+        faces, lattices = self.thinned(samples)
+        return {"faces": _packed(shares(faces)), "lattice": _packed(shares(lattices))}
+
+
+def _scene(body: Body, frames: Sequence[Frame], coarser: int) -> Scene:
+    """Return a scene of frames with the same fields; the distortion of the body joins the first frame's fields."""
+    points, patches = points_of(body), as_multipatch(body).patches
+    drawn = Drawn(outer_faces(body), coarser if len(patches) <= MANY else 2)
     cloud = np.concatenate([where.reshape(-1, 3) for where in points.everywhere])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
-    octant, view = best_cut(patches_of(points.patches)[:6])
-    count, many = (part.shape[1] for part in _thinned(points, coarser))
-    whole = [replace(frames[0], fields=[*frames[0].fields, distortion_of(volume)]), *frames[1:]]
+    images = patches_of(body, points.patches)
+    left_out, view = cut_of(body, [images[k] for k in drawn.faces], points)
+    count, many = (part.shape[1] for part in drawn.thinned(points))
+    whole = [replace(frames[0], fields=[*frames[0].fields, distortion_of(body)]), *frames[1:]]
     bound = _bound(frames)
+    knots = frames[0].knots or [patch.knots for patch in patches]
     return {
         "samples": {"faces": count, "lattice": many},  # per direction
         "low": low.tolist(),
         "high": high.tolist(),
         "view": np.stack([view.right, view.up, view.towards]).tolist(),
-        "octant": list(octant),  # the octant that the cut leaves out
-        "places": _both(points, coarser, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
-        "axes": list(AXES),
-        "spans": [breakpoints(row).tolist() for row in frames[0].knots or volume.knots],
-        "colors": list(evaluate.FACE_COLORS),
-        "labels": evaluate.face_labels(),
+        "outer": [divmod(k, 9) for k in drawn.faces],  # patch and face
+        "cut": _cut(list(seen_quarters(body, left_out)), drawn.faces),
+        "places": drawn.packed(points, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
+        "axes": [] if isinstance(body, MultiPatch) else list(AXES),  # along which there are sections through the cube
+        "spans": [[breakpoints(row).tolist() for row in rows] for rows in knots],
+        **_colors(body, drawn.faces),
         "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
         "fields": [_described(field, frames[0]) for field in whole[0].fields],
-        "frames": [_values(frame, bound, coarser) for frame in whole],
+        "frames": [_values(frame, bound, drawn) for frame in whole],
         "bound": bound,  # of the entries of all vectors
         "warp": 0.0,
         "oscillates": False,
-        "opening": _opening(frames[0]),
+        "opening": _opening(frames[0], drawn.faces),
+    }
+
+
+def _cut(seen: Sequence[Mask], outer: Sequence[int]) -> dict[str, list[tuple[float, ...]]]:
+    """Return what is seen of a body cut open.
+
+    These are outer faces by their numbers, with their quarters (`_bits`); and planes inside: patch, direction, its
+    parameter, and quarters. Glued faces are such planes, too.
+    """
+    faces = [(number, _bits(seen[k // 9][k % 9])) for number, k in enumerate(outer)]
+    inside = [(i, k) for i in range(len(seen)) for k in range(9) if 9 * i + k not in set(outer)]
+    planes = [(i, *PLANES[k], _bits(seen[i][k])) for i, k in inside]
+    return {"faces": [row for row in faces if row[-1]], "planes": [row for row in planes if row[-1]]}
+
+
+def _bits(quarters: Mask) -> int:
+    """Return the quarters (2, 2) of a face as bits of a number, (i, j) as bit 2 i + j."""
+    return int(quarters.ravel() @ (1 << np.arange(4)))
+
+
+def _colors(body: Body, outer: Sequence[int]) -> dict[str, Any]:
+    """Return the colours and the names of the outer faces, and the legend of the colours."""
+    colors, labels = np.reshape(face_colors(body), (-1, len(FACE_NAMES))), evaluate.face_labels()
+    if isinstance(body, MultiPatch):
+        labels = [face_label(i, name) for i in range(len(body)) for name in FACE_NAMES]
+    named = np.reshape(labels, (-1, len(FACE_NAMES)))
+    return {
+        "colors": [str(colors[divmod(k, 9)]) for k in outer],
+        "labels": [str(named[divmod(k, 9)]) for k in outer],
+        "legend": color_labels(body),
     }
 
 
@@ -189,7 +255,7 @@ def _bound(frames: Sequence[Frame]) -> float:
     return max((float(np.abs(values).max()) for values in parts), default=0.0) or 1.0
 
 
-def _opening(frame: Frame) -> dict[str, str]:
+def _opening(frame: Frame, outer: Sequence[int]) -> dict[str, str]:
     """Return the first view: the first field, on the boundary, unless half of the boundary has nearly one value.
 
     A body is seen as a whole, because its shape is more informative than the colours inside.
@@ -197,7 +263,7 @@ def _opening(frame: Frame) -> dict[str, str]:
     if not frame.fields:
         return {"field": "faces", "part": "surface"}
     field = frame.fields[0]
-    quarters = np.percentile([field.limits.shares(patch) for patch in field.patches[:6]], [25.0, 75.0])
+    quarters = np.percentile([field.limits.shares(field.patches[k]) for k in outer], [25.0, 75.0])
     is_even = quarters[1] - quarters[0] < EVEN and not field.limits.remark
     return {"field": field.name, "part": "cut" if is_even and not frame.displaces else "surface"}
 
@@ -214,32 +280,13 @@ def _is_derived(field: Field, frame: Frame) -> bool:
     return frame.vectors is not None and field.name in COMPONENTS
 
 
-def _values(frame: Frame, bound: float, coarser: int) -> dict[str, Any]:
+def _values(frame: Frame, bound: float, drawn: Drawn) -> dict[str, Any]:
     """Return the values of a frame, as shares of their ranges."""
     values = {
-        field.name: _both(field, coarser, field.limits.shares)
-        for field in frame.fields
-        if not _is_derived(field, frame)
+        field.name: drawn.packed(field, field.limits.shares) for field in frame.fields if not _is_derived(field, frame)
     }
-    vectors = frame.vectors and _both(frame.vectors, coarser, lambda found: 0.5 + 0.5 * found / bound)
+    vectors = frame.vectors and drawn.packed(frame.vectors, lambda found: 0.5 + 0.5 * found / bound)
     return {"label": frame.label, "values": values, "vectors": vectors}
-
-
-def _both(samples: Samples, coarser: int, shares: Callable[[Array], Array]) -> dict[str, str]:
-    """Return the packed shares of samples, on the faces and in the inner lattice."""
-    return {
-        name: _packed(shares(part)) for name, part in zip(("faces", "lattice"), _thinned(samples, coarser), strict=True)
-    }
-
-
-def _thinned(samples: Samples, coarser: int) -> tuple[Array, Array]:
-    """Return every second point on the six faces (6, m, m, ...) and all points in the lattice.
-
-    With `coarser` 2 both have half as many points a direction.
-    """
-    step = slice(None, None, coarser)
-    faces = np.stack([patch[:: 2 * coarser, :: 2 * coarser] for patch in samples.patches[:6]])
-    return faces, samples.lattice[step, step, step]
 
 
 def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint16) -> str:

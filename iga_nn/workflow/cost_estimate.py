@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from parameterize.config import Config, SplineConfig
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
 from solve.discretization.errors import POINTS
@@ -27,6 +28,7 @@ from solve.discretization.space import trial_space
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.options import SolveOptions
 
+from ..figures.evaluate import problems_on
 from ..rounding import rounded
 
 log = logging.getLogger(__name__)
@@ -216,10 +218,16 @@ class SolveMemory:
         return self.shared_mb / processes + self.each_mb
 
 
-def solve_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> SolveMemory:
-    """Return the forecast for one solve."""
+def solve_memory(body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions) -> SolveMemory:
+    """Return the forecast for one solve: the sum over the patches of a body."""
+    parts = zip(as_multipatch(body), problems_on(problem, body), strict=True)
+    found = [_patch_memory(patch, own, options) for patch, own in parts]
+    return SolveMemory(sum(one.shared_mb for one in found), sum(one.each_mb for one in found))
+
+
+def _patch_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> SolveMemory:
     form, space = problem.form, trial_space(volume, options.refine, options.degree)
-    rule = rule_of(volume, space, problem.on(volume).form.tensor, options.quadrature)
+    rule = rule_of(volume, space, problem.form.tensor, options.quadrature)
     points = float(np.prod(rule.shape, dtype=float))
     unknowns = float(form.components * space.dofs)
     kept = CONSTANT * form.constant + BLOCK + form.has_reaction
@@ -230,7 +238,7 @@ def solve_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: 
     return SolveMemory(8e-6 * shared, 8e-6 * each)
 
 
-def tell_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> None:
+def tell_memory(body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions) -> None:
     """Log the memory of a solve.
 
     Where it is not free, warn, and name the number of processes that could solve the problem.
@@ -239,14 +247,15 @@ def tell_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: S
     if options.comm is not None:
         names = options.comm.allgather(platform.node())
         processes, here = len(names), names.count(platform.node())
-    wanted, free = solve_memory(volume, problem, options), available_memory_mb(here)
+    wanted, free = solve_memory(body, problem, options), available_memory_mb(here)
     needed = wanted.on(processes)
     each = f" on each of {processes} processes" * (processes > 1)
     log.info("estimate: %s GB of memory%s", rounded(needed / 1000.0, 1), each)
     if free is None or needed <= free:
         return
-    spans = len(trial_space(volume, options.refine, options.degree).breaks[0]) - 1
-    enough = next((count for count in range(processes + 1, spans + 1) if wanted.on(count) <= free), None)
+    spans = len(trial_space(as_multipatch(body).patches[0], options.refine, options.degree).breaks[0]) - 1
+    most = processes if isinstance(body, MultiPatch) else spans  # several patches are solved by one process
+    enough = next((count for count in range(processes + 1, most + 1) if wanted.on(count) <= free), None)
     more = f", or take {enough} processes with as much memory each: mpiexec -n {enough} iga-nn solve .. --mpi"
     log.warning(
         "%s GB of memory are needed, %s GB are free: lower --refine%s",

@@ -17,13 +17,15 @@ import numpy as np
 from parameterize.checkpoint import differing
 from parameterize.files import save_text
 from parameterize.progress import ProgressCallback
+from parameterize.spline.multipatch import as_multipatch
 from parameterize.spline.volume import BSplineVolume
-from solve import ConvergenceRow, Solution, check_device, check_problem, convergence, modes
+from solve import ConvergenceRow, check_device, check_problem, convergence, modes
 from solve.discretization.slab import agreed
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, input_errors
-from ..io.formats import load_one_patch
+from ..figures.evaluate import Body
+from ..io.formats import load_volume
 from ..level_table import as_csv, as_table, rows_of
 from ..options import (
     NO_UNITS,
@@ -44,6 +46,7 @@ from .cost_estimate import tell_memory
 from .mapping import MapInput, map_surface, read_input
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
 from .solving import (
+    Found,
     described,
     each_level,
     moving_scene_of,
@@ -209,7 +212,7 @@ def solve_to(
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
     problem = with_part(statement.problem(), path)
-    loaded, options = load_one_patch(path), replace(statement.solve_options(), device=device, comm=comm)
+    loaded, options = load_volume(path), replace(statement.solve_options(), device=device, comm=comm)
     processes = 1 if comm is None else comm.size
     if comm is not None and processes == 1:
         log.warning("--mpi in a single process: `mpiexec -n 4 iga-nn solve ... --mpi` takes four")
@@ -265,8 +268,8 @@ def study_to(
     check_type("volume", volume, str | Path)
     study_options, path = study_options or StudyOptions(), Path(volume)
     problem, levels = study_options.problem(), study_options.levels()
-    loaded = load_one_patch(path)
-    degrees = sorted(study_options.degree) or [max(loaded.degrees)]
+    loaded = load_volume(path)
+    degrees = sorted(study_options.degree) or [max(max(patch.degrees) for patch in as_multipatch(loaded))]
     for degree in degrees:
         check_size(loaded, levels[-1], degree, problem.form.components)
     with input_errors():
@@ -301,7 +304,7 @@ def modes_to(
     """
     check_type("volume", volume, str | Path)
     modes_options, path = modes_options or ModesOptions(), Path(volume)
-    body, loaded = with_part(modes_options.problem(), path), load_one_patch(path)
+    body, loaded = with_part(modes_options.problem(), path), load_volume(path)
     check_size(loaded, modes_options.refine, modes_options.degree, body.form.components)
     with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
         state.begin("modes")
@@ -347,14 +350,14 @@ def _finished_by(
 
 def _finish(
     state: RunFolder,
-    volume: BSplineVolume,
-    solution: Solution | None = None,
+    body: Body,
+    solution: Found | None = None,
     problem: BoundaryValueProblem | None = None,
     units: Units = NO_UNITS,
     scene: Any = None,
 ) -> Outcome:
     """Finish the report, write the page that shows it and return the output folder."""
-    scene = scene or scene_of(state, volume, solution, problem, units=units)
+    scene = scene or scene_of(state, body, solution, problem, units=units)
     outcome = state.finish()
     html.write(outcome.folder, outcome.report, scene)
     return outcome

@@ -10,28 +10,32 @@ from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.compilation import compilation_told
 from parameterize.quality.quality import proved
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
+from ..report.patches import proved_of
 from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 
 
-def certified_facts(volume: BSplineVolume) -> dict[str, Any]:
-    """Certify a volume and return the section `parameterization` of report.json."""
+def certified_facts(body: BSplineVolume | MultiPatch) -> dict[str, Any]:
+    """Certify a body and return the section `parameterization` of report.json."""
     with compilation_told():
-        certificate = certify(volume)
-        facts = proved(volume.shape, volume.degrees, certificate, check_boundary(volume))
-    return facts | advice.unproved(volume, certificate)
+        if isinstance(body, MultiPatch):
+            return proved_of(body, certify(body), check_boundary(body))
+        certificate = certify(body)
+        facts = proved(body.shape, body.degrees, certificate, check_boundary(body))
+    return facts | advice.unproved(body, certificate)
 
 
-def write_certificate(state: RunFolder, path: Path, volume: BSplineVolume, command: str) -> None:
-    """Certify a saved volume, and write the sections of report.json about the input and the proof."""
+def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiPatch, command: str) -> None:
+    """Certify a saved body, and write the sections of report.json about the input and the proof."""
     with state.timed("certify"):
-        facts = certified_facts(volume)
+        facts = certified_facts(body)
     state.write(
         command=command,
         input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},

@@ -141,16 +141,22 @@ class QualityReport(Shown):
 
 
 def proved(
-    shape: tuple[int, int, int], degrees: tuple[int, int, int], certificate: Certificate, check: BoundaryCheck
+    shape: tuple[int, int, int],
+    degrees: tuple[int, int, int],
+    certificate: Certificate,
+    check: BoundaryCheck | None = None,
 ) -> dict[str, Any]:
-    """Return the section's entries for a volume that was certified, but not measured."""
+    """Return the section's entries for a volume that was certified, but not measured.
+
+    check: None for one patch of several, whose boundary is checked as a whole.
+    """
     bound = certificate.lower_bound
     return {
         "control_points": list(shape),
         "degrees": list(degrees),
         "bijective": certificate.verdict,
         "orientation": certificate.orientation,
-        **check.as_dict(),
+        **({} if check is None else check.as_dict()),
         "det_lower_bound": bound if isfinite(bound) else None,
         "witness": None if certificate.witness is None else list(certificate.witness),
     }

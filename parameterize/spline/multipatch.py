@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -26,6 +26,10 @@ from .interface import (
     orientations,
 )
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
+
+if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.figure import Figure
 
 TOLERANCE = 1e-6  # of the body's size: distance of two control points that are taken for one
 SAMPLES = 5  # points a direction at which two faces over the same corners are compared
@@ -112,6 +116,14 @@ class MultiPatch(Brief, Shown):
     def to_splinepy(self) -> Any:
         """Return the same body as a splinepy.Multipatch. Raises InputError where splinepy is missing."""
         return above("io.splinepy").body_to_splinepy(self)
+
+    def to_pyvista(self, samples: int | None = None) -> "pyvista.UnstructuredGrid":
+        """Return the body as a grid of pyvista with the cell data `patch`; as `BSplineVolume.to_pyvista`."""
+        return above("io.view").grid(self, samples=samples)
+
+    def plot(self, what: str = "faces", file: str | Path | None = None) -> "Figure":
+        """Return a figure of the body; as `BSplineVolume.plot`."""
+        return above("figures.map").plot_body(self, what, file)
 
     def save(self, path: str | Path) -> None:
         """Write the patches and interfaces as volume.npz; atomic. One patch that is not glued is a volume there."""

@@ -192,7 +192,7 @@ class BSplineVolume(Brief, Shown):
         what: "faces", "lines", "cut" or "distortion". file: PNG to write the figure to, too.
         Raises ValueError for another name, RuntimeError where VTK cannot draw on this machine.
         """
-        return above("figures.map").plot_volume(self, what, file)
+        return above("figures.map").plot_body(self, what, file)
 
     @property
     def shape(self) -> tuple[int, int, int]:

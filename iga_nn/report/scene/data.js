@@ -7,7 +7,7 @@ function bytes(text) {
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 }
 
-// Shares 0..1 of the faces and of the lattice, changed one by one: change(share, number).
+// Shares 0..1 of the outer faces and of the lattices of all cubes, changed one by one: change(share, number).
 function both(texts, kind, change) {
   const numbers = (text) => kind.from(new Uint16Array(bytes(text).buffer), (one, at) => change(one / 65535, at));
   return {faces: numbers(texts.faces), lattice: numbers(texts.lattice)};

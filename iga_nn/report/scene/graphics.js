@@ -26,14 +26,11 @@ precision highp float;
 in vec3 facing, parameters;
 in float share;
 uniform sampler2D map, spans;
-uniform vec3 plain, octant;
-uniform int clip, look;
+uniform vec3 plain;
+uniform int cube, look;
 uniform bool mapped, lined;
 out vec4 color;
 void main() {
-  vec3 side = (parameters - 0.5) * (2.0 * octant - 1.0);
-  float inside = min(side.x, min(side.y, side.z));
-  if (clip == ${WITHOUT} && inside > 0.0 || clip == ${ALONE} && inside < -1e-6) discard;
   float towards = abs(normalize(facing).z);
   if (look == ${FAINT}) {
     float dense = 0.06 + 0.3 * pow(1.0 - towards, 2.0);
@@ -45,7 +42,7 @@ void main() {
   else if (look == ${LIT}) base *= 0.5 + 0.5 * towards;
   if (lined && look != ${FLAT}) {
     vec3 width = fwidth(parameters), nearest;
-    for (int k = 0; k < 3; k++) nearest[k] = texelFetch(spans, ivec2(int(parameters[k] * ${BINS - 1}.0 + 0.5), 0), 0)[k];
+    for (int k = 0; k < 3; k++) nearest[k] = texelFetch(spans, ivec2(int(parameters[k] * ${BINS - 1}.0 + 0.5), cube), 0)[k];
     vec3 near = mix(vec3(9.0), abs(parameters - nearest) / max(width, 1e-7), greaterThan(width, vec3(1e-7)));
     base *= 1.0 - 0.45 * (1.0 - smoothstep(0.4, 1.3, min(near.x, min(near.y, near.z))));
   }
@@ -83,16 +80,16 @@ function normals(places, corners) {
   return sums;
 }
 
-// The element line that is nearest to each of some even parameters, of u, v and w.
+// The element line that is nearest to each of some even parameters, of u, v and w, a row for each cube.
 function nearestLines(spans) {
-  const found = new Float32Array(3 * BINS);
-  spans.forEach((lines, axis) => {
+  const found = new Float32Array(3 * BINS * spans.length);
+  spans.forEach((cube, row) => cube.forEach((lines, axis) => {
     for (let bin = 0, next = 0; bin < BINS; bin++) {
       const at = bin / (BINS - 1);
       while (next + 1 < lines.length && lines[next + 1] - at < at - lines[next]) next++;
-      found[3 * bin + axis] = lines[next];
+      found[3 * (BINS * row + bin) + axis] = lines[next];
     }
-  });
+  }));
   return found;
 }
 
@@ -110,18 +107,17 @@ class Graphics {
     const gl = this.gl;
     this.program = compiled(gl);
     this.loaded = [];
-    this.#texture("spans", 1, gl.RGB32F, BINS, gl.FLOAT, nearestLines(scene.spans));
-    this.#texture("map", 0, gl.RGB, 256, gl.UNSIGNED_BYTE, scene.map);
-    gl.uniform3fv(this.uniform("octant"), scene.octant);
+    this.#texture("spans", 1, gl.RGB32F, [BINS, scene.spans.length], gl.FLOAT, nearestLines(scene.spans));
+    this.#texture("map", 0, gl.RGB, [256, 1], gl.UNSIGNED_BYTE, scene.map);
     gl.enable(gl.DEPTH_TEST);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
-  #texture(name, unit, format, width, kind, data) {
+  #texture(name, unit, format, [width, height], kind, data) {
     const gl = this.gl;
     gl.activeTexture(gl.TEXTURE0 + unit);
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-    gl.texImage2D(gl.TEXTURE_2D, 0, format, width, 1, 0, gl.RGB, kind, data);
+    gl.texImage2D(gl.TEXTURE_2D, 0, format, width, height, 0, gl.RGB, kind, data);
     for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
     for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
     gl.uniform1i(this.uniform(name), unit);
@@ -141,7 +137,7 @@ class Graphics {
     this.loaded = [
       ...ghosts.map((patch) => this.#sent(patch, FAINT)),
       ...patches.map((patch) => this.#sent(patch, LIT, range)),
-      ...outlines.map((patch) => this.#sent({...patch, plain: OUTLINE, octant: WHOLE}, FLAT)),
+      ...outlines.map((patch) => this.#sent({...patch, plain: OUTLINE}, FLAT)),
     ];
   }
 
@@ -185,11 +181,11 @@ class Graphics {
       gl.uniform1f(this.uniform("nearer"), look === FLAT ? NEARER : 0);
       gl.uniform1i(this.uniform("mapped"), mapped);
       gl.uniform1i(this.uniform("look"), look);
-      gl.uniform1i(this.uniform("clip"), patch.octant);
+      gl.uniform1i(this.uniform("cube"), patch.cube);
       (look === FAINT ? gl.enable : gl.disable).call(gl, gl.BLEND);
       gl.depthMask(look !== FAINT);
       gl.bindVertexArray(array);
-      gl.drawElements(look === FLAT ? gl.LINE_LOOP : gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+      gl.drawElements(look === FLAT ? gl.LINES : gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
     }
     gl.depthMask(true);
   }

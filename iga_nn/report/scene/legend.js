@@ -75,9 +75,9 @@ function showLegend(scene, field, range) {
   place.replaceChildren();
   element("range").hidden = !field || Boolean(range.remark);
   if (!field) {
-    scene.labels.forEach((label, face) => {
+    scene.legend.forEach(([color, label]) => {
       const item = put(place, "swatch");
-      put(item, "chip").style.background = scene.colors[face];
+      put(item, "chip").style.background = color;
       item.append(label);
     });
     return;

@@ -64,7 +64,7 @@ class View {
   }
 
   probe(x, y) {
-    this.probed = hit(this.shown.patches, this.scene.octant, this.camera, this.canvas, x, y);
+    this.probed = hit(this.shown.patches, this.camera, this.canvas, x, y);
     this.say(chosen("part"), Number(element("at").value));
     this.draw();
     if (window.parent !== window) this.tell();

@@ -1,40 +1,48 @@
-// Chooses what is drawn of a body: its faces, sections through the cube or across an axis of space, the cut.
+// Chooses what is drawn of a body: its outer faces, sections through the cube or across an axis of space, the cut. A body
+// is one cube, or several that are glued.
 //
-// A patch has places, parameters u, v, w and a value a corner, and the corners of its triangles. `take(source, k)` finds
-// its part of any data that are given on the faces and in the lattice, k numbers a place.
+// A patch has its cube, places, parameters u, v, w and a value a corner, and the corners of its triangles. `take(source,
+// k)` finds its part of any data that are given on the outer faces and in the lattices of all cubes, k numbers a place.
 
 const INSIDE = "#b8bdc7";  // of sections where no field is shown
 const GHOST = "#8b95a1";  // of the rest around a section
-const WHOLE = 0, WITHOUT = 1, ALONE = 2;  // what becomes of the octant that the cut leaves out
-const FACES = [0, 1, 2, 3, 4, 5], AXES = [0, 1, 2];
+const WHOLE = 15;  // all quarters: the quarter (i, j) of a patch is bit 2 i + j
+const AXES = [0, 1, 2];
 
 function remembered(make) {
   const known = {};
   return (...given) => known[given] ??= make(...given);
 }
 
-// The corners of the triangles of n x n points.
-const triangles = remembered((n) => {
-  const found = new Uint32Array(6 * (n - 1) ** 2);
-  let at = 0;
+// The corners of the triangles of some quarters of n x n points.
+const triangles = remembered((n, quarters) => {
+  const middle = (n - 1) >> 1, found = [];
   for (let i = 0; i + 1 < n; i++)
     for (let j = 0; j + 1 < n; j++) {
+      if (!(quarters >> (2 * (i >= middle) + (j >= middle)) & 1)) continue;
       const a = i * n + j, b = a + n;
-      found.set([a, b, b + 1, a, b + 1, a + 1], at);
-      at += 6;
+      found.push(a, b, b + 1, a, b + 1, a + 1);
     }
-  return found;
+  return Uint32Array.from(found);
 });
 
-// The points along the border of n x n points, or of a quarter [side, side] of them, once around.
-const border = remembered((n, first, second) => {
-  const middle = (n - 1) / 2, ends = (side) => side === undefined ? [0, n - 1] : side ? [middle, n - 1] : [0, middle];
-  const [[top, bottom], [left, right]] = [ends(first), ends(second)], found = [];
-  for (let j = left; j < right; j++) found.push(top * n + j);
-  for (let i = top; i < bottom; i++) found.push(i * n + right);
-  for (let j = right; j > left; j--) found.push(bottom * n + j);
-  for (let i = bottom; i > top; i--) found.push(i * n + left);
-  return new Uint32Array(found);
+// The ends of the lines along the border of some quarters of n x n points.
+const border = remembered((n, quarters) => {
+  const starts = [0, (n - 1) >> 1], lengths = [starts[1], n - 1 - starts[1]], found = [];
+  const has = (i, j) => [0, 1].includes(i) && [0, 1].includes(j) && quarters >> (2 * i + j) & 1;
+  const line = (from, step, length) => {
+    for (let k = 0; k < length; k++) found.push(from + k * step, from + (k + 1) * step);
+  };
+  for (const i of [0, 1])
+    for (const j of [0, 1]) {
+      if (!has(i, j)) continue;
+      const from = starts[i] * n + starts[j];
+      if (!has(i - 1, j)) line(from, 1, lengths[j]);
+      if (!has(i + 1, j)) line(from + lengths[i] * n, 1, lengths[j]);
+      if (!has(i, j - 1)) line(from, n, lengths[i]);
+      if (!has(i, j + 1)) line(from + lengths[j], n, lengths[i]);
+    }
+  return Uint32Array.from(found);
 });
 
 // The parameters of n x n points where that of an axis (0, 1, 2) is `value`.
@@ -62,48 +70,49 @@ function plane(lattice, n, k, axis, at) {
   return found;
 }
 
-function filled(body, patch) {
-  return {octant: WHOLE, ...patch, places: patch.take(body.places, 3), values: body.values && patch.take(body.values, 1)};
+// The part of a cube of data in the lattices of n^3 points, k numbers each.
+function latticeOf(source, n, k, cube) {
+  return source.lattice.subarray(k * n ** 3 * cube, k * n ** 3 * (cube + 1));
 }
 
-function facePatch(body, face) {
-  const {scene} = body, n = scene.samples.faces, count = n * n, axis = face >> 1;
+function filled(body, patch) {
+  return {...patch, places: patch.take(body.places, 3), values: body.values && patch.take(body.values, 1)};
+}
+
+// The patch of an outer face; `face` counts these.
+function facePatch(body, face, quarters = WHOLE) {
+  const {scene} = body, n = scene.samples.faces, count = n * n, [cube, side] = scene.outer[face];
   return filled(body, {
-    face, plain: scene.colors[face], corners: triangles(n), border: border(n),
-    parameters: parametersOn(n, axis, face % 2),
+    face, cube, plain: scene.colors[face], corners: triangles(n, quarters), border: border(n, quarters),
+    parameters: parametersOn(n, side >> 1, side % 2),
     take: (source, k) => source.faces.subarray(k * count * face, k * count * (face + 1)),
   });
 }
 
-// The patch inside where the parameter of an axis is that of the lattice's plane `at`.
-function sectionPatch(body, axis, at) {
+// The patch inside a cube where the parameter of an axis is that of the lattice's plane `at`.
+function sectionPatch(body, cube, axis, at, quarters = WHOLE) {
   const n = body.scene.samples.lattice;
   return filled(body, {
-    face: -1, plain: INSIDE, corners: triangles(n), border: border(n), parameters: parametersOn(n, axis, at / (n - 1)),
-    take: (source, k) => plane(source.lattice, n, k, axis, at),
-  });
-}
-
-// The parts of the three mid-sections that the cut lays open.
-function cutPlanes(body) {
-  const n = body.scene.samples.lattice;
-  return AXES.map((axis) => {
-    const quarter = body.scene.octant.filter((_, other) => other !== axis);
-    return {...sectionPatch(body, axis, (n - 1) / 2), octant: ALONE, border: border(n, ...quarter)};
+    face: -1, cube, plain: INSIDE, corners: triangles(n, quarters), border: border(n, quarters),
+    parameters: parametersOn(n, axis, at / (n - 1)),
+    take: (source, k) => plane(latticeOf(source, n, k, cube), n, k, axis, at),
   });
 }
 
 // What is seen: "surface", "cut", or the section at `share` of the way along "u", "v", "w", "x", "y" or "z". Lists of the
 // patches, of those that stay as a ghost around a section, and of those whose borders show the shape.
 function patchesOf(body, part, share) {
-  const faces = FACES.map((face) => facePatch(body, face));
-  if (part === "surface") return {patches: faces, ghosts: [], outlines: body.values ? faces : []};
+  const {scene} = body, last = scene.samples.lattice - 1;
   if (part === "cut") {
-    const planes = cutPlanes(body);
-    return {patches: [...faces.map((patch) => ({...patch, octant: WITHOUT})), ...planes], ghosts: [], outlines: planes};
+    const faces = scene.cut.faces.map(([face, quarters]) => facePatch(body, face, quarters));
+    const planes = scene.cut.planes.map(([cube, axis, at, quarters]) => sectionPatch(body, cube, axis, at * last, quarters));
+    return {patches: [...faces, ...planes], ghosts: [], outlines: planes};
   }
-  const axis = body.scene.axes.indexOf(part);
-  const section = axis < 0 ? planeSection(body, "xyz".indexOf(part), share)
-    : sectionPatch(body, axis, Math.round(share * (body.scene.samples.lattice - 1)));
-  return {patches: [section], ghosts: faces.map((patch) => ({...patch, plain: GHOST})), outlines: faces};
+  const faces = scene.outer.map((_, face) => facePatch(body, face));
+  if (part === "surface") return {patches: faces, ghosts: [], outlines: body.values ? faces : []};
+  const axis = scene.axes.indexOf(part), cubes = [...scene.spans.keys()];
+  const sections = axis < 0 ? cubes.map((cube) => planeSection(body, cube, "xyz".indexOf(part), share))
+    : cubes.map((cube) => sectionPatch(body, cube, axis, Math.round(share * last)));
+  const patches = sections.filter((patch) => patch.corners.length);
+  return {patches, ghosts: faces.map((patch) => ({...patch, plain: GHOST})), outlines: faces};
 }

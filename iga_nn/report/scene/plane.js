@@ -1,4 +1,4 @@
-// Cuts the lattice by a plane across an axis of space: marching tetrahedra, six in every cell.
+// Cuts the lattice of a cube by a plane across an axis of space: marching tetrahedra, six in every cell.
 
 const TETRAHEDRA = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];  // the order of their three steps
 
@@ -40,20 +40,20 @@ const latticeParameters = remembered((n) =>
     return index[at % 3] / (n - 1);
   }));
 
-// The section where x, y or z (axis 0, 1, 2) of the body at rest is `share` of the way through its box.
-function planeSection(body, axis, share) {
-  const {scene} = body, n = scene.samples.lattice, places = scene.places.lattice;
+// The section of a cube where x, y or z (axis 0, 1, 2) of the body at rest is `share` of the way through its box.
+function planeSection(body, cube, axis, share) {
+  const {scene} = body, n = scene.samples.lattice, places = latticeOf(scene.places, n, 3, cube);
   const extent = (scene.high[axis] - scene.low[axis]) / scene.size;
   const heights = Float32Array.from({length: n ** 3}, (_, at) => places[3 * at + axis]);
   const edges = crossings(heights, n, (share - 0.5) * extent);
-  const take = (source, k) => {
-    const found = new source.lattice.constructor(k * edges.length);
+  const between = (lattice, k) => {
+    const found = new lattice.constructor(k * edges.length);
     edges.forEach(([from, to, way], at) => {
-      for (let c = 0; c < k; c++)
-        found[k * at + c] = (1 - way) * source.lattice[k * from + c] + way * source.lattice[k * to + c];
+      for (let c = 0; c < k; c++) found[k * at + c] = (1 - way) * lattice[k * from + c] + way * lattice[k * to + c];
     });
     return found;
   };
+  const take = (source, k) => between(latticeOf(source, n, k, cube), k);
   const corners = Uint32Array.from(edges, (_, at) => at);
-  return filled(body, {face: -1, plain: INSIDE, corners, parameters: take({lattice: latticeParameters(n)}, 3), take});
+  return filled(body, {face: -1, cube, plain: INSIDE, corners, parameters: between(latticeParameters(n), 3), take});
 }

@@ -3,7 +3,7 @@
 const PLACES = 2e-5;  // of the box's diagonal: places are known no better
 
 // The patch at a place of the window, its triangle and the weights of the corners; null where there is none.
-function hit(patches, octant, camera, canvas, x, y) {
+function hit(patches, camera, canvas, x, y) {
   const [right, down] = fromMiddle(canvas, x, y), fit = camera.fit(canvas);
   const at = [(right - camera.shift[0]) / fit, (camera.shift[1] - down) / fit];
   let best = null;
@@ -11,7 +11,7 @@ function hit(patches, octant, camera, canvas, x, y) {
     const seen = projected(patch.places, camera.view);
     for (let t = 0; t < patch.corners.length; t += 3) {
       const corners = patch.corners.subarray(t, t + 3), weights = weightsAt(seen, corners, at);
-      if (!weights || isCutAway(patch, corners, weights, octant)) continue;
+      if (!weights) continue;
       const depth = mixed(seen, 3, corners, weights, 2);
       if (!best || depth > best.depth) best = {patch: number, corners, weights, depth};
     }
@@ -41,13 +41,6 @@ function mixed(data, k, corners, weights, entry = 0) {
   return weights.reduce((sum, weight, i) => sum + weight * data[k * corners[i] + entry], 0);
 }
 
-function isCutAway(patch, corners, weights, octant) {
-  if (patch.octant === WHOLE) return false;
-  const sides = AXES.map((axis) => (mixed(patch.parameters, 3, corners, weights, axis) - 0.5) * (2 * octant[axis] - 1));
-  const inside = Math.min(...sides);
-  return patch.octant === WITHOUT ? inside > 0 : inside < -1e-6;
-}
-
 // The point x, y, z of the body at rest, rounded to what is known of it.
 function pointAt(scene, patch, {corners, weights}) {
   const rest = patch.take(scene.places, 3), step = scene.size * PLACES;
@@ -62,6 +55,7 @@ function readings(scene, frame, patch, hit) {
   const {corners, weights} = hit;
   const found = [
     ["x, y, z", pointAt(scene, patch, hit).map(written).join(", ")],
+    ...(scene.spans.length > 1 ? [["patch", `p${patch.cube}`]] : []),
     ["u, v, w", AXES.map((axis) => mixed(patch.parameters, 3, corners, weights, axis).toFixed(3)).join(", ")],
   ];
   for (const field of scene.fields)

@@ -1,0 +1,34 @@
+"""Chooses the colours in which the faces of a body are told apart: a volume's six faces, or the patches of several."""
+
+from collections.abc import Sequence
+
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+
+from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.volume import FACE_NAMES
+
+from .evaluate import FACE_COLORS, Body, face_labels
+
+PATCH_COLORS = tuple(to_hex(color) for color in colormaps["tab20"].colors)  # type: ignore[attr-defined]
+NAMED = 4  # patches of one colour that its label names
+
+
+def face_colors(body: Body) -> list[str]:
+    """Return the colours of six faces of each patch: those of the faces of a volume; of several each patch has one."""
+    if not isinstance(body, MultiPatch):
+        return list(FACE_COLORS)
+    return [PATCH_COLORS[i % len(PATCH_COLORS)] for i in range(len(body)) for _ in FACE_NAMES]
+
+
+def color_labels(body: Body) -> list[tuple[str, str]]:
+    """Return the legend of the colours: each with a label such as "u0: u = 0", of several patches such as "p3, p23"."""
+    if not isinstance(body, MultiPatch):
+        return list(zip(FACE_COLORS, face_labels(), strict=True))
+    names = [f"p{i}" for i in range(len(body))]
+    alike = [names[i :: len(PATCH_COLORS)] for i in range(min(len(names), len(PATCH_COLORS)))]
+    return [(color, _shortened(each)) for color, each in zip(PATCH_COLORS, alike, strict=False)]
+
+
+def _shortened(names: Sequence[str]) -> str:
+    return ", ".join([*names[:NAMED], "…"] if len(names) > NAMED else names)

@@ -1,0 +1,119 @@
+"""Figures of bodies of several patches: what is seen of them, whole and cut open, and in which colours."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from bodies import ring, row_of
+from matplotlib.colors import rgb_to_hsv, to_rgb
+from matplotlib.image import imread
+
+import iga_nn
+import solve
+from iga_nn.figures import cutaway, fields, palette
+from iga_nn.figures import map as map_figures
+from iga_nn.figures import render as rendering
+from iga_nn.figures import solution as solution_figures
+from iga_nn.figures.evaluate import all_grids, outer_faces, points_on
+from parameterize.spline.volume import FACE_NAMES
+
+TURNED = row_of(
+    [(0, 0, 0), (1, 0, 0), (1, 1, 0)],
+    [(), ((2, 0, 1), (True, False, True)), ((1, 2, 0), (False, True, True))],
+    degrees=(2, 2, 2),
+    shape=(4, 4, 4),
+)
+
+
+@pytest.fixture
+def drawing() -> None:
+    if not rendering.can_draw():
+        pytest.skip(f"VTK cannot draw on this machine; remedy: {rendering.REMEDY}")
+
+
+def coarse(body):
+    """The faces and sections of each patch, of four cells each: a cell is a quarter."""
+    return cutaway.patches_of(body, [points_on(patch, grid) for patch in body for grid in all_grids(3)])
+
+
+def edges_of(patches):
+    """How often each edge of a cell occurs among patches."""
+    counts = Counter()
+    for patch in patches:
+        x = np.round(patch.points, 9) + 0.0
+        for i, j in np.ndindex(len(x) - 1, x.shape[1] - 1):
+            corners = [tuple(x[at].tolist()) for at in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
+            counts.update(frozenset(pair) for pair in zip(corners, [*corners[1:], corners[0]], strict=True))
+    return counts
+
+
+@pytest.mark.parametrize("body", [TURNED, ring(1), ring(3)])
+def test_what_is_seen_of_a_body_is_a_closed_surface_whatever_is_left_out(body):
+    """However patches are turned against each other, the quarters behind each other are known."""
+    patches, random = coarse(body), np.random.default_rng(3)
+    whole = cutaway.visible(body, patches, np.zeros((len(body), 2, 2, 2), dtype=bool))
+    assert [id(patch) for patch in whole] == [id(patches[k]) for k in outer_faces(body)]
+    for _ in range(5):
+        left_out = random.random((len(body), 2, 2, 2)) < 0.4
+        seen = cutaway.visible(body, patches, left_out)
+        assert len(seen) > len(whole) and all(count % 2 == 0 for count in edges_of(seen).values())
+
+
+def test_without_a_patch_the_face_behind_it_is_seen():
+    body = TURNED
+    left_out = np.zeros((3, 2, 2, 2), dtype=bool)
+    left_out[0] = True
+    first, second = body.interfaces[0].first, body.interfaces[0].second
+    (behind,) = (place for place in (first, second) if place[0] != 0)
+    seen = list(cutaway.seen_quarters(body, left_out))
+    assert not seen[0].any()
+    assert seen[behind[0]][FACE_NAMES.index(behind[1])].all()
+
+
+def test_the_half_beyond_a_plane_is_left_out():
+    rod = iga_nn.MultiPatch.from_patches(
+        [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (a + u, v, w), 4) for a in range(3)]
+    )
+    left_out = cutaway.beyond(fields.points_of(rod), np.array([1.0, 0.0, 0.0]))
+    assert left_out.sum(axis=(1, 2, 3)).tolist() == [0, 4, 8] and left_out[1, 1].all()
+
+
+def test_each_patch_has_a_colour_and_many_share_them():
+    few, many = ring(3), ring(45, shape=(3, 3, 2), degrees=(2, 2, 1))
+    assert [label for _, label in palette.color_labels(few)] == ["p0", "p1", "p2"]
+    labels = [label for _, label in palette.color_labels(many)]
+    assert len(labels) == 20 and labels[0] == "p0, p20, p40" and labels[-1] == "p19, p39"
+
+
+def test_distortion_measures_each_patch_at_its_own_size():
+    """Cubes of sides 1 and 3 are not distorted, and no size of the body makes them so."""
+    parts = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (a * u, a * v, a * w), 4) for a in (1.0, -3.0)]
+    field = fields.distortion_of(iga_nn.MultiPatch(tuple(parts)))
+    assert max(values.max() for values in field.everywhere) < 1e-6 and "each patch" in field.title
+
+
+def test_a_field_of_a_body_is_that_of_each_patch():
+    problem = solve.Poisson(exact="exp(X)*y")
+    solution = iga_nn.solve(TURNED, problem)
+    error = fields.error_of(TURNED, solution, problem)
+    assert len(error.patches) == 27 and [len(part) for part in error.lattices] == [fields.OF_SEVERAL[1]] * 3
+    assert error.limits.high < 0.1 * fields.solution_of(solution).limits.high
+    stiff = iga_nn.solve(TURNED, solve.Elasticity(fix="x < 0.01", load={"p1_u0": (0, 0, 1)}, young={0: 1, 1: 50, 2: 1}))
+    stress, own = fields.fields_of(stiff)[0], stiff.patches[1].quantity_grid("von_mises", *all_grids(81)[0])
+    assert np.allclose(stress.patches[9], own.reshape(81, 81), rtol=1e-9)
+
+
+def test_figures_show_all_patches(tmp_path, drawing, small_views):
+    body, problem = ring(3), solve.Poisson(exact="x*y+z")
+    for name, draw in map_figures.PLOTS.items():
+        draw(tmp_path / f"{name}.png", body)
+    pixels = rgb_to_hsv(imread(tmp_path / "faces.png")[..., :3].reshape(-1, 3))
+    for color in palette.PATCH_COLORS[:3]:
+        assert np.mean(np.abs(pixels[pixels[:, 1] > 0.2][:, 0] - rgb_to_hsv(to_rgb(color))[0]) < 0.02) > 0.05
+    solution = iga_nn.solve(body, problem)
+    solution_figures.draw_solution(tmp_path / "solution.png", body, solution)
+    figure = solution_figures.draw_error(tmp_path / "error.png", body, solution, problem)
+    assert [axes.get_title() for axes in figure.axes][3:6] == ["cut across x", "cut across y", "cut across z"]
+    for name in ("lines", "cut", "distortion", "solution", "error"):
+        image = imread(tmp_path / f"{name}.png")[..., :3]
+        assert np.mean(np.ptp(image, axis=-1) > 0.1) > 0.05
