@@ -13,6 +13,7 @@ from matplotlib.patches import Patch as Swatch
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.interface import axis_side, face_label
 from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.surface import Surface
 from solve.forms.condition import Condition
 from solve.forms.frame import face_geometry

@@ -51,7 +51,7 @@ class Format:
 
 FORMATS = {
     "gismo": Format(".xml", gismo.write_gismo, ("_u.xml", gismo.write_gismo_field)),
-    "mfem": Format(".mesh", mfem.write_mfem, (".gf", mfem.write_mfem_field)),
+    "mfem": Format(".mesh", mfem_writer.write_mfem, (".gf", mfem_writer.write_mfem_field)),
     "vtk": Format("_bezier.vtu", vtk.write_bezier),
     "view": Format("_view.vtu", view.write_view),
     "json": Format(".json", splinepy.write_json, ("_u.json", splinepy.write_json)),
