@@ -49,6 +49,13 @@ class Interface:
     def __str__(self) -> str:
         return f"{face_label(*self.first)} = {face_label(*self.second)}"
 
+    @property
+    def ring(self) -> int | None:
+        """Return the direction along which a patch is glued to itself without a turn, None for other interfaces."""
+        (p, face_p), (q, face_q) = self.first, self.second
+        is_ring = p == q and face_p[0] == face_q[0] and not self.swapped and not any(self.flipped)
+        return axis_side(face_p)[0] if is_ring else None
+
     def turned(self, second: Floats) -> Floats:
         """Return an array (m_a, m_b, ...) of the second face in the order of the first."""
         array = second.swapaxes(0, 1) if self.swapped else second
