@@ -45,6 +45,7 @@ def runs(full: bool) -> dict[str, Callable[[], Path]]:
         "load_volume": lambda: module("load_volume").main(),
         "export_files": lambda: module("export_files").main(),
         "elasticity": lambda: module("elasticity").main(),
+        "rational_ring": lambda: module("rational_ring").main(),
         "bracket": lambda: module("bracket").main(),
         "batch": lambda: module("batch").main(mapping=mapping),
         **equations,

@@ -1,6 +1,6 @@
 """Checkpoints of a run: arrays and a JSON header in one safetensors file, replaced as a whole.
 
-A checksum over both is kept with them: what is damaged is refused, not computed with.
+A checksum over both is kept with them: a damaged file is refused.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from .files import save_bytes
 FORMAT = 9  # a file of another one is refused by name
 NAMES = ("training", "spline", "knots")
 _ANEW = "start anew with --force instead of --resume"
-_DAMAGED = "remove this file to go on from what was kept before it, or start anew with --force"
+_DAMAGED = "remove this file to continue from an earlier checkpoint, or start anew with --force"
 
 
 class CheckpointError(ValueError):
@@ -30,7 +30,7 @@ class CheckpointError(ValueError):
 class Checkpoints:
     """The checkpoint files of one run in one folder.
 
-    identity: what must be equal for a checkpoint to be continued (surface, options, seed, device); plain JSON values.
+    identity: the surface and all options of the run, as plain JSON values; a checkpoint of another run is refused.
     folder None keeps nothing; `resume` False removes the checkpoints (NAMES) that are there.
     """
 
@@ -50,7 +50,7 @@ class Checkpoints:
     def check(self) -> None:
         """Raise CheckpointError where one of the files in the folder, of any part, is of another version or run.
 
-        Only their headers are read; what is damaged is refused when it is loaded.
+        Only their headers are read; a damaged file is refused when it is loaded.
         """
         for path in sorted(self._folder.glob("*.safetensors")) if self._folder is not None else []:
             try:
@@ -64,8 +64,8 @@ class Checkpoints:
 
     def _demand_own(self, path: Path, found: Any) -> None:
         """Raise CheckpointError for a checkpoint with another identity."""
-        if differing := _differing(json.loads(self._identity), found):
-            raise CheckpointError(f"{path}: belongs to another run ({', '.join(differing)} differ); {_ANEW}")
+        if names := differing(json.loads(self._identity), found):
+            raise CheckpointError(f"{path}: belongs to another run (different: {', '.join(names)}); {_ANEW}")
 
     def save(self, name: str, arrays: Mapping[str, NDArray[Any]], state: Mapping[str, Any]) -> None:
         """Write checkpoint `name`, replacing an older one. Raises OSError naming the file, say on a full disk."""
@@ -110,13 +110,13 @@ def _digest(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, str]) -> st
     return hashlib.sha256(to_bytes(dict(arrays)) + json.dumps(header, sort_keys=True).encode()).hexdigest()
 
 
-def _differing(wanted: Any, found: Any) -> list[str]:
-    """Return the dotted names of the entries in which two tables of plain JSON values differ."""
+def differing(wanted: Any, found: Any) -> list[str]:
+    """Return the dotted names of the entries in which two identities, tables of plain JSON values, differ."""
     names: list[str] = []
     for key in sorted(wanted.keys() | found.keys()):
         ours, theirs = wanted.get(key), found.get(key)
         if isinstance(ours, dict) and isinstance(theirs, dict):
-            names += [f"{key}.{name}" for name in _differing(ours, theirs)]
+            names += [f"{key}.{name}" for name in differing(ours, theirs)]
         elif ours != theirs:
             names.append(key)
     return names

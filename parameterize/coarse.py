@@ -48,7 +48,7 @@ def optimize_coarse_first(
     fine = (open_uniform_knots(config.control_points, config.degree),) * 3
     if len(fine[0]) == len(start.knots[0]):
         return *optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, **report), fit
-    longer = (len(fine[0]) / len(start.knots[0])) ** 1.5  # that a step takes on all of them, about
+    longer = (len(fine[0]) / len(start.knots[0])) ** 1.5  # about, of a step on all control points
     begun = min(schedule.grown or PATIENT_ROUNDS, schedule.rounds - 1)  # at least one round is on all
     usual = schedule.usual_steps[:begun]
     usual += tuple(math.ceil(longer * steps) for steps in schedule.usual_steps[begun:])

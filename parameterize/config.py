@@ -45,14 +45,14 @@ class TrainConfig:
     # nothing is trained; None: every map is trained to the end first.
     easy_loss: float | None = 3.5
     cell: float = 0.12  # edge h of the interior cells (section 4.4.2)
-    triangles: int = 700  # surface triangles sampled in a step; all of them where there are fewer
+    triangles: int = 700  # surface triangles sampled in a step; all where there are fewer
     whiten: bool = True  # start from the affine map that makes the domain equally wide in all directions
     race: float = 0.45  # share of the first stage towards the cube that is trained twice: as G is, and turned
 
 
 @dataclass(frozen=True)
 class SplineConfig:
-    """Fit and control-point optimisation (section 4.3.2); what the terms of the energy read stands beside them."""
+    """Fit and control-point optimisation (section 4.3.2); constants of the energy stand beside its terms."""
 
     control_points: int = 30
     degree: int = 3
@@ -142,8 +142,8 @@ class Config:
             raise ValueError(f"max_control_points must be a whole number, got {max_control_points!r:.80}")
         fewest = self.spline.control_points
         if not fewest <= max_control_points <= MAX_CONTROL_POINTS:
-            given = f"between {fewest} and {MAX_CONTROL_POINTS}, got {max_control_points}"
-            raise ValueError(f"max_control_points must lie {given}")
+            given = f"between {fewest}, the number of the first map, and {MAX_CONTROL_POINTS}"
+            raise ValueError(f"max_control_points must lie {given}, got {max_control_points}")
         return replace(self, refinement=RefinementConfig(tolerance, max_control_points))
 
     def with_control_points(self, n: int) -> Config:

@@ -15,7 +15,7 @@ Vector = Any  # a NumPy array or a torch tensor: anything with their arithmetic,
 class LinearResult:
     """The last iterate, and |r| / |b| before the first and after every iteration.
 
-    breakdown: why the iteration could not go on; "" where it could.
+    breakdown: the reason why the iteration could not continue; "" where it could.
     """
 
     x: Vector

@@ -1,4 +1,4 @@
-"""How results are printed; and finds what draws and converts them: code of `iga_nn`, which stands above, by its name.
+"""Prints results, and finds the code of `iga_nn`, a package above, that draws and converts them, by its name.
 
 `volume.plot()` belongs to the volume, but figures, tables and files of other programs to `iga_nn`, which imports the
 volume. So this one module looks upwards, and only when such a method is called: importing the package loads none of it.

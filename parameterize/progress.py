@@ -19,7 +19,7 @@ class Progress:
 
     mapped: while the network is trained, computes where it maps the surface as it is now, (n, 3) with the cube at
     0..1; the first rows are the surface's own vertices. Costs one evaluation, changes nothing.
-    seconds_after: what a usual run takes after that, to its end, where this is known.
+    seconds_after: the seconds from then to the end of a usual run, where they are known.
     """
 
     stage: str
@@ -61,7 +61,7 @@ class History:
 
 @contextmanager
 def timed(seconds: dict[str, float], name: str) -> Iterator[None]:
-    """Add the wall seconds of what runs inside to seconds[name]."""
+    """Add the wall seconds of the block to seconds[name]."""
     start = time.perf_counter()
     yield
     seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start

@@ -1,11 +1,11 @@
 """Inserts knots where a map needs them and optimises further, until its boundary is close enough to the surface.
 
-Knots that are inserted leave a map as it is, so each further spline stage starts from what the one before has found.
+Knots that are inserted leave a map as it is, so each further spline stage starts from the map of the stage before.
 What it finds is kept where no less is proved of it; else the map before is the result, and that is said.
 """
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ from .checkpoint import Checkpoints
 from .config import RefinementConfig, SplineConfig
 from .optimization.determinant_penalty import MIN_COEFFICIENT
 from .optimization.distortion import ARAP_LIMIT
+from .optimization.endings import Course
 from .optimization.newton import LEAST_STEPS
 from .optimization.optimized import Optimized
 from .optimization.phases import FIRM_ROUNDS, Polish, Schedule, Separate, Unfold
@@ -34,28 +35,33 @@ _log = logging.getLogger(__name__)
 _CHECKPOINT = "knots"
 SHARE = 0.7  # of all that is found lies on the spans that are halved together: fewer would take more refinements
 GROWTH = 2.0  # factor of the number of control points in one refinement, at most: the next one knows better where
-DISTORTION = 0.25  # what the distortion above its limit counts, all squared distances together counting 1
+DISTORTION = 0.25  # the weight of distortion above its limit, where all squared distances together have weight 1
 _NARROWEST = 0.2  # of the first spline's spans: none gets narrower than this share of their length
 _CLOSER = 3.0  # factor of the surface's weight: the boundary counts more once the map is in shape
 _GAIN = 3e-4  # in place of the spline stage's: the first steps on new knots gain little, the later ones more
 ROUNDS = 8  # after a refinement, at most
-POLISH = 3  # of them, while the map is certified, at most
+POLISH = 3  # of these rounds, while the map is certified, at most
 
 Stop = Literal["tolerance met", "limit reached", "no better map"]
 
 
 @dataclass(frozen=True)
 class Level:
-    """Say of one map: its control points a direction, its distance to the surface, and how many spans are not proved.
+    """Describe a map: its control points a direction, its distance from the surface, and the rounds on its knots.
 
     distance, largest: between surface and spline, both ways, over the diagonal of the surface's bounding box; root mean
-    square, and the largest of all samples.
+    square, and the largest of all samples. unproved: the number of spans on which det J > 0 is not proved. rounds,
+    seconds: the number of rounds and the wall seconds by phase, and their ending; empty for the map before the first
+    refinement, whose rounds belong to an attempt.
     """
 
     control_points: tuple[int, int, int]
     distance: float
     largest: float
     unproved: int
+    rounds: dict[str, int] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict, compare=False)
+    ending: str = ""
 
     def __str__(self) -> str:
         size = " x ".join(map(str, self.control_points))
@@ -64,10 +70,10 @@ class Level:
 
 @dataclass(frozen=True)
 class Refinement:
-    """Say how a map came to its control points.
+    """Describe the refinements that led to the control points of a map.
 
-    levels: the maps that were kept, the result last. dropped: one with more control points that is no better: less is
-    proved of it, or its boundary is no closer. stopped: why no more knots were inserted.
+    levels: the maps that were kept, the result last. dropped: the map with more control points that was not kept, as
+    less is proved of it, or its boundary is no closer. stopped: the reason why no more knots were inserted.
     """
 
     tolerance: float
@@ -105,13 +111,13 @@ def refine(
         if tuple(len(row) - config.degree - 1 for row in finer) == levels[-1].control_points:
             stopped = "limit reached"
             break
-        other = _optimized_on(finer, spots.volume, fit, config, weights, kept, report)
-        spots = _Spots.of(*other)
-        if (other[0].faults, spots.level.distance) >= (found.faults, levels[-1].distance):
+        other, surface, course = _optimized_on(finer, spots.volume, fit, config, weights, kept, report)
+        spots = _Spots.of(other, surface, course)
+        if (other.faults, spots.level.distance) >= (found.faults, levels[-1].distance):
             stopped, dropped = "no better map", spots.level
             _log.warning("no better map with %s, %d spans unproved: the one before is kept", dropped, dropped.unproved)
             break
-        found, fit = other
+        found, fit = other, surface
         levels.append(spots.level)
     told = Refinement(refinement.tolerance, refinement.max_control_points, stopped, tuple(levels), dropped)
     return found, fit, told
@@ -119,7 +125,7 @@ def refine(
 
 @dataclass(frozen=True, eq=False)
 class _Spots:
-    """A map at volume 1, and what is found on it and where.
+    """A map at volume 1, with its distances and unproved spans, and their places.
 
     places (n, 3), squares (n,): the parameters of samples on the surface and the spline, and their squared distances
     times the areas they stand for.
@@ -132,20 +138,22 @@ class _Spots:
     level: Level
 
     @classmethod
-    def of(cls, found: Optimized, fit: SurfaceFit) -> "_Spots":
-        """Measure as the report will."""
+    def of(cls, found: Optimized, fit: SurfaceFit, course: Course | None = None) -> "_Spots":
+        """Measure a map as the report does; course: of the rounds on its knots."""
         volume = found.spline.volume
         gaps = two_sided(volume, fit.points, fit.places.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
         unproved = found.certificate.unproved
         level = Level(volume.shape, distance.rms, distance.max, len(unproved))
+        if course is not None:
+            level = replace(level, rounds=dict(course.rounds), seconds=course.seconds, ending=str(course.ending))
         ways = (gaps.mesh_to_spline, gaps.spline_to_mesh)
         places = np.concatenate([way.parameters for way in ways])
         squares = np.concatenate([way.shares * way.distances**2 for way in ways])
         return cls(volume, places, squares, unproved, level)
 
     def amounts(self, distortion_share: float) -> list[Array]:
-        """Return for each direction what is found on each of its spans.
+        """Return for each direction the amounts on each of its spans.
 
         Unproved spans, where there are any; else squared distances, and distortion above the limit with a share.
         """
@@ -215,8 +223,8 @@ def _optimized_on(
     weights: Weights,
     checkpoints: Checkpoints,
     report: dict[str, Any],
-) -> tuple[Optimized, SurfaceFit]:
-    """Insert the knots and go on with the rounds that follow those of a certified map."""
+) -> tuple[Optimized, SurfaceFit, Course]:
+    """Insert the knots and continue with the rounds that follow those of a certified map; return their course, too."""
     phases = (Unfold(), Separate(), Polish(rounds=POLISH))
     schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, (LEAST_STEPS,) * (FIRM_ROUNDS + 2), gain=_GAIN)
     start, surface = volume.on_knots(finer), fit.on_knots(finer)
@@ -234,4 +242,4 @@ def _optimized_on(
         **report,
     )
     _log.info("the rounds end: %s; %s", course.ending, course.ending.sentence)
-    return found, surface
+    return found, surface, course

@@ -1,4 +1,4 @@
-"""parameterize: a closed surface to a trivariate B-spline volume, certified where that succeeds."""
+"""parameterize: a closed surface to a trivariate B-spline volume, certified where its proof succeeds."""
 
 import hashlib
 from dataclasses import asdict, dataclass, replace
@@ -60,7 +60,7 @@ class Parameterization(Brief):
     origin : "network", "growth" or "extension"
         Where the map comes from: the trained network, a cube that grew, or an extended layout of the surface.
     attempts : tuple of AttemptReport
-        The starts that were tried, in their order: what each has led to, with rounds and seconds by phase.
+        The starts that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
     refinement : Refinement or None
         With config.refinement, how many control points each direction got, and why no more.
 
@@ -153,7 +153,7 @@ def parameterize(
         raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
     place, dtype = choose_device(device), choose_precision(dtype)
     given = None if corners is None else corner_vertices(surface, corners)
-    identity = _identity(surface, config, seed, place, dtype, given)
+    identity = identity_of(surface, config, seed=seed, device=place, dtype=dtype, corners=given)
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     history, seconds = History(), dict[str, float]()
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
@@ -189,26 +189,20 @@ def parameterize(
     )
 
 
-def check_checkpoint(
+def identity_of(
     surface: Surface,
     config: Config,
     *,
     seed: int,
     device: str,
-    corners: ArrayLike | None,
-    checkpoint_dir: Path,
     dtype: str = "float32",
-) -> None:
-    """Raise CheckpointError where a run of these arguments of `parameterize` could not go on from that folder."""
-    given = None if corners is None else corner_vertices(surface, corners)
-    identity = _identity(surface, config, seed, choose_device(device), choose_precision(dtype), given)
-    Checkpoints(checkpoint_dir, identity, resume=True).check()
-
-
-def _identity(
-    surface: Surface, config: Config, seed: int, device: str, dtype: str, corners: IntArray | None
+    corners: IntArray | None = None,
 ) -> dict[str, Any]:
-    """Return what the checkpoints of a run are known by."""
+    """Return the identity of a run: the content of its surface and all its options.
+
+    Runs whose identities are equal, see `checkpoint.differing`, make the same map. device: "cpu" or "cuda". corners:
+    (8,), vertex numbers.
+    """
     return {
         "surface": hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest(),
         "config": asdict(config),
@@ -249,7 +243,7 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     if numbers.min() < 0 or numbers.max() >= len(surface.vertices):
         raise ValueError(f"corners: vertex numbers must lie between 0 and {len(surface.vertices) - 1}")
     if len(np.unique(numbers)) != 8:
-        raise ValueError("corners: two of them fall on the same vertex; give eight places farther apart")
+        raise ValueError("corners: two fall on the same vertex; give eight places farther apart")
     return np.asarray(numbers, dtype=np.int64)
 
 

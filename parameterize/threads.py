@@ -1,4 +1,4 @@
-"""Pieces of work shared out among threads; what comes out does not depend on their number."""
+"""Shares pieces of work out among threads; the result does not depend on the number of threads."""
 
 import functools
 import os
@@ -59,5 +59,5 @@ def in_parallel(task: Callable[[Piece], Result], pieces: Sequence[Piece], thread
 
 @functools.cache
 def _pool(threads: int, _process: int) -> ThreadPoolExecutor:
-    """Return the further threads of this process: a copy that fork makes of it has none of them."""
+    """Return the further threads of this process: a copy made by fork has none."""
     return ThreadPoolExecutor(threads - 1)

@@ -18,6 +18,7 @@ True
 """
 
 from .diagnostics import ConvergenceError as ConvergenceError
+from .field import MultiPatchField as MultiPatchField
 from .field import SplineField as SplineField
 from .forms.elasticity import Elasticity as Elasticity
 from .forms.form import Form as Form
@@ -37,6 +38,7 @@ from .options import SolveOptions as SolveOptions
 from .options import check_device as check_device
 from .quantities import Extremes as Extremes
 from .reactions import Balance as Balance
+from .solution import MultiPatchSolution as MultiPatchSolution
 from .solution import Solution as Solution
 from .solution import SolveReport as SolveReport
 from .solver import check_problem as check_problem

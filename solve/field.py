@@ -182,6 +182,15 @@ class MultiPatchField(Brief):
     ----------
     patches : tuple of SplineField
         The function on each patch, with the patch as its volume.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
+    >>> rod = iga_nn.MultiPatch.from_patches(halves)
+    >>> heat = iga_nn.solve(rod, iga_nn.Poisson(exact="x")).field
+    >>> heat.probe([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]]).round(9)
+    array([0.5, 1.5])
     """
 
     patches: tuple[SplineField, ...]

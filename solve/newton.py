@@ -115,7 +115,9 @@ def newton(
     placed, (patch,) = prepared(volume, problem, options)
     space = patch.space
     if len(placed.natural) == 6 and not placed.form.has_reaction:
-        raise ValueError("newton: data of all six faces leave the solution open: give one face to boundary or robin")
+        raise ValueError(
+            "newton: Neumann data on all six faces do not determine the solution: name one face in boundary or robin"
+        )
     with one_blas_thread():
         balance = _Balance.of(volume, placed, space, options, linear_iterations)
         full = np.zeros_like(balance.load)

@@ -19,6 +19,8 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.condition import WITH_FACTOR
 from .patch_system import PatchSystem
 
+CANCELLED = 1e-9  # share of all parts of the forces below which the forces are rounding: each balances itself
+
 
 @dataclass(frozen=True)
 class Balance:
@@ -90,6 +92,9 @@ def balance(
     reactions |= {role: space.total(force) for role, force in supports.items()}
     forces = [load, *reactions.values()]
     size = float(np.abs(forces).sum())
+    parts = [part for patch, residual in zip(patches, residuals, strict=True) for part in (patch.loads, residual)]
+    scale = float(space.total(sum(np.abs(part).sum() for part in parts)))
+    size = scale if size < CANCELLED * scale else size
     imbalance = None
     if reactions and not problem.form.has_reaction:
         imbalance = float(np.abs(np.sum(forces, axis=0)).max()) / size if size > 0.0 else 0.0

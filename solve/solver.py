@@ -192,7 +192,9 @@ def _on_patches(
     for i, (volume, faces) in enumerate(zip(glued.patches, glued.outer, strict=True)):
         own = placed.on_patch(i, faces) if several else placed
         space = trial_space(volume, options.refine, options.degree, own.dirichlet, faces)
-        patches.append(PatchProblem(volume, own, space))
+        own_ways = (interface.ring for interface in glued.interfaces if interface.first[0] == i)
+        rings = tuple(way for way in own_ways if way is not None)
+        patches.append(PatchProblem(volume, own, replace(space, periodic=rings)))
     return placed, patches
 
 

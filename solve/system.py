@@ -321,8 +321,8 @@ def build(
         blocks = _preconditioners(unknowns, systems, interfaces)
         if blocks[0].singular and isinstance(systems[0].matrix, FormOperator):
             raise ValueError(
-                f"{type(problem.form).__name__} without a reaction and with Neumann data on all faces leaves the "
-                "solution open: give one face, or a region, a value or an exchange"
+                f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
+                "determine the solution: give a value, or an exchange, on a face or a region"
             )
         right = unknowns.collect([system.right for system in systems])
         right = balanced(right, unknowns, systems[0].space) if blocks[0].singular else right

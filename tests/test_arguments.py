@@ -45,8 +45,8 @@ def refined(levels):
     "tolerance, most, words",
     [
         (1e-3, "x", "max_control_points must be a whole number, got 'x'"),
-        (1e-3, 29, "max_control_points must lie between 30 and 100, got 29"),
-        (1e-3, 101, "max_control_points must lie between 30 and 100, got 101"),
+        (1e-3, 29, "max_control_points must lie between 30, the number of the first map, and 100, got 29"),
+        (1e-3, 101, "max_control_points must lie between 30, the number of the first map, and 100, got 101"),
         ("x", 40, "tolerance must be positive and finite, got 'x'"),
         (0.0, 40, "tolerance must be positive and finite, got 0.0"),
     ],

@@ -17,6 +17,13 @@ from small_run import small_surface
 
 from iga_nn.cli.commands import main
 
+PROGRAM = """
+from small_run import tiny_config
+from iga_nn.options import MapOptions
+MapOptions.config = lambda _: tiny_config()  # as in the workers: a result of another config is another run's
+from iga_nn.__main__ import run_and_exit
+run_and_exit()
+"""
 SUPPORT = Path(__file__).resolve().parent / "support"
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 PATIENCE = 900.0  # seconds, on a busy machine
@@ -33,7 +40,7 @@ class Command:
             "DASK_DISTRIBUTED__WORKER__PRELOAD": str(SUPPORT / "batch_worker.py"),
             "TMPDIR": str(scratch),
         }
-        command = [sys.executable, "-P", "-m", "iga_nn", "batch", *arguments, "--refine", "0", "--out", "out"]
+        command = [sys.executable, "-P", "-c", PROGRAM, "batch", *arguments, "--refine", "0", "--out", "out"]
         self.out, self.err = folder / "stdout", folder / "stderr"
         with self.out.open("w") as out, self.err.open("w") as err:
             self.process = subprocess.Popen(
@@ -102,7 +109,7 @@ def test_a_batch_survives_what_happens_to_it(tmp_path):
     os.killpg(interrupted.process.pid, signal.SIGINT)
     assert interrupted.ended() == 130
     last = interrupted.err.read_text().splitlines()[-1]
-    assert last.startswith("iga-nn: interrupted; 2 surfaces: ") and "the same command goes on" in last
+    assert last.startswith("iga-nn: interrupted; 2 surfaces: ") and "run the same command again" in last
     assert (tmp_path / "out" / "held" / "checkpoint" / "training.safetensors").exists()
     assert states(tmp_path)["held"] == "waiting"
 

@@ -225,7 +225,9 @@ def test_an_interruption_keeps_the_rows(formula, formula_training, monkeypatch, 
     monkeypatch.setattr("iga_nn.batch.cluster.computed", interrupted)
     assert g1.main(formula) == 130
     assert "Not finished yet: duck." in Path("out/g1.md").read_text()
-    assert capsys.readouterr().err == "g1.py: interrupted; 1 surface: 1 waiting; the same command goes on\n"
+    assert (
+        capsys.readouterr().err == "g1.py: interrupted; 1 surface: 1 waiting; run the same command again to continue\n"
+    )
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")

@@ -62,14 +62,14 @@ def test_without_a_folder_nothing_is_kept():
 def test_another_run_is_refused_and_the_difference_named(tmp_path, name):
     Checkpoints(tmp_path, IDENTITY, resume=False).save("training", {"x": np.zeros(1)}, {})
     other = Checkpoints(tmp_path, IDENTITY | {name: "other"}, resume=True)
-    with pytest.raises(CheckpointError, match=rf"\({name} differ\)"):
+    with pytest.raises(CheckpointError, match=rf"\(different: {name}\)"):
         other.load("training")
 
 
 def test_of_many_settings_those_that_differ_are_named(tmp_path):
     Checkpoints(tmp_path, IDENTITY, resume=False).save("training", {"x": np.zeros(1)}, {})
     other = Checkpoints(tmp_path, IDENTITY | {"seed": 1, "config": {"steps": [1, 3], "rounds": 2}}, resume=True)
-    with pytest.raises(CheckpointError, match=r"another run \(config\.rounds, config\.steps, seed differ\)"):
+    with pytest.raises(CheckpointError, match=r"another run \(different: config\.rounds, config\.steps, seed\)"):
         other.load("training")
 
 

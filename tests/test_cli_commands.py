@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mesh_files import CUBE, obj
 
 import iga_nn
 import solve
@@ -60,7 +61,7 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
     assert not [file for file in folder.iterdir() if file.name.startswith(".")]  # no temporary file left
     report = json.loads((folder / "report.json").read_text())
     assert list(report) == [
-        "schema", "command", "input", "config", "estimate", "seed", "device", "versions",
+        "schema", "command", "identity", "input", "config", "estimate", "seed", "device", "versions",
         "parameterization", "poisson", "seconds",
     ]  # fmt: skip
     described = (Path(iga_nn.__file__).resolve().parents[1] / "docs" / "output.md").read_text(encoding="utf-8")
@@ -532,9 +533,51 @@ def test_a_finished_result_answers_the_same_command_alone(formula_training, in_f
     assert main(["parameterize", "cube", "--out", "out"]) == 0
     capsys.readouterr()
     assert main(["parameterize", "bean", "--out", "out", "--resume"]) == 2
-    assert "holds the result of `iga-nn parameterize cube --out out`" in one_line(capsys.readouterr().err)
+    refusal = "holds the result of `iga-nn parameterize cube --out out` (different: surface)"
+    assert refusal in one_line(capsys.readouterr().err)
     assert main(["parameterize", "cube", "--seed", "7", "--out", "out", "--resume"]) == 2
+    assert "(different: seed)" in one_line(capsys.readouterr().err)
     assert main(["parameterize", "cube", "--out", "./out", "--resume"]) == 0
+
+
+def test_a_finished_result_belongs_to_the_content_of_its_surface_not_to_the_name(formula_training, in_folder, capsys):
+    formula_training()
+    Path("part.obj").write_text(obj())
+    assert main(["run", "poisson", "part.obj", "--refine", "0", "--out", "out"]) == 0
+    Path("part.obj").rename("renamed.obj")
+    assert main(["run", "poisson", "renamed.obj", "--refine", "0", "--out", "out", "--resume"]) == 0
+    capsys.readouterr()
+    assert main(["run", "poisson", "renamed.obj", "--refine", "1", "--out", "out", "--resume"]) == 2
+    assert "(different: poisson.refine)" in one_line(capsys.readouterr().err)
+    Path("renamed.obj").write_text(obj(2.0 * CUBE))
+    assert main(["run", "poisson", "renamed.obj", "--refine", "0", "--out", "out", "--resume"]) == 2
+    assert "(different: surface)" in one_line(capsys.readouterr().err)
+
+
+def test_the_device_of_a_finished_result_may_be_that_of_another_machine(formula_training, in_folder, capsys):
+    formula_training()
+    assert main(["parameterize", "cube", "--out", "out"]) == 0
+    report = Path("out/report.json")
+    known = json.loads(report.read_text())
+    known["device"] = known["identity"]["device"] = "cuda"
+    report.write_text(json.dumps(known))
+    assert main(["parameterize", "cube", "--out", "out", "--resume"]) == 0
+    assert main(["parameterize", "cube", "--device", "cuda", "--out", "out", "--resume"]) == 0
+    capsys.readouterr()
+    assert main(["parameterize", "cube", "--device", "cpu", "--out", "out", "--resume"]) == 2
+    assert "(different: device)" in one_line(capsys.readouterr().err)
+
+
+def test_a_finished_result_whose_options_are_not_known_is_not_taken_for_the_same(formula_training, in_folder, capsys):
+    formula_training()
+    assert main(["parameterize", "cube", "--out", "out"]) == 0
+    report = Path("out/report.json")
+    known = json.loads(report.read_text())
+    del known["identity"]  # as older versions wrote it
+    report.write_text(json.dumps(known))
+    capsys.readouterr()
+    assert main(["parameterize", "cube", "--out", "out", "--resume"]) == 2
+    assert "whose report has no identity; --force replaces it" in one_line(capsys.readouterr().err)
 
 
 def test_an_interrupted_run_is_not_started_over_unasked(formula_training, in_folder, capsys):

@@ -54,7 +54,7 @@ def test_refined():
     for tolerance in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="tolerance must be positive and finite"):
             config.refined(tolerance, 20)
-    with pytest.raises(ValueError, match="between 12 and 100, got 11"):
+    with pytest.raises(ValueError, match="between 12, the number of the first map, and 100, got 11"):
         config.refined(1e-3, 11)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from conftest import formula_parameterization
 from matplotlib.image import imread
+from rational_shapes import quarter_ring
 
 import iga_nn
 from iga_nn.figures.map import draw_distortion
@@ -43,6 +44,11 @@ def test_a_volume_shows_its_spline():
         "control points", "7 × 7 × 7", "degrees", "3, 3, 3", "knot spans", "4 × 4 × 4", "lies within",
         "(0, 0, 0) to (1, 1, 1)",
     ]  # fmt: skip
+
+
+def test_a_rational_volume_shows_its_weights():
+    found = cells(quarter_ring()._repr_html_())
+    assert found[found.index("weights") + 1] == "0.707107 to 1"
 
 
 def test_a_certificate_and_a_quality_say_what_is_proved():

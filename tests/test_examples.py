@@ -107,6 +107,17 @@ def test_bracket_balances_its_load_and_is_near_beam_theory(tmp_path, capsys):
     assert numbers(out, r"(\S+)\), fix") == [-1000.0] and numbers(out, r"(\S+)\) \(balanced") == [1000.0]
 
 
+def test_rational_ring_is_lames(tmp_path, capsys):
+    assert shown(load("rational_ring").main(out=tmp_path))
+    out = capsys.readouterr().out
+    assert "certificate: certified" in out
+    found, known = numbers(out, r"(?:volume|formula) (\d\S+?),?(?=\s)")
+    assert found == pytest.approx(known, rel=1e-13)
+    assert numbers(out, r"L2 rate ([\d.]+)")[-1] == pytest.approx(4.0, abs=0.3)
+    stress, lame = numbers(out, r"(?:inside:|Lamé) ([\d.]+)")
+    assert stress == pytest.approx(lame, rel=1e-3)
+
+
 def test_own_law_has_the_rates_of_its_degree_on_any_volume(tmp_path, capsys):
     benchmark_volume(2).save(tmp_path / "volume.npz")
     assert shown(load("own_law").main(tmp_path / "volume.npz", tmp_path))

@@ -142,7 +142,8 @@ def test_rules_for_a_later_refinement_are_passed_over(in_folder):
         ("knotvectors\n3", "knotvectors\n2", "patch 0 must have three knot vectors"),
         ("1 5 5 4 1 2 11 10 7 8", "1 5 4 1 2 5 10 7 8 11", "p0_u1 = p1_v0: the file says that they are one"),
         ("2.0 1.0 0.0 1", "2.0 1.0 nan 1", "the control points of patch 1 must be finite"),
-        ("2.0 1.0 0.0 1", "2.0 1.0 0.0 -1", "the weights of patch 1 must be positive"),
+        ("2.0 1.0 0.0 1", "2.0 1.0 0.0 -1", "patch 1: weights must be positive"),
+        ("2.0 1.0 0.0 1.0", "2e99 1.0 0.0 1e-300", "patch 1: control_points must be finite"),
         ("dimension\n3\n\ncontrolpoints", "dimension\n2\n\ncontrolpoints", "patch 0 must have control points of 3"),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from volumes import spans_at
 
-from iga_nn.io.mfem import write_mfem, write_mfem_field
+from iga_nn.io.mfem_writer import write_mfem, write_mfem_field
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Poisson, benchmark_volume, solve_problem
 

@@ -77,10 +77,10 @@ def test_auto_takes_its_limits_to_the_map():
         ({"control_points": "auto", "tolerance": 0.0}, "tolerance must be positive and finite, got 0.0"),
         (
             {"control_points": "auto", "max_control_points": 29},
-            "at least 30, at most 100 per direction; auto starts with 30",
+            "must lie between 30, the number of the first map, and 100, got 29",
         ),
-        ({"control_points": "auto", "max_control_points": 101}, "max control points 101: at least 30, at most 100"),
-        ({"control_points": 3}, "control points 3: at least 4, at most 100"),
+        ({"control_points": "auto", "max_control_points": 101}, "the first map, and 100, got 101"),
+        ({"control_points": 3}, "degree 3 needs at least 4 control points, got 3"),
         ({"tolerance": 1e-3}, "tolerance: requires --control-points auto"),
         ({"control_points": "many"}, "control points: must be a whole number or 'auto', got 'many'"),
         ({"seed": True}, "seed: must be a whole number, got True"),

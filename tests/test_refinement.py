@@ -92,6 +92,8 @@ def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
     assert distance(found, fit) == told.levels[-1].distance <= options["tolerance"]
     assert not any(found.faults)
     assert tuple(found.spline.control.shape[1:]) == told.levels[-1].control_points > (6, 6, 6)
+    assert told.levels[0].rounds == {} and sum(told.levels[1].rounds.values()) > 0
+    assert told.levels[1].seconds.keys() == told.levels[1].rounds.keys() and told.levels[1].ending
     for row in fit.places.knots:
         assert set(KNOTS[0]) < set(row)
 

@@ -139,7 +139,7 @@ def test_a_refinement_interrupted_and_resumed_is_undisturbed(surface, tmp_path):
     same_result(undisturbed, resumed)
     assert resumed.refinement == told
     assert all(np.array_equal(a, b) for a, b in zip(resumed.volume.knots, undisturbed.volume.knots, strict=True))
-    with pytest.raises(CheckpointError, match=r"\(config\.refinement\.tolerance differ\)"):
+    with pytest.raises(CheckpointError, match=r"\(different: config\.refinement\.tolerance\)"):
         parameterize(surface, config.refined(1e-3, 7), resume=True, **options)
 
 
@@ -185,16 +185,16 @@ def test_checkpoint_of_another_run_is_refused(surface, tmp_path):
     def resume(mesh=surface, options=config, **more):
         parameterize(mesh, options, device="cpu", checkpoint_dir=tmp_path, resume=True, **more)
 
-    with pytest.raises(CheckpointError, match=r"\(surface differ"):
+    with pytest.raises(CheckpointError, match=r"\(different: surface"):
         resume(replace(small_surface(3.0), sha256=surface.sha256))  # as another body of the same file
     with pytest.raises(
         CheckpointError,
-        match=r"\(config\.spline\.steps, config\.stages, config\.steps_factor differ",
+        match=r"\(different: config\.spline\.steps, config\.stages, config\.steps_factor",
     ):
         resume(options=config.scaled(2.0))
-    with pytest.raises(CheckpointError, match=r"\(seed differ"):
+    with pytest.raises(CheckpointError, match=r"\(different: seed"):
         resume(seed=1)
-    with pytest.raises(CheckpointError, match=r"\(corners, seed differ"):
+    with pytest.raises(CheckpointError, match=r"\(different: corners, seed"):
         resume(seed=1, corners=np.arange(8))
 
 

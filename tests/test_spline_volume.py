@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
@@ -220,3 +221,21 @@ def test_a_function_that_is_no_volume_is_refused(function, how, says):
 def test_degrees_and_knots_of_another_kind_are_refused(degrees, knots, says):
     with pytest.raises(ValueError, match=says):
         BSplineVolume(degrees, knots, np.zeros((4, 4, 4, 3)))
+
+
+def test_a_divided_volume_is_the_same_map_in_parts():
+    volume = make_volume()
+    parts = volume.divided(u=[0.5, 0.2], w=[1 / 3])
+    assert len(parts) == 6
+    where = np.random.default_rng(0).uniform(size=(20, 3))
+    ends = [(0.0, 0.2), (0.2, 0.5), (0.5, 1.0)]
+    for number, part in enumerate(parts):
+        low, high = (np.array([ends[number // 2][i], i, [(0, 1 / 3), (1 / 3, 1)][number % 2][i]]) for i in (0, 1))
+        assert part(where) == pytest.approx(volume(low + where * (high - low)), abs=1e-14)
+    assert len(MultiPatch.from_patches(parts).interfaces) == 7
+
+
+@pytest.mark.parametrize("cuts", [[0.0], [1.0], [0.5, 0.5], [np.nan], [-1.0]])
+def test_cuts_outside_of_the_cube_are_refused(cuts):
+    with pytest.raises(ValueError, match="cuts must be different parameters between 0 and 1"):
+        make_volume().divided(v=cuts)

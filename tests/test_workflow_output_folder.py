@@ -1,6 +1,5 @@
 """What is on the disk before a run is accepted, and after it was refused or interrupted: nothing of its own."""
 
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
 from iga_nn.workflow.output_folder import open_folder
-from parameterize.run import check_checkpoint
+from parameterize.run import identity_of
 from parameterize.spline.volume import BSplineVolume
 from solve.study import benchmark_volume
 
@@ -125,17 +124,17 @@ def test_a_checkpoint_of_another_run_is_refused_before_anything_is_computed(
     with pytest.raises(KeyboardInterrupt):
         iga_nn.run("poisson", "cube", "out", progress=interrupted)
     before = {file: file.read_bytes() for file in Path("out").rglob("*") if file.is_file()}
-    monkeypatch.setattr("parameterize.run.check_checkpoint", partial(check_checkpoint_of_short, check_checkpoint))
+    monkeypatch.setattr("parameterize.run.identity_of", identity_of_short)
     monkeypatch.setattr("iga_nn.workflow.mapping.forecast", lambda *_, **__: pytest.fail("too late"))
     assert main(["run", "poisson", *other, "--out", "out", "--resume"]) == 2
     assert "belongs to another run (" in capsys.readouterr().err
     assert {file: file.read_bytes() for file in Path("out").rglob("*") if file.is_file()} == before
 
 
-def check_checkpoint_of_short(check, surface, config, **given):
+def identity_of_short(surface, config, **given):
     """As the short training of the fixture shortens the config."""
     short = shortened(config)
-    check(surface, short.with_control_points(min(8, short.spline.control_points)), **given)
+    return identity_of(surface, short.with_control_points(min(8, short.spline.control_points)), **given)
 
 
 def test_a_batch_whose_options_are_refused_leaves_no_folder(in_folder, capsys):

@@ -71,7 +71,7 @@ PAPER = {
 
 
 @dataclass(frozen=True)
-class Row:
+class Row(processes.MapColumns):
     """What is known of one model, the columns of g1.csv; distances between spline and mesh at the scale it came in.
 
     status: "done", or in one line why figures are missing or not to be trusted.
@@ -102,18 +102,6 @@ class Row:
     seconds_optimize: float | None = None
     seconds_refine: float | None = None
     seconds_certify: float | None = None
-    origin: str | None = None  # where the map comes from
-    attempts: str | None = None  # the starts that were tried; the rounds and seconds are of all of them
-    rounds_grow: int | None = None
-    rounds_shape: int | None = None
-    rounds_unfold: int | None = None
-    rounds_separate: int | None = None
-    rounds_polish: int | None = None
-    seconds_grow: float | None = None
-    seconds_shape: float | None = None
-    seconds_unfold: float | None = None
-    seconds_separate: float | None = None
-    seconds_polish: float | None = None
     threads: int | None = None
     exact: str | None = None
     l2_relative_refine_0: float | None = None
@@ -309,7 +297,7 @@ def write_tables(rows: Sequence[Row], options: Options) -> None:
 
 def as_csv(rows: Sequence[Row]) -> str:
     """Every figure, ours and the paper's, with all its digits; empty where there is none."""
-    columns = [field.name for field in fields(Row)] + [f"paper_{field.name}" for field in fields(Published)]
+    columns = processes.columns_of(Row) + [f"paper_{field.name}" for field in fields(Published)]
     paper = [{f"paper_{name}": value for name, value in asdict(PAPER[row.model]).items()} for row in rows]
     return csv_text(columns, (asdict(row) | beside for row, beside in zip(rows, paper, strict=True)))
 

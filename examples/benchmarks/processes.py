@@ -7,6 +7,7 @@ import os
 import platform
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -23,7 +24,7 @@ from parameterize.threads import default_threads
 BAD_INPUT, INTERRUPTED = 2, 130
 THREADS = "threads.txt"  # in the folder of a surface whose seconds were measured
 STAGES = ("train", "fit", "optimize", "refine", "certify")
-PHASES = ("grow", "shape", "unfold", "separate", "polish")  # of a spline stage
+PHASES = ("grow", "shape", "unfold", "separate", "polish")  # of a spline stage, the columns of MapColumns
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -58,6 +59,30 @@ def times_of(row: Row) -> dict[str, Any]:
         return {}
     seconds = {f"seconds_{stage}": row.report["seconds"].get(stage, 0.0) for stage in STAGES}
     return seconds | {"seconds": sum(seconds.values()), "threads": int(file.read_text(encoding="utf-8"))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapColumns:
+    """Columns of a row on the starts of its map; rounds and seconds are sums over all starts."""
+
+    origin: str | None = None  # where the map comes from
+    attempts: str | None = None  # the starts that were tried
+    rounds_grow: int | None = None
+    rounds_shape: int | None = None
+    rounds_unfold: int | None = None
+    rounds_separate: int | None = None
+    rounds_polish: int | None = None
+    seconds_grow: float | None = None
+    seconds_shape: float | None = None
+    seconds_unfold: float | None = None
+    seconds_separate: float | None = None
+    seconds_polish: float | None = None
+
+
+def columns_of(row: type[MapColumns]) -> list[str]:
+    """The names of a row's columns, its own ones first."""
+    shared = [field.name for field in fields(MapColumns)]
+    return [field.name for field in fields(row) if field.name not in shared] + shared
 
 
 def attempts_of(report: dict[str, Any]) -> dict[str, Any]:

@@ -110,7 +110,7 @@ def run_mfem(case: Case) -> dict[str, Any]:
     """MFEM on the map as it is exported, with boundary data projected in L2 on the boundary."""
     import mfem.ser as mfem  # type: ignore[import-not-found]
 
-    from iga_nn.io.mfem import write_mfem
+    from iga_nn.io.mfem_writer import write_mfem
 
     terms = _poisson_of_mfem() if case.law == "poisson" else _elasticity_of_mfem()
     with TemporaryDirectory() as folder:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import fmean, median
 
@@ -45,7 +45,7 @@ LOOKS = {  # what a reader should picture
 
 
 @dataclass(frozen=True)
-class Row:
+class Row(processes.MapColumns):
     """What is known of one surface. Distances and ARAP at volume 1; error: in one line why figures are missing."""
 
     number: int
@@ -63,18 +63,6 @@ class Row:
     distance_max: float | None = None
     spline_to_mesh_max: float | None = None
     seconds: float | None = None
-    origin: str | None = None  # where the map comes from
-    attempts: str | None = None  # the starts that were tried; the rounds and seconds are of all of them
-    rounds_grow: int | None = None
-    rounds_shape: int | None = None
-    rounds_unfold: int | None = None
-    rounds_separate: int | None = None
-    rounds_polish: int | None = None
-    seconds_grow: float | None = None
-    seconds_shape: float | None = None
-    seconds_unfold: float | None = None
-    seconds_separate: float | None = None
-    seconds_polish: float | None = None
     error: str | None = None
 
     @property
@@ -207,8 +195,7 @@ def row_of(known: Known, options: Options) -> Row:
 def write_tables(rows: Sequence[Row], options: Options) -> None:
     """stress.csv and stress.md with the rows so far; each replaced in one go."""
     rows = sorted(rows, key=lambda row: row.number)
-    columns = [field.name for field in fields(Row)]
-    save_text(options.out / "stress.csv", csv_text(columns, map(asdict, rows)))
+    save_text(options.out / "stress.csv", csv_text(processes.columns_of(Row), map(asdict, rows)))
     save_text(options.out / "stress.md", as_text(rows, options))
 
 

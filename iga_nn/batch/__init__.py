@@ -1,1 +1,1 @@
-"""Runs many surfaces in worker processes, each into a folder of its own, and keeps one table of them all."""
+"""Runs many surfaces in worker processes, each into a folder of its own, and keeps one table."""

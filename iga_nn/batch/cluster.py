@@ -151,7 +151,9 @@ def computed(
             present = sum(client.nthreads().values())
             seen = time.monotonic() if present or workers.scheduler else seen
             if time.monotonic() - seen > HOPELESS:
-                raise InputError("the workers of this machine do not start again; the same command goes on")
+                raise InputError(
+                    "the workers of this machine do not start again; run the same command again to continue"
+                )
             free = max(0, present - len(running))
             for number in waiting[:free]:
                 running[client.submit(work, tasks[number], number, batch, pure=False)] = number
@@ -166,7 +168,9 @@ def computed(
                     yield number, how
     except (OSError, CancelledError) as error:
         where = workers.scheduler or "the workers of this machine"
-        raise InputError(f"{where}: the connection is lost ({one_line(error)}); the same command goes on") from None
+        raise InputError(
+            f"{where}: the connection is lost ({one_line(error)}); run the same command again to continue"
+        ) from None
     finally:
         if running:
             _stop(client, batch, list(running))
@@ -190,7 +194,9 @@ def _ended(client: Client, future: Future) -> Ended:
     if isinstance(error, KilledWorker):
         if _ran_out_of_memory(client, error.last_worker.address):
             return Ended("failed", f"out of memory: its worker took more than its limit; {LESS_MEMORY}")
-        return Ended("failed", "its worker process was lost; the same command goes on from its checkpoint")
+        return Ended(
+            "failed", "its worker process was lost; run the same command again to continue from the checkpoint"
+        )
     return Ended("failed", f"internal error, please report it: {type(error).__name__}: {one_line(error)}")
 
 

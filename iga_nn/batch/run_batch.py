@@ -57,7 +57,7 @@ def run_batch(
 
     Each surface has a folder of its own in `out`, named after it; batch.csv, batch.json and batch.html beside them are
     written anew after every surface. One that is finished with the same options is skipped, one that has a checkpoint
-    goes on from there, and failures are tried again.
+    continues from there, and failures are tried again.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def _computed(batch: Batch, tasks: Sequence[Task], workers: WorkerOptions, progr
                 log.log(logging.INFO if row.state == "certified" else logging.WARNING, "%s", row.as_line())
                 show()
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {batch.summary}; the same command goes on") from None
+        raise KeyboardInterrupt(f"interrupted; {batch.summary}; run the same command again to continue") from None
     return batch
 
 

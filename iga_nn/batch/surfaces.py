@@ -71,7 +71,7 @@ def _names_in(given: str) -> Iterator[str]:
             raise InputError(f"{given}: no file matches this pattern")
         yield from map(str, files)
     else:
-        yield given  # the run refuses it, and the others go on
+        yield given  # the run refuses it, and the other surfaces are computed
 
 
 def _is_surface(file: Path) -> bool:

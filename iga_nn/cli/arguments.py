@@ -9,17 +9,7 @@ from typing import Annotated, Any, get_args
 
 from cyclopts import CycloptsError, Parameter, Token, convert
 
-from ..options import (
-    ElasticityOptions,
-    ElasticityStudyOptions,
-    MapOptions,
-    ModesOptions,
-    PoissonOptions,
-    ProblemOptions,
-    StudyOptions,
-    SurfaceOptions,
-    WorkerOptions,
-)
+from ..options import MapOptions, ModesOptions, ProblemOptions, StudyOptions, SurfaceOptions, WorkerOptions
 
 
 def converted(kind: Any, tokens: Sequence[Token]) -> Any:
@@ -75,7 +65,3 @@ class PageOptions(MapOptions):
 
 for kind in (OutputOptions, SurfaceOptions, WorkerOptions, ProblemOptions, StudyOptions, ModesOptions):
     Parameter(name="*")(kind)  # each field of these options, and of those derived from them, is a flag
-
-OUTPUT, MAP, STUDY, ELASTICITY_STUDY = OutputOptions(), MapOptions(), StudyOptions(), ElasticityStudyOptions()
-WORKERS, SURFACE, POISSON, ELASTICITY = WorkerOptions(), SurfaceOptions(), PoissonOptions(), ElasticityOptions()
-PAGE, MODES = PageOptions(), ModesOptions()

@@ -27,27 +27,7 @@ from ..options import (
 )
 from ..version import __version__
 from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED, NOT_SOLVED
-from .arguments import (
-    ELASTICITY,
-    ELASTICITY_STUDY,
-    MAP,
-    MODES,
-    OUTPUT,
-    PAGE,
-    POISSON,
-    STUDY,
-    SURFACE,
-    WORKERS,
-    Json,
-    Mesh,
-    Mpi,
-    ObjFile,
-    OutputOptions,
-    Overwrite,
-    PageOptions,
-    Volume,
-    converted,
-)
+from .arguments import Json, Mesh, Mpi, ObjFile, OutputOptions, Overwrite, PageOptions, Volume, converted
 from .progress import shown_batch, shown_progress
 from .refusal import refusal
 
@@ -72,7 +52,12 @@ for group in (run_app, solve_app, study_app):
 
 @run_app.command(name="poisson")
 def run_poisson(
-    mesh: Mesh, /, *, output: OutputOptions = OUTPUT, mapping: MapOptions = MAP, poisson: PoissonOptions = POISSON
+    mesh: Mesh,
+    /,
+    *,
+    output: OutputOptions = OutputOptions(),
+    mapping: MapOptions = MapOptions(),
+    poisson: PoissonOptions = PoissonOptions(),
 ) -> int:
     """Parameterize a surface, certify the spline and solve Poisson's equation on it."""
     return _run(mesh, output, mapping, poisson)
@@ -83,9 +68,9 @@ def run_elasticity(
     mesh: Mesh,
     /,
     *,
-    output: OutputOptions = OUTPUT,
-    mapping: MapOptions = MAP,
-    elasticity: ElasticityOptions = ELASTICITY,
+    output: OutputOptions = OutputOptions(),
+    mapping: MapOptions = MapOptions(),
+    elasticity: ElasticityOptions = ElasticityOptions(),
 ) -> int:
     """Parameterize a surface, certify the spline and solve linear elasticity on it.
 
@@ -108,15 +93,15 @@ def _run(mesh: str, output: OutputOptions, mapping: MapOptions, statement: Probl
 @app.command(name="batch")
 def run_many(
     *surfaces: str,
-    output: OutputOptions = OUTPUT,
-    workers: WorkerOptions = WORKERS,
-    mapping: MapOptions = MAP,
-    poisson: PoissonOptions = POISSON,
+    output: OutputOptions = OutputOptions(),
+    workers: WorkerOptions = WorkerOptions(),
+    mapping: MapOptions = MapOptions(),
+    poisson: PoissonOptions = PoissonOptions(),
 ) -> int:
-    """Run many surfaces in worker processes, each into its own folder in --out, with one table of them all.
+    """Run many surfaces in worker processes, each into its own folder in --out, with one table.
 
     batch.csv, batch.json and batch.html are written anew after every surface. The same command again skips finished
-    surfaces, goes on from checkpoints and tries failures once more.
+    surfaces, continues from checkpoints and tries failures once more.
 
     Args:
         surfaces: files, folders, patterns in quotes, names of samples and models, or g1 for the set G1.
@@ -136,7 +121,9 @@ def run_many(
 
 
 @app.command(name="parameterize")
-def parameterize_mesh(mesh: Mesh, /, *, output: OutputOptions = OUTPUT, mapping: MapOptions = MAP) -> int:
+def parameterize_mesh(
+    mesh: Mesh, /, *, output: OutputOptions = OutputOptions(), mapping: MapOptions = MapOptions()
+) -> int:
     """Turn a surface into a certified trivariate B-spline."""
     return _run(mesh, output, mapping)
 
@@ -148,8 +135,8 @@ def solve_poisson(
     *,
     device: Literal["cpu", "cuda"] = "cpu",
     mpi: Mpi = False,
-    output: OutputOptions = OUTPUT,
-    poisson: PoissonOptions = POISSON,
+    output: OutputOptions = OutputOptions(),
+    poisson: PoissonOptions = PoissonOptions(),
 ) -> int:
     """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
 
@@ -164,7 +151,12 @@ def solve_poisson(
 
 @solve_app.command(name="elasticity")
 def solve_elasticity(
-    volume: Volume, /, *, mpi: Mpi = False, output: OutputOptions = OUTPUT, elasticity: ElasticityOptions = ELASTICITY
+    volume: Volume,
+    /,
+    *,
+    mpi: Mpi = False,
+    output: OutputOptions = OutputOptions(),
+    elasticity: ElasticityOptions = ElasticityOptions(),
 ) -> int:
     """Solve linear elasticity on a volume.npz.
 
@@ -185,7 +177,9 @@ def _solve(volume: Path, output: OutputOptions, statement: ProblemOptions, mpi: 
 
 
 @study_app.default
-def study_volume(volume: Volume, /, *, output: OutputOptions = OUTPUT, study: StudyOptions = STUDY) -> int:
+def study_volume(
+    volume: Volume, /, *, output: OutputOptions = OutputOptions(), study: StudyOptions = StudyOptions()
+) -> int:
     """Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors and their rates.
 
     Results go to STEM-study in the current folder, unless --out names another.
@@ -195,7 +189,11 @@ def study_volume(volume: Volume, /, *, output: OutputOptions = OUTPUT, study: St
 
 @study_app.command(name="elasticity")
 def study_elasticity(
-    volume: Volume, /, *, output: OutputOptions = OUTPUT, study: ElasticityStudyOptions = ELASTICITY_STUDY
+    volume: Volume,
+    /,
+    *,
+    output: OutputOptions = OutputOptions(),
+    study: ElasticityStudyOptions = ElasticityStudyOptions(),
 ) -> int:
     """Make a convergence study of linear elasticity with a given displacement."""
     return _study(volume, output, study)
@@ -214,7 +212,9 @@ def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
 
 
 @app.command(name="modes")
-def find_modes(volume: Volume, /, *, output: OutputOptions = OUTPUT, modes: ModesOptions = MODES) -> int:
+def find_modes(
+    volume: Volume, /, *, output: OutputOptions = OutputOptions(), modes: ModesOptions = ModesOptions()
+) -> int:
     """Find the lowest vibrations of an elastic body, a volume.npz; write their frequencies, shapes and a figure.
 
     Frequencies are in Hz where the units agree: m, Pa and kg/m^3, or mm, MPa and t/mm^3. Results go to STEM-modes in
@@ -236,7 +236,7 @@ def check(
     path: str,
     /,
     *,
-    surface: SurfaceOptions = SURFACE,
+    surface: SurfaceOptions = SurfaceOptions(),
     strict: bool = False,
     region: tuple[str, ...] = (),
     picture: Path | None = None,
@@ -270,7 +270,7 @@ def check(
             facts |= {"regions": looked_at(region, given, picture, force)}
         _print(reports.as_json(facts) if as_json else "accepted\n" + answer.surface_in_words(facts))
         return DONE
-    if surface != SURFACE or strict or region or picture:
+    if surface != SurfaceOptions() or strict or region or picture:
         options = "--component, --max-faces, --decimate, --strict, --region and --picture"
         raise InputError(f"{path}: is a volume; {options} are for surfaces")
     facts = certified_facts(load_volume(path))
@@ -364,8 +364,8 @@ def serve_page(
     port: int = 8080,
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
     max_upload: int = 64,
-    mapping: PageOptions = PAGE,
-    poisson: PoissonOptions = POISSON,
+    mapping: PageOptions = PageOptions(),
+    poisson: PoissonOptions = PoissonOptions(),
 ) -> None:
     """Serve a page to this computer's browser: drop a surface, watch it become a volume, download the files.
 

@@ -39,7 +39,7 @@ def draw_history(path: Path | None, history: dict[str, NDArray[Any]]) -> Figure:
     for name, color in zip(terms, TERM_COLORS * len(terms), strict=False):
         values = positive(history[name])
         if not np.any(values >= lowest):
-            continue  # it was zero, or far too small to be seen, at every step
+            continue  # zero, or too small to be seen, at every step
         style = {"color": color, "linewidth": 0.8, "marker": ".", "markersize": 2.0}  # a dot shows a single step
         upper.plot(steps, values, alpha=0.8, label=TERMS.get(name, name), **style)
     upper.plot(steps, positive(history["loss"]), color="black", linewidth=1.4, label="loss")

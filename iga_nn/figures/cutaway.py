@@ -22,7 +22,7 @@ from .render import Patch, View, plain_patch, view_of
 
 Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
 
-INSIDE = "#e9e6df"  # colour of the sections, unlike those of the faces
+INSIDE = "#e9e6df"  # colour of the sections, unlike the six colours of the faces
 
 
 def patches_of(body: Body, points: Sequence[Array], every: int = 0) -> list[Patch]:

@@ -1,6 +1,6 @@
 """Samples fields of a body once for all their pictures: on the faces, mid-sections and a lattice of each patch.
 
-Figures and the interactive view colour a field by one range, which counts every sample: those on the boundary, on the
+Figures and the interactive view colour a field by one range, which counts every sample: on the boundary, on the
 mid-sections and inside. Whatever is drawn is among the samples, so no value that is drawn lies outside.
 """
 

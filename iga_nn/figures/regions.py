@@ -13,6 +13,7 @@ from matplotlib.patches import Patch as Swatch
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.interface import axis_side, face_label
 from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.surface import Surface
 from solve.forms.condition import Condition
 from solve.forms.frame import face_geometry
@@ -52,15 +53,12 @@ def draw_conditions(path: str | Path | None, body: Body, conditions: Sequence[Co
 
 def draw_regions(path: str | Path | None, surface: Surface, regions: Sequence[Region]) -> Figure:
     """Draw regions on a surface, from the front and from behind. Where two meet, the first is shown."""
-    palette, corners = _palette(len(regions)), surface.vertices[surface.faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(cross, axis=1)
-    sides = np.clip(np.sqrt(CELLS * size / size.sum()).astype(int), 1, FINEST)
-    grids = [_grid(triangle, side) for triangle, side in zip(corners, sides, strict=True)]
+    palette, (normals, areas) = _palette(len(regions)), normals_and_areas(surface.vertices, surface.faces)
+    sides = np.clip(np.sqrt(CELLS * areas / areas.sum()).astype(int), 1, FINEST)
+    grids = [_grid(triangle, side) for triangle, side in zip(surface.vertices[surface.faces], sides, strict=True)]
     counts = (sides + 1) ** 2
     points = np.concatenate([grid.reshape(-1, 3) for grid in grids]).T
-    normals = np.repeat(cross / np.where(size > 0.0, size, 1.0)[:, None], counts, axis=0).T
-    parts = np.split(palette[_first(regions, points, normals)], np.cumsum(counts)[:-1])
+    parts = np.split(palette[_first(regions, points, np.repeat(normals, counts, axis=0).T)], np.cumsum(counts)[:-1])
     outlined = len(sides) <= LINES_UP_TO
     patches = [
         Patch(grid, part.reshape(grid.shape), every=int(side) if outlined else 0)
@@ -85,7 +83,7 @@ def _first(regions: Sequence[Region], points: Array, normals: Array, face: str =
 
 
 def _palette(count: int) -> Array:
-    """Return as many colours, and that of the rest as the last, (count + 1, 3)."""
+    """Return `count` colours, and last the colour of the rest, (count + 1, 3)."""
     chosen = islice(cycle(colormaps["tab10"].colors), count)  # type: ignore[attr-defined]
     return np.array([*map(to_rgb, chosen), to_rgb(REST)])
 

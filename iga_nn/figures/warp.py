@@ -1,4 +1,4 @@
-"""Chooses by which factor displacements are drawn enlarged, so that a deformation is seen."""
+"""Chooses the factor of drawn displacements, so that a deformation is seen."""
 
 import math
 
@@ -9,7 +9,7 @@ from .fields import is_spatial, quantities_of, solution_of
 from .style import SMALLEST
 
 SHARE = 0.08  # of the diagonal of the body's box: the largest displacement as drawn
-DIGITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # that a factor may begin with; each at most 1.5 times the one before
+DIGITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # first digits of a factor; each is at most 1.5 times the one before
 
 
 def is_displacement(solution: Solved) -> bool:

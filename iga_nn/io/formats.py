@@ -3,9 +3,9 @@
 docs/output.md explains our own files, NumPy archives without pickles.
 
 A solution, scalar or a displacement, is exported with its volume into every format: `vtk` and `view` hold it as the
-point data `u`, the others as a second file beside the volume's. `io.gismo`, `io.mfem` and `io.splinepy` explain the
-formats that are also read, `io.geopdes` one that is only read; `io.vtk` and `io.view` those for ParaView. IGES and STEP
-have no trivariate splines.
+point data `u`, the others as a second file beside the volume's. `io.gismo`, `io.mfem`, `io.mfem_writer` and
+`io.splinepy` explain the formats that are also read, `io.geopdes` one that is only read; `io.vtk` and `io.view` those
+for ParaView. IGES and STEP have no trivariate splines.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -29,7 +29,7 @@ from ..new_file import check_new
 from ..options import PROBLEMS
 from ..report import document as reports
 from ..type_check import check_type
-from . import gismo, mfem, splinepy, view, vtk
+from . import gismo, mfem_writer, splinepy, view, vtk
 from .reading import ENDINGS, READERS, kind_of, read_body
 
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
@@ -51,7 +51,7 @@ class Format:
 
 FORMATS = {
     "gismo": Format(".xml", gismo.write_gismo, ("_u.xml", gismo.write_gismo_field)),
-    "mfem": Format(".mesh", mfem.write_mfem, (".gf", mfem.write_mfem_field)),
+    "mfem": Format(".mesh", mfem_writer.write_mfem, (".gf", mfem_writer.write_mfem_field)),
     "vtk": Format("_bezier.vtu", vtk.write_bezier),
     "view": Format("_view.vtu", view.write_view),
     "json": Format(".json", splinepy.write_json, ("_u.json", splinepy.write_json)),
@@ -156,7 +156,7 @@ def export(
     samples : int, optional
         Of a view: cells a span of the solution and direction; by default 3, fewer where they were more than a million.
     quantity : names, optional
-        Of a view: the quantities in place of those; names of the law, as "principal".
+        Of a view: other quantities of the law, by their names, such as "principal".
     force : bool
         Replace a file that exists.
 

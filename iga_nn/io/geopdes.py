@@ -15,7 +15,7 @@ from parameterize.arrays import Array
 from parameterize.spline.interface import Face
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
-from .patches import patch_of
+from .patches import patch_of, projected
 from .words import Words
 
 HEADER = re.compile(r"^\s*#.*nurbs (?:mesh|geometry) v\.?(\d{1,3})\.", re.IGNORECASE | re.MULTILINE)
@@ -27,10 +27,8 @@ def read_geopdes(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]
     words = Words(text)
     header = HEADER.search(text, 0, HEAD)
     old = header is not None and int(header[1]) < 2
-    counts = words.as_wholes(
-        words.row("the numbers of dimensions and patches"), "the numbers of dimensions and patches"
-    )
-    dimension, *rest = counts
+    what = "the numbers of dimensions and patches"
+    dimension, *rest = words.as_wholes(words.row(what), what)
     space = dimension if old or not rest else rest.pop(0)
     if (dimension, space) != (3, 3):
         raise words.fault(f"maps {dimension} parameters to {space} coordinates; a volume maps 3 to 3")
@@ -54,10 +52,8 @@ def _read_patch(words: Words, name: str) -> BSplineVolume:
     total = int(np.prod(counts, dtype=object))
     points = np.stack([_reals(words, total, f"the {axis} coordinates of {name}") for axis in "xyz"], axis=1)
     weights = _reals(words, total, f"the weights of {name}")
-    if not np.all(weights > 0.0):
-        raise words.fault(f"the weights of {name} must be positive")
     try:
-        return patch_of(degrees, knots, points / weights[:, None], weights)
+        return patch_of(degrees, knots, projected(points, weights), weights)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
 

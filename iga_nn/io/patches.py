@@ -43,6 +43,17 @@ def patch_of(degrees: Sequence[int], knots: Sequence[Array], rows: Array, weight
     return BSplineVolume((p_u, p_v, p_w), (k_u, k_v, k_w), net, weights.reshape(*reversed(counts)).transpose(2, 1, 0))
 
 
+def projected(rows: Array, weights: Array) -> Array:
+    """Return control points (n, 3) from homogeneous coordinates (n, 3) and weights (n,), which must be positive.
+
+    Raises ValueError for other weights.
+    """
+    if not np.all(weights > 0.0):
+        raise ValueError("weights must be positive")
+    with np.errstate(over="ignore"):  # infinite control points are refused where the volume is made
+        return rows / weights[:, None]
+
+
 def fastest_first(net: Array) -> Array:
     """Return the coefficients (n_u, n_v, n_w, ...) as rows (n_u n_v n_w, components), u fastest."""
     return net.transpose(2, 1, 0, *range(3, net.ndim)).reshape(int(np.prod(net.shape[:3])), -1)
@@ -62,6 +73,8 @@ def body_of(
     where the two faces of a pair are apart, and where the patches do not fit together. Interfaces that the file does
     not name, though it names others, are glued with a notice.
     """
+    if not patches:
+        raise ValueError("holds no patch")
     body = MultiPatch.from_patches(patches, tolerance)
     _compare(body, [frozenset(pair) for pair in declared])
     return body if len(body) > 1 or body.interfaces else body.patches[0]
@@ -84,7 +97,7 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
                 reason = f"are {apart:.3g} apart, {share:.1e} of the body's size{close}"
             raise ValueError(f"interface {names}: the file says that they are one, but their control points {reason}")
     if declared and (more := found - set(declared)):
-        names = ", ".join(" = ".join(face_label(*face) for face in sorted(pair)) for pair in more)
+        names = ", ".join(" = ".join(face_label(*face) for face in pair) for pair in sorted(map(sorted, more)))
         log.warning("%s: glued, for their control points are the same, though the file does not list them", names)
 
 

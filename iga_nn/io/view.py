@@ -96,7 +96,7 @@ def grid(
 ) -> pyvista.UnstructuredGrid:
     """Return a body, and a solution on it, as a grid of pyvista: exact cells, or `samples` linear ones a span.
 
-    quantities: names that the law gives, or functions by name; those of `_default` by default.
+    quantities: names of the law's quantities, or functions by name; by default the names that `_default` returns.
     """
     if samples is None:
         if quantities:

@@ -49,20 +49,21 @@ class Words:
 
     def row(self, what: str) -> list[str]:
         """Return the words left in the present row, of the next row where there are none."""
-        if self.peek() is None:
-            raise ValueError(f"ends before {what}: the file is cut off, or a count in it is too large")
-        found = self._words[self._at :]
-        self._at = len(self._words)
-        return found
+        return self._part(None, what)
 
     def take(self, count: int, what: str) -> list[str]:
         """Return the next words, over as many rows as they take."""
         found: list[str] = []
         while len(found) < count:
-            row = self.row(what)
-            wanted = count - len(found)
-            found += row[:wanted]
-            self._at -= max(len(row) - wanted, 0)
+            found += self._part(count - len(found), what)
+        return found
+
+    def _part(self, most: int | None, what: str) -> list[str]:
+        """Return the next words of one row, all that are left of it or at most so many."""
+        if self.peek() is None:
+            raise ValueError(f"ends before {what}: the file is cut off, or a count in it is too large")
+        found = self._words[self._at : None if most is None else self._at + most]
+        self._at += len(found)
         return found
 
     def word(self, what: str) -> str:

@@ -1,4 +1,4 @@
-"""Follows a run: the share of its work that is done, which never falls, and the seconds that are left."""
+"""Follows a run: the share of its work that is done, which never falls, and the seconds to its end."""
 
 import time
 from collections import deque
@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 WINDOW = 20.0  # seconds over which estimates are compared
 SHORTEST = 8.0  # shortest span of estimates that suffices, in seconds
-SLIPPING = 0.5  # seconds by which the expected end moves in each second, from which on it is not known
-MOST = 0.9  # largest part of the share left that is taken without a new estimate
+SLIPPING = 0.5  # seconds that the expected end may move in a second; an end that moves more is unknown
+MOST = 0.9  # largest part of the remaining share that counts as done without a new estimate
 
 
 class Course:
-    """Hold the share of a run that is done, and when its end is expected. clock: in seconds."""
+    """Hold the share of a run that is done, and the expected time of its end. clock: in seconds."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -26,15 +26,15 @@ class Course:
             self._estimates.popleft()
 
     def pause(self) -> None:
-        """Keep the share that is done, and forget the estimates: time goes by in which nothing runs."""
+        """Keep the share that is done, and forget the estimates, because nothing runs for a while."""
         self._done = self.share
         self._estimates.clear()
 
     @property
     def share(self) -> float:
-        """Return the share of the run that is done: what is left of it shrinks as the seconds that are left do.
+        """Return the share of the run that is done: the rest is in proportion to the seconds to the end.
 
-        It rises linearly as long as the estimates expect the same end, and goes on from where it is where they change.
+        The share rises linearly as long as the estimates expect the same end; a new end changes its slope only.
         """
         if not self._estimates:
             return self._done

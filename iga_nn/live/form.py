@@ -1,4 +1,4 @@
-"""Reads the form in which the live page asks for a problem: Poisson's equation, or an elastic body."""
+"""Reads the live page's form of a problem: Poisson's equation, or an elastic body."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -36,11 +36,7 @@ SHEETS = {
         (
             ("kappa", "Coefficient κ, one formula or six: xx,xy,xz,yy,yz,zz", "1"),
             ("reaction", "Reaction c", "0"),
-            (
-                "exact",
-                "Exact solution u, from which all that is left empty follows",
-                "none; without a source exp(X+Z)*sin(Y)",
-            ),
+            ("exact", "Exact solution u, from which empty data follow", "none; without a source exp(X+Z)*sin(Y)"),
             ("source", "Source f", "that of the exact solution"),
             ("boundary", "Values of u on the faces", "those of the exact solution, or 0"),
         ),
@@ -53,7 +49,7 @@ SHEETS = {
     ),
     "elasticity": Sheet(
         "an elastic body",
-        "−div σ = f, small displacements. Click a face of the part for its region; all that no region names is free.",
+        "−div σ = f, small displacements. Click a face of the part for its region; the rest of its boundary is free.",
         (
             ("young", "Young's modulus E", "1"),
             ("poisson_ratio", "Poisson's ratio ν", "0.3"),
@@ -70,7 +66,7 @@ SHEETS = {
         {"young": "E", "poisson_ratio": "ν", "body_force": "f"},
     ),
 }
-LOADS = ("body_force", "fix", "load", "pressure")  # an elastic body without any of them does not move
+LOADS = ("body_force", "fix", "load", "pressure")  # without one of these loads an elastic body does not move
 EXCHANGE = "exchange"  # the other kind of data of a face of the cube is "flux"
 
 

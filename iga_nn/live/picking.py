@@ -1,4 +1,4 @@
-"""Names the face of a part that is clicked on the live page: by a point on it, up to the sharp edges around."""
+"""Names the face of a part that is clicked on the live page: by a point on the face, which ends at sharp edges."""
 
 import math
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Picked:
 
 
 def picked(part: PartSurface, start: Array, end: Array) -> Picked | None:
-    """Return the face that is met first on the way from one point (3,) through another; None where none is."""
+    """Return the first face on the ray from one point (3,) through another; None where the ray meets no face."""
     shares = _shares(part, start, end - start)
     triangle = int(np.argmin(shares))
     if not math.isfinite(shares[triangle]):
@@ -31,10 +31,12 @@ def picked(part: PartSurface, start: Array, end: Array) -> Picked | None:
 
 
 def _shares(part: PartSurface, start: Array, way: Array) -> Array:
-    """Return the distance (m,) to each triangle along the way, infinite without one (Moller and Trumbore, 1997)."""
+    """Return the distance (m,) of each triangle along the ray, infinite where it is missed (Moller, Trumbore 1997)."""
     a, b, c = np.moveaxis(part.vertices[part.faces], 1, 0)
     across = np.cross(way, c - a)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # triangles along the way are not met
+    with np.errstate(
+        divide="ignore", invalid="ignore", over="ignore"
+    ):  # a ray misses the triangles that are parallel to it
         scale = 1.0 / np.sum((b - a) * across, axis=1)
         u = scale * np.sum((start - a) * across, axis=1)
         along = np.cross(start - a, b - a)

@@ -83,7 +83,7 @@ class Job:
         return self.volume.is_file() and self.volume.stat().st_mtime >= self.begun
 
     def begin(self) -> None:
-        """Forget the run before this one, unless this one goes on from its checkpoint."""
+        """Forget the run before this one, unless this one continues from its checkpoint."""
         self.state, self.text, self.begun = "running", "", time.time()
         self.course.pause()
         if not has_checkpoint(self.results):
@@ -107,7 +107,7 @@ class Jobs:
         self._root, self._check, self._run, self._changed = root, check, run, changed
         self._jobs: list[Job] = []
         self._queue: list[Job] = []  # waiting and running
-        self.latest = 0  # number of the latest job; those of deleted jobs are not given again
+        self.latest = 0  # number of the latest job; numbers of deleted jobs are not used again
         self._lock = Lock()
         self._checker, self._runner = ThreadPoolExecutor(1), ThreadPoolExecutor(1)
 
@@ -134,13 +134,13 @@ class Jobs:
         return job
 
     def refuse(self, job: Job, text: str) -> None:
-        """Refuse a job, and delete its file: nothing more is done with it. text: the reason, in one line."""
+        """Refuse a job for good, and delete its file. text: the reason, in one line."""
         job.path.unlink(missing_ok=True)
         job.state, job.text = "refused", text
         self._changed(job)
 
     def check(self, job: Job) -> None:
-        """Have the job's surface checked, after those before it."""
+        """Put the job's surface into the queue of surfaces to check."""
         self._checker.submit(self._check_now, job)
 
     def solve(self, done: Job, statement: ProblemOptions) -> Job:
@@ -164,7 +164,7 @@ class Jobs:
         return job
 
     def delete(self, job: Job) -> None:
-        """Delete a job and its folder; one that is checked, waits or runs stays as it is."""
+        """Delete a job and its folder; a job that is being checked, waits or runs stays."""
         with self._lock:
             if job.state not in DELETED or job not in self._jobs:
                 return
@@ -173,7 +173,7 @@ class Jobs:
         self._changed(job)
 
     def start(self, job: Job) -> None:
-        """Put an accepted, a stopped or a failed job into the queue; any other stays as it is."""
+        """Put an accepted, a stopped or a failed job into the queue; other jobs are left alone."""
         with self._lock:
             if job.state not in STARTS or job not in self._jobs:
                 return
@@ -195,7 +195,7 @@ class Jobs:
         self._changed(job)
 
     def close(self) -> None:
-        """Stop all jobs, wait until they have ended, and let go of them: libraries complain of running jobs at exit."""
+        """Stop all jobs and wait for their ends, because libraries complain of jobs that run at exit."""
         for job in self:
             self.stop(job)
         self._checker.shutdown(cancel_futures=True)

@@ -96,7 +96,7 @@ class Page:
             self.jobs.close()
 
     def _lay_out(self) -> None:
-        """Give trame the page's template, style and script."""
+        """Set the page's template, style and script in trame."""
         here = files(__package__)
         sheets = (files("iga_nn.report") / "page.css", here / "app.css")
         vtk.initialize(self._server)  # its elements stand in the template, where trame does not see them
@@ -126,7 +126,7 @@ class Page:
             self._loop.call_soon_threadsafe(self._show, job)
 
     def _tick(self) -> None:
-        """Let time pass in the rows of running jobs, now and then again."""
+        """Update the rows of running jobs, once every TICK seconds."""
         if self._loop is None:
             return
         self._loop.call_later(TICK, self._tick)
@@ -147,7 +147,7 @@ class Page:
                 state.update({f"{name}_{changed.number}": None for name in ARRAYS})
 
     def _draw(self, state: Any, job: Job) -> None:
-        """Send the surface, or where the training maps it, when there is something new."""
+        """Send the surface, or its image under the training's map, where it has changed."""
         if job.surface is None:
             return
         points = job.surface.unit_vertices if job.mapped is None else job.mapped
@@ -166,7 +166,7 @@ class Page:
 
     def _bind(self, served: Any) -> None:
         """Add the routes and guards to the web server before it listens."""
-        served.config["host"] = HOST  # whatever trame's own variables and arguments say
+        served.config["host"] = HOST  # trame's own variables and arguments could say otherwise
         app: web.Application = served.app
         app.middlewares.append(_guard(lambda: self._server.port))
         app.on_response_prepare.append(_restrict)
@@ -234,7 +234,7 @@ class Page:
         """
         job = self._named(request)
         if job is None or job.surface is None or job.mapped is not None:
-            raise web.HTTPNotFound(text="there is no part of this job to pick a face of")
+            raise web.HTTPNotFound(text="this job has no part whose faces could be picked")
         try:
             sight = np.array(json.loads(await request.text()), dtype=np.float64)
         except (ValueError, TypeError, RecursionError):
@@ -267,7 +267,7 @@ class Page:
         """Take the form of a problem, to be solved on a job's volume; answer with the new job's number."""
         job = self._named(request)
         if job is None or not is_solvable(job):
-            raise web.HTTPNotFound(text="there is no volume of this job to solve on")
+            raise web.HTTPNotFound(text="this job has no volume to solve on")
         try:
             statement = form.stated(await request.post(), self._poisson)
         except InputError as error:
@@ -282,7 +282,7 @@ class Page:
         return self.jobs.find(int(request.match_info["number"]))
 
     async def _file(self, request: web.Request) -> web.FileResponse:
-        """Give out a result of a job; only names in CONTENT are."""
+        """Send a result of a job; only files named in CONTENT are sent."""
         job, name = self._named(request), request.match_info["name"]
         if job is None or name not in CONTENT or not (job.results / name).is_file():
             raise web.HTTPNotFound
@@ -303,9 +303,10 @@ def _guard(port: Callable[[], int]) -> Any:
         asks = reads if origin is None else origin in {f"http://{name}" for name in own}
         if request.host not in own or not asks:
             raise web.HTTPForbidden(text=f"this page answers at http://{HOST}:{port()}/ only")
-        if len(request.path.encode()) > LONGEST or "\0" in request.path:  # no file can be called that
+        if len(request.path.encode()) > LONGEST or "\0" in request.path:  # no file can have such a name
             raise web.HTTPNotFound
-        if request.path == "/ws" and not web.WebSocketResponse().can_prepare(request):  # wslink would fail on it
+        # wslink fails on other requests
+        if request.path == "/ws" and not web.WebSocketResponse().can_prepare(request):
             raise web.HTTPBadRequest(text="this address takes web sockets only")
         return await handler(request)
 

@@ -52,7 +52,7 @@ def row(job: Job, before: int, statement: ProblemOptions) -> dict[str, Any]:
         "label": LABELS.get(job.state, job.state) + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
         "what": f"{form.in_words(job.statement)}; on the volume of {job.parent}" if job.statement else "",
         "text": job.text,
-        "starts": job.state in STARTS and not (job.statement and job.state == "failed"),  # that one would fail again
+        "starts": job.state in STARTS and not (job.statement and job.state == "failed"),  # a solve would fail again
         "deletes": job.state in DELETED,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",
@@ -145,7 +145,7 @@ def as_placed(points: Array) -> Array:
 def colors(points: Array, surface: Surface, *, mapped: bool, picked: IntArray | None = None) -> dict[str, str]:
     """Return red, green and blue (m, 3) of the triangles: of the cube's face each is nearest to.
 
-    If not mapped, they are grey, and those that are picked (k,) orange.
+    Without a map, the triangles are grey, and the picked ones (k,) orange.
     """
     if not mapped:
         plain = np.full(surface.faces.shape, GREY, dtype=np.uint8)

@@ -28,7 +28,7 @@ GRACE = 3.0  # seconds a job has to stop by itself, leaving a checkpoint
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Hold the training after one step. mapped: where the surface's vertices and those added to them are, (n, 3)."""
+    """Hold the training after one step. mapped: images (n, 3) of the surface's vertices, with the vertices of cuts."""
 
     progress: Progress
     mapped: Array | None
@@ -100,7 +100,7 @@ def _work(
 
     def work() -> Outcome | None:
         if mapping is None:
-            return pipeline.solve_to(name, statement=statement, force=True)  # over what a stopped solve left
+            return pipeline.solve_to(name, statement=statement, force=True)  # replaces the files of a stopped solve
         return pipeline.parameterize_to(
             name, mapping=mapping, statement=statement, progress=throttled(tell, halt.is_set)
         )

@@ -7,8 +7,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from parameterize.config import MAX_CONTROL_POINTS
-
 from ..errors import InputError, input_errors
 from ..type_check import Checked
 
@@ -80,10 +78,7 @@ class MapOptions(SurfaceOptions):
         with input_errors():
             config = preset(self.preset).scaled(self.steps_factor)
             if self.control_points == "auto":
-                first = config.spline.control_points
-                _check_count("max control points", self.max_control_points, first, f"; auto starts with {first}")
                 return config.refined(self.tolerance, self.max_control_points)
-            _check_count("control points", self.control_points, config.spline.degree + 1)
             for name in ("tolerance", "max_control_points"):
                 if getattr(self, name) != getattr(MapOptions, name):
                     raise InputError(f"{name.replace('_', ' ')}: requires --control-points auto")
@@ -93,9 +88,3 @@ class MapOptions(SurfaceOptions):
     def most_control_points(self) -> int:
         """Return the largest number of control points that a direction may have."""
         return self.max_control_points if self.control_points == "auto" else self.control_points
-
-
-def _check_count(name: str, count: int, fewest: int, reason: str = "") -> None:
-    """Raise InputError for a number of control points that cannot be run."""
-    if not fewest <= count <= MAX_CONTROL_POINTS:
-        raise InputError(f"{name} {count}: at least {fewest}, at most {MAX_CONTROL_POINTS} per direction{reason}")

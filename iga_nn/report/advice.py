@@ -29,7 +29,7 @@ def span_places(volume: BSplineVolume, spans: IntArray) -> Array:
 def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
     """Return an entry of the section `parameterization`: the number of spans without a proof, and some of their places.
 
-    The first place is the worst fold found, where there is one.
+    The first place is the worst fold found, where there is one; `flat` a point where det J is zero.
     """
     spans = certificate.unproved
     if not len(spans):
@@ -38,7 +38,10 @@ def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
     parameters = span_parameters(volume, picked)
     if certificate.witness is not None:
         parameters = np.concatenate([[certificate.witness], parameters])[:SHOWN]
-    return {"unproved": {"spans": len(spans), "parameters": parameters.tolist(), "places": volume(parameters).tolist()}}
+    found = {"spans": len(spans), "parameters": parameters.tolist(), "places": volume(parameters).tolist()}
+    if certificate.flat is not None:
+        found["flat"] = volume(certificate.flat)[0].tolist()
+    return {"unproved": found}
 
 
 def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
@@ -72,7 +75,8 @@ def in_words(report: Report) -> list[str]:
     quality, lines = report["parameterization"], []
     if found := quality.get("unproved"):
         places = ", ".join(map(in_brackets, found["places"]))
-        lines.append(f"not proved       on {found['spans']} spans, near {places}")
+        flat = f"; det J is zero, up to rounding, at {in_brackets(found['flat'])}" if "flat" in found else ""
+        lines.append(f"not proved       on {found['spans']} spans, near {places}{flat}")
     lines += [f"folded back      at {interface}" for interface in quality.get("misglued", ())]
     if meeting := quality.get("boundary_meeting"):
         lines.append(f"meets itself     at {in_brackets(meeting['point'])}")

@@ -115,6 +115,8 @@ def verdicts(report: Report) -> list[tuple[str, str, str]]:
         meaning += f" Two parts of the boundary meet at x, y, z = {_point(meeting['point'])}."
     elif answer == "yes":
         meaning += " Its faces do not meet themselves either: the map is one-to-one."
+    if flat := quality.get("unproved", {}).get("flat"):
+        meaning += f" det J is zero, up to rounding, at x, y, z = {_point(flat)}."
     if quality.get("witness"):
         meaning += f" The worst place is u, v, w = {_point(quality['witness'])}."
     color = "good" if reports.is_certified(report) else "bad" if answer == "no" else "unsure"

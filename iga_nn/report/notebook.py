@@ -45,6 +45,7 @@ def _volume(volume: BSplineVolume) -> str:
         ("control points", _times(volume.shape)),
         ("degrees", ", ".join(map(str, volume.degrees))),
         ("knot spans", _times([len(breakpoints(row)) - 1 for row in volume.knots])),
+        *([] if volume.weights is None else [("weights", f"{volume.weights.min():.6g} to {volume.weights.max():.6g}")]),
         ("lies within", _ends(net.min(axis=0), net.max(axis=0))),
     ]
     return _table("Spline volume", facts)

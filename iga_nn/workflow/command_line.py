@@ -25,30 +25,6 @@ def command_line(command: str, source: str | Path, *chosen: Any, **given: Any) -
     return shlex.join(words)
 
 
-def gives_the_same(one: str, other: str) -> bool:
-    """Return whether two such lines give the same result.
-
-    The lines may differ in the output folder, and in the names of the same file.
-    """
-    return _without_folder(one) == _without_folder(other)
-
-
-def _without_folder(line: str) -> list[str]:
-    words = shlex.split(line)
-    if "--out" in words:
-        at = words.index("--out")
-        del words[at : at + 2]
-    return [_as_path(word) for word in words]
-
-
-def _as_path(word: str) -> str:
-    """Return the absolute path of a word that names an existing file or folder, otherwise the word itself."""
-    try:
-        return str(Path(word).resolve(strict=True))
-    except (OSError, RuntimeError, ValueError):  # most words are options and formulas
-        return word
-
-
 def _words(name: str, value: Any) -> list[str]:
     flag = "--" + name.replace("_", "-")
     if value is True:

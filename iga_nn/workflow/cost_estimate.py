@@ -114,7 +114,7 @@ def forecast(
     trainings = [count * TRAINING_STEP * points * one_pass for count in _training_steps(config)]
     low, high = sorted(training + fit + last for training, fit in zip(trainings, fits, strict=True))
     most = spline.control_points
-    if config.refinement is not None:  # it may end with the first spline, or go on to its limit
+    if config.refinement is not None:  # it may end with the first spline, or only at its limit
         most = config.refinement.max_control_points
         rounds, steps = HARD_AFTER
         growths = _growths(config.refinement.max_control_points, spline.control_points)

@@ -47,88 +47,106 @@ _LARGEST_WHOLE = 2**53  # beyond it not every whole number is a float64
 
 
 @dataclass(frozen=True, eq=False)
-class _Given:
-    """Hold the input of a training.
+class MapInput:
+    """Hold the input of a training, and the identity of the map.
 
-    corners: vertices or points. marks: (8, 3), the points of the corners, for figures.
+    corners: vertices or points. marks: (8, 3), the points of the corners, for figures. identity: the content of the
+    surface and the options of the map; equal identities give equal maps.
     """
 
     surface: Surface
     corners: Any
     marks: Array | None
-    expected: Forecast
+    identity: dict[str, Any]
+
+
+def read_input(mesh: str | Path, mapping: MapOptions, finished: reports.Report | None = None) -> MapInput:
+    """Check the options, and read the surface and the corners. Raises MeshError and InputError.
+
+    finished: the report of a result that may be that of this run. Then the device need not exist here, and "auto" is
+    the device of that result, because another machine may have computed it.
+    """
+    from parameterize.run import corner_vertices, identity_of
+
+    config = mapping.config()
+    if finished is None:
+        from parameterize.training.backend import choose_device
+
+        with input_errors():
+            device = choose_device(mapping.device)
+    else:
+        device = finished.get("device", "") if mapping.device == "auto" else mapping.device
+    with compilation_told():
+        surface = resolve(str(mesh), **mapping.reading())
+    corners = read_corners(Path(mapping.corners), frame_of(surface)) if mapping.corners else None
+    with input_errors():
+        vertices = None if corners is None else corner_vertices(surface, corners)
+    marks = None if vertices is None else surface.vertices[vertices]
+    return MapInput(
+        surface, corners, marks, identity_of(surface, config, seed=mapping.seed, device=device, corners=vertices)
+    )
 
 
 def map_surface(
     state: RunFolder,
-    mesh: str | Path,
+    given: MapInput,
     mapping: MapOptions,
     progress: ProgressCallback | None,
-    command: str,
+    known: dict[str, Any],
     problem: BoundaryValueProblem | None = None,
     unknowns: int = 0,
 ) -> Parameterization:
     """Parameterize a surface, write all results on the map into the folder, and return it.
 
-    command: the command that repeats the run. problem, unknowns: the problem that is solved on the map, and its number
-    of unknowns.
+    known: the command that repeats the run and the identity of the run, for the report. problem, unknowns: the problem
+    that is solved on the map, and its number of unknowns.
     """
     with compilation_told():
-        given = _prepare(state, mesh, mapping, problem, unknowns)
-        result = _train(given, mapping, progress, state.folder / CHECKPOINT)
+        expected = _prepare(state, given, mapping, problem, unknowns)
+        result = _train(given, expected, mapping, progress, state.folder / CHECKPOINT)
     state.begin("map", "solution")  # files that stay until the checkpoint of a resumed run is accepted
     state.seconds.update(result.seconds)
-    _write(state, given, result, command, mapping)
+    state.write(**known)  # first, so that files which a full disk or a kill leaves belong to a run
+    _write(state, given, expected, result, mapping)
     _draw(state, given, result)
     return result
 
 
 def _prepare(
-    state: RunFolder, mesh: str | Path, mapping: MapOptions, problem: BoundaryValueProblem | None, unknowns: int
-) -> _Given:
-    """Check the options, read the surface and the corners, check the problem's data, and announce the cost of the run.
+    state: RunFolder, given: MapInput, mapping: MapOptions, problem: BoundaryValueProblem | None, unknowns: int
+) -> Forecast:
+    """Check the problem's data on the surface, announce the cost of the run, and return it.
 
     The folder is cleared once all input is accepted; in a resumed run, only once its map is there, because the
     checkpoint may be refused.
     """
-    from parameterize.run import corner_vertices
-    from parameterize.training.backend import choose_device
-
-    with input_errors():
-        config, device = mapping.config(), choose_device(mapping.device)
-    with state.timed("load"):
-        surface = resolve(str(mesh), **mapping.reading())
-        corners = read_corners(Path(mapping.corners), frame_of(surface)) if mapping.corners else None
+    surface = given.surface
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
     for notice in surface.notices:
         log.warning("%s: %s", surface.name, notice)
-    with input_errors():
-        marks = None if corners is None else surface.vertices[corner_vertices(surface, corners)]
     if problem is not None:
         _check_data(problem, surface)
     is_resumed = mapping.resume and has_checkpoint(state.folder)
     if is_resumed:
-        _check_checkpoint(state, surface, corners, mapping)
+        _check_checkpoint(state.folder / CHECKPOINT, given)
     else:
         state.begin("map", "solution")
     if mapping.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
     with state.timed("load"):
-        expected = forecast(surface, config, device=device, unknowns=unknowns)
+        expected = forecast(surface, mapping.config(), device=given.identity["device"], unknowns=unknowns)
     log.info("estimate: %s", expected)
     needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
     warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
-    return _Given(surface, corners, marks, expected)
+    return expected
 
 
-def _check_checkpoint(state: RunFolder, surface: Surface, corners: Any, mapping: MapOptions) -> None:
-    """Raise InputError for a checkpoint of another surface, seed or config, before any computation."""
-    from parameterize.checkpoint import CheckpointError
-    from parameterize.run import check_checkpoint
+def _check_checkpoint(folder: Path, given: MapInput) -> None:
+    """Raise InputError for a checkpoint of another run, before any computation."""
+    from parameterize.checkpoint import CheckpointError, Checkpoints
 
-    given: dict[str, Any] = {"seed": mapping.seed, "device": mapping.device, "corners": corners}
     try:
-        check_checkpoint(surface, mapping.config(), checkpoint_dir=state.folder / CHECKPOINT, **given)
+        Checkpoints(folder, given.identity, resume=True).check()
     except CheckpointError as error:
         raise InputError(str(error)) from None
 
@@ -199,7 +217,9 @@ def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, 
     raise refused
 
 
-def _train(given: _Given, mapping: MapOptions, progress: ProgressCallback | None, checkpoint: Path) -> Parameterization:
+def _train(
+    given: MapInput, expected: Forecast, mapping: MapOptions, progress: ProgressCallback | None, checkpoint: Path
+) -> Parameterization:
     """Train, and return the map. Raises InputError for a checkpoint of another run, and for corners without paths."""
     from parameterize.checkpoint import CheckpointError
     from parameterize.cube.edge_paths import PathError
@@ -207,7 +227,7 @@ def _train(given: _Given, mapping: MapOptions, progress: ProgressCallback | None
 
     def tell(now: Progress) -> None:
         if progress is not None:
-            progress(replace(now, seconds_after=given.expected.seconds_after(now.stage)))
+            progress(replace(now, seconds_after=expected.seconds_after(now.stage)))
 
     try:
         return parameterize(
@@ -226,15 +246,17 @@ def _train(given: _Given, mapping: MapOptions, progress: ProgressCallback | None
         raise InputError(f"{given.surface.name}: {error}; train longer, or give --corners") from None
 
 
-def _write(state: RunFolder, given: _Given, result: Parameterization, command: str, mapping: MapOptions) -> None:
-    state.write(command=command)  # first, so that files which a full disk or a kill leaves belong to a run
+def _write(
+    state: RunFolder, given: MapInput, expected: Forecast, result: Parameterization, mapping: MapOptions
+) -> None:
+    """Write the files of the map, and the report on it."""
     result.volume.save(state.folder / "volume.npz")
     result.boundary.save(state.folder / "boundary.npz")
     save_arrays(state.folder / "history.npz", **result.history)
     state.write(
         input=given.surface.summary(),
         config=asdict(result.config),
-        estimate=asdict(given.expected),
+        estimate=asdict(expected),
         seed=mapping.seed,
         device=result.device,
         versions=reports.versions(),
@@ -246,7 +268,7 @@ def _write(state: RunFolder, given: _Given, result: Parameterization, command: s
     tell(state, mapping)
 
 
-def _draw(state: RunFolder, given: _Given, result: Parameterization) -> None:
+def _draw(state: RunFolder, given: MapInput, result: Parameterization) -> None:
     """Draw the map, and the places without a proof and the places where it meets itself, if there are any."""
     defects: dict[str, Any] = {}
     if len(unproved := result.certificate.unproved):

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from parameterize.checkpoint import differing
 from parameterize.files import save_text
 from parameterize.progress import ProgressCallback
 from parameterize.spline.multipatch import as_multipatch
@@ -40,9 +41,9 @@ from ..options import (
 from ..report import document as reports
 from ..report import html
 from ..type_check import check_type
-from .command_line import command_line, gives_the_same
+from .command_line import command_line
 from .cost_estimate import tell_memory
-from .mapping import map_surface
+from .mapping import MapInput, map_surface, read_input
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
 from .solving import (
     Found,
@@ -142,11 +143,14 @@ def parameterize_to(
     check_type("out", out, str | Path | None)
     check_type("progress", progress, Callable | None)
     problem, unknowns = (None, 0) if statement is None else checked(mapping, statement)
-    command = _command(mesh, out, mapping, statement)
     with open_folder(mesh, out, force, mapping.resume, vector) as state:
+        with state.timed("load"):
+            given = read_input(mesh, mapping, state.finished.report if state.finished else None)
+        identity = _identity(given, statement)
         if state.finished:
-            return _finished_by(command, state.finished, vector, statement)
-        result = map_surface(state, mesh, mapping, progress, command, problem, unknowns)
+            return _finished_by(identity, state.finished, vector, statement)
+        known = {"command": _command(mesh, out, mapping, statement), "identity": identity}
+        result = map_surface(state, given, mapping, progress, known, problem, unknowns)
         if statement is None or problem is None:
             return _finish(state, result.volume)
         problem = problem.on_surface(result.boundary.part)
@@ -161,6 +165,11 @@ def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, stat
     return command_line(f"run {statement.section}", mesh, mapping, statement, out=out)
 
 
+def _identity(given: MapInput, statement: ProblemOptions | None) -> dict[str, Any]:
+    """Return the identity of a run, as plain JSON values: that of its map, and the options of its problem."""
+    return reports.plain(given.identity | ({} if statement is None else {statement.section: asdict(statement)}))
+
+
 def checked(mapping: MapOptions, statement: ProblemOptions) -> tuple[BoundaryValueProblem, int]:
     """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
     problem, degree = statement.problem(), mapping.config().spline.degree
@@ -173,12 +182,13 @@ def finished_run(
 ) -> Outcome | None:
     """Return the finished result of `parameterize_to` in its folder, None where there is none.
 
-    Raises InputError where another command made the result, or where some of its files are missing.
+    Raises InputError where another run made the result, or where some of its files are missing.
     """
     report = reports.read(Path(out))
     if report is None or not reports.is_finished(report):
         return None
-    return _finished_by(_command(mesh, out, mapping, statement), Outcome(Path(out), report), vector, statement)
+    identity = _identity(read_input(mesh, mapping, report), statement)
+    return _finished_by(identity, Outcome(Path(out), report), vector, statement)
 
 
 def solve_to(
@@ -314,17 +324,21 @@ def modes_to(
         return _finish(state, loaded, scene=moving_scene_of(state, loaded, found)), str(found)
 
 
-def _finished_by(command: str, finished: Outcome, vector: bool, statement: ProblemOptions | None) -> Outcome:
-    """Return the finished result that a resumed run finds.
+def _finished_by(
+    identity: dict[str, Any], finished: Outcome, vector: bool, statement: ProblemOptions | None
+) -> Outcome:
+    """Return the finished result that a resumed run of this identity finds.
 
-    Raises InputError where another command made the result, or where some of its files are missing.
+    Raises InputError where another run made the result, or where some of its files are missing.
     """
-    folder, made_by = finished.folder, finished.report.get("command", "")
+    folder, made_by, known = finished.folder, finished.report.get("command", ""), finished.report.get("identity")
     if statement is not None and statement.section not in finished.report:
         path = folder / "volume.npz"
         raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {statement.section} {path}` solves on it")
-    if not gives_the_same(made_by, command):
-        raise InputError(f"{folder}: holds the result of `{made_by}`; --force replaces it, --out names another folder")
+    if known is None or (names := differing(identity, known)):
+        why = ", whose report has no identity" if known is None else f" (different: {', '.join(names)})"
+        remedy = "--force replaces it, --out names another folder"
+        raise InputError(f"{folder}: holds the result of `{made_by}`{why}; {remedy}")
     wanted = ["volume.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
     if gone := [name for name in wanted if not (folder / name).is_file()]:
         raise InputError(f"{folder}: {gone[0]} is gone from this finished result; --force makes it anew")

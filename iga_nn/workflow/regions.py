@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
-from parameterize.surface.geometry import doubled_areas
+from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.surface import Surface
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
@@ -90,7 +90,7 @@ def facts_of(region: Region, surface: Surface) -> dict[str, Any]:
     """
     if not share_of(region, surface):
         raise ValueError(f"region {str(region)!r:.80}: {_nowhere(surface)}")
-    covered, areas = cover(region, surface), 0.5 * _lengths(doubled_areas(surface.vertices, surface.faces))
+    covered, (_, areas) = cover(region, surface), normals_and_areas(surface.vertices, surface.faces)
     area = float(areas @ covered)
     return {
         "region": str(region),
@@ -105,7 +105,7 @@ def cover(region: Region, surface: Surface) -> Array:
 
     The share is that of points on the triangle; larger triangles have more points.
     """
-    areas = _lengths(doubled_areas(surface.vertices, surface.faces))
+    _, areas = normals_and_areas(surface.vertices, surface.faces)
     counts = np.maximum(1, np.round(_SAMPLES * areas / areas.sum())).astype(int)
     chosen = np.repeat(np.arange(len(counts)), counts)
     found = region.holds(*_points(surface, chosen, np.random.default_rng(_SEED)))
@@ -118,15 +118,13 @@ def share_of(region: Region, surface: Surface) -> float:
     A region without such points, but with vertices, has the least share that is not zero.
     """
     rng = np.random.default_rng(_SEED)
-    cross = doubled_areas(surface.vertices, surface.faces)
-    size = _lengths(cross)
-    chosen = rng.choice(len(size), _SAMPLES, p=size / size.sum())
+    normals, areas = normals_and_areas(surface.vertices, surface.faces)
+    chosen = rng.choice(len(areas), _SAMPLES, p=areas / areas.sum())
     found = region.holds(*_points(surface, chosen, rng))
     if found.any():
         return float(found.mean())
     corners = surface.vertices[surface.faces].reshape(-1, 3).T
-    normals = np.repeat(_units(cross), 3, axis=0).T
-    return 1.0 / _SAMPLES if region.holds(corners, normals).any() else 0.0
+    return 1.0 / _SAMPLES if region.holds(corners, np.repeat(normals, 3, axis=0).T).any() else 0.0
 
 
 def _points(surface: Surface, chosen: IntArray, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -134,14 +132,4 @@ def _points(surface: Surface, chosen: IntArray, rng: np.random.Generator) -> tup
     corners = surface.vertices[surface.faces[chosen]]
     a, b = np.sort(rng.uniform(size=(2, len(chosen))), axis=0)
     points = np.einsum("mk,mkd->dm", np.stack([a, b - a, 1.0 - b], axis=1), corners)
-    return points, _units(doubled_areas(surface.vertices, surface.faces[chosen])).T
-
-
-def _lengths(vectors: Array) -> Array:
-    return np.asarray(np.linalg.norm(vectors, axis=1))
-
-
-def _units(vectors: Array) -> Array:
-    """Return vectors (k, 3) scaled to length 1; zero vectors stay zero."""
-    size = _lengths(vectors)
-    return vectors / np.where(size > 0.0, size, 1.0)[:, None]
+    return points, normals_and_areas(surface.vertices, surface.faces[chosen])[0].T

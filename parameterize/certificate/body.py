@@ -50,7 +50,7 @@ class BodyCertificate(Shown):
 
     @property
     def lower_bound(self) -> float:
-        """Return the smallest of the patches' lower bounds of |det J|, each divided by the mean of its own patch."""
+        """Return the smallest of the lower bounds of the patches, each relative to the mean of its own patch."""
         return min(patch.lower_bound for patch in self.patches)
 
     @property
@@ -71,9 +71,11 @@ class BodyCertificate(Shown):
 
 
 def _defect(patch: Certificate) -> str:
-    """Return where a patch is folded, or on how many spans it is not proved."""
+    """Return where a patch is folded or flat, or on how many spans it is not proved."""
     if patch.witness is not None:
         return f"folded at {in_brackets(patch.witness)}"
+    if patch.flat is not None:
+        return f"det J is zero, up to rounding, at {in_brackets(patch.flat)}"
     return f"{patch.claim} not proved on {len(patch.unproved)} knot spans"
 
 

@@ -45,6 +45,9 @@ class Certificate(Shown):
         The parameters of a point where det J has the wrong sign; None unless folded.
     unproved : (k, 3) array of int
         Span numbers (i, j, l) on which the sign of det J was not proved.
+    flat : three float or None
+        Of an undecided volume the parameters of a point where det J is zero, up to rounding, such as one where control
+        points coincide; None where no such point was met.
     left_handed : bool
         Whether det J is negative on the whole: u, v, w are a left-handed system.
 
@@ -62,6 +65,7 @@ class Certificate(Shown):
     witness: tuple[float, float, float] | None
     unproved: IntArray
     left_handed: bool = False
+    flat: tuple[float, float, float] | None = None
 
     @property
     def orientation(self) -> str:
@@ -102,6 +106,7 @@ def certify_patch(volume: BSplineVolume, max_depth: int) -> Certificate:
         witness=search.witness(volume),
         unproved=form.numbers(failed),
         left_handed=left_handed,
+        flat=search.parameters(search.flat_piece) if search.flat_piece and verdict == "undecided" else None,
     )
 
 
@@ -132,6 +137,9 @@ class _Pieces:
         )
 
 
+_Corner = tuple[int, int, IntArray, IntArray]  # a piece's depth, span and origin (3,), and the corner (3,)
+
+
 class _Search:
     """Depth-first subdivision of doubtful spans, each until it is proved, or folded, or a part of it is given up.
 
@@ -147,7 +155,8 @@ class _Search:
         self.unproved = np.zeros(form.span_count, dtype=bool)
         self.closed = np.zeros(form.span_count, dtype=bool)  # folded or given up: not examined further
         self.deepest = 0.0  # det J at the worst fold
-        self.worst_piece: tuple[int, int, IntArray, IntArray] | None = None  # depth, span, origin (3,), corner (3,)
+        self.worst_piece: _Corner | None = None
+        self.flat_piece: _Corner | None = None  # where det J is zero up to rounding
 
     def examine(self, spans: IntArray) -> None:
         """Examine whole spans (k,), flat numbers, until each is proved, folded or given up."""
@@ -180,6 +189,9 @@ class _Search:
         if pieces.depth == self.max_depth:
             self.closed[pieces.spans[~(bounds > 0.0)]] = True
         hopeless = (lowest_corner <= errors) & (least >= -errors)  # det J is 0 at a corner, and no fold can show
+        if self.flat_piece is None and hopeless.any():
+            row = int(np.flatnonzero(hopeless)[0])
+            self.flat_piece = _corner(pieces, row, int(corners[row].argmin()))
         done = (bounds > self.target) | hopeless | self.closed[pieces.spans] | (pieces.depth == self.max_depth)
         self.unproved[pieces.spans[done & ~(bounds > 0.0)]] = True
         self.lowest = min(self.lowest, float(bounds[done].min(initial=np.inf)))
@@ -190,8 +202,16 @@ class _Search:
         row, corner = np.unravel_index(int(corners.argmin()), corners.shape)
         if folded[row] and corners[row, corner] < self.deepest:
             self.deepest = float(corners[row, corner])
-            place = np.array(np.unravel_index(int(corner), (2, 2, 2)), dtype=np.int64)
-            self.worst_piece = (pieces.depth, int(pieces.spans[row]), pieces.origins[row], place)
+            self.worst_piece = _corner(pieces, int(row), int(corner))
+
+    def parameters(self, corner: _Corner, inward: float = 0.0) -> tuple[float, float, float]:
+        """Return the parameters of a corner of a piece, or of a point a share of the way towards its middle."""
+        depth, span, origin, place = corner
+        number = self.form.numbers(np.array([span]))[0]
+        edges = np.array([b[[i, i + 1]] for b, i in zip(self.form.breaks, number, strict=True)])  # (3, 2)
+        local = (origin + place + inward * (0.5 - place)) / 2.0**depth
+        u, v, w = ((1.0 - local) * edges[:, 0] + local * edges[:, 1]).tolist()
+        return u, v, w
 
     def witness(self, volume: BSplineVolume) -> tuple[float, float, float] | None:
         """Return the parameters of the worst fold found.
@@ -201,13 +221,14 @@ class _Search:
         """
         if self.worst_piece is None:
             return None
-        depth, span, origin, place = self.worst_piece
-        number = self.form.numbers(np.array([span]))[0]
-        edges = np.array([b[[i, i + 1]] for b, i in zip(self.form.breaks, number, strict=True)])  # (3, 2)
         for inward in (0.0, 1e-12, 1e-9, 1e-6, 1e-3):
-            local = (origin + place + inward * (0.5 - place)) / 2.0**depth
-            point = (1.0 - local) * edges[:, 0] + local * edges[:, 1]
+            point = self.parameters(self.worst_piece, inward)
             if np.linalg.det(volume.jacobian(point)[0]) <= 0.0:
                 break
-        u, v, w = point.tolist()
-        return u, v, w
+        return point
+
+
+def _corner(pieces: _Pieces, row: int, corner: int) -> _Corner:
+    """Return a corner, numbered 0 to 7, of one of the pieces."""
+    place = np.array(np.unravel_index(corner, (2, 2, 2)), dtype=np.int64)
+    return pieces.depth, int(pieces.spans[row]), pieces.origins[row], place

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import eigsh, splu
 
 from ..arrays import Array, IntArray, Mask
 from ..progress import Progress, ProgressCallback, ignore
-from ..surface.geometry import doubled_areas, edge_table
+from ..surface.geometry import edge_table, normals_and_areas
 from .cutting import split_edges
 from .layout import CubeLayout
 
@@ -165,7 +165,7 @@ class _Triangles:
 
     def __init__(self, vertices: Array, faces: IntArray) -> None:
         self.faces = faces
-        area = 0.5 * np.linalg.norm(doubled_areas(vertices, faces), axis=1)
+        _, area = normals_and_areas(vertices, faces)
         scale = 4.0 * np.pi / area.sum()
         self._area = scale * np.maximum(area, _THIN * area.mean())
         corners = vertices[faces]

@@ -10,7 +10,7 @@ from scipy.optimize import fmin
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Array
-from ..surface.geometry import doubled_areas, edge_triangles
+from ..surface.geometry import edge_triangles, normals_and_areas
 from ..threads import in_parallel
 from .layout import CubeLayout
 
@@ -84,8 +84,7 @@ def _bends(layout: CubeLayout) -> tuple[Array, Array, Array]:
     points, faces, places = layout.points, layout.faces, layout.places
     edges, owners = edge_triangles(faces)
     here, there = owners.T
-    normals = doubled_areas(points, faces)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    normals, _ = normals_and_areas(points, faces)
     angle = np.arccos(np.clip((normals[here] * normals[there]).sum(axis=1), -1.0, 1.0))
     middle_there = points[faces[there]].mean(axis=1) - points[edges[:, 0]]
     hollow = np.where((middle_there * normals[here]).sum(axis=1) > 0.0, angle, -angle)

@@ -26,7 +26,7 @@ _WEIGHT = 10.0  # times that of the distance from the surface, whose data hold t
 _SAMPLES = 110  # a direction and cube face
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
 _CHUNK = 4096  # samples at a time, which take some 40 MB
-_REACH = 0.05  # from a contact, in a domain of volume 1: what the steps of a round look at
+_REACH = 0.05  # distance from a contact, in a domain of volume 1, within which a round's steps look for others
 _ACCURACY = 2.0  # of the fast winding number
 
 

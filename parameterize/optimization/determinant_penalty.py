@@ -23,7 +23,7 @@ from .spans import with_neighbours
 from .term import RoundWeights
 
 MIN_COEFFICIENT = 0.1  # a Bernstein coefficient of det J below this is penalised on active spans; mean det J is 1
-_BLOCK = 32  # spans at a time: what they need fits into the cache
+_BLOCK = 32  # spans at a time: their arrays fit into the cache
 _MOST_KEPT = 300e6  # bytes of rows that are kept from product to product; those of further spans are made anew
 
 

@@ -14,7 +14,7 @@ from .operators import PiecewiseOperator
 from .tensor_product import SYMMETRIC, GaussGrid
 from .term import RoundWeights
 
-ARAP_LIMIT = 6.0  # times 1 + the mean distortion: what lies above costs more, as a few elements would else be crushed
+ARAP_LIMIT = 6.0  # times 1 + the mean distortion: larger distortion costs more, else a few elements are crushed
 _STIFFENING = 3.0  # weight of the squared excess above that limit
 _MIN_DET = 0.15  # det J below this is penalised at the Gauss points; mean det J is 1
 _GAUSS = 3, 1  # Gauss points a span and direction: on the first and last span, where F bends most, and on the others

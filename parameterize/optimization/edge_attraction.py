@@ -19,9 +19,9 @@ from .surface_distance import TANGENTIAL, SurfaceFit
 from .term import RoundWeights
 
 _A_SPAN = 2
-_WEIGHT = 0.03  # share of the surface's weight: the data of the surface decide, the anchors hold what these leave open
+_WEIGHT = 0.03  # share of the surface's weight: the data of the surface decide, the anchors hold the rest
 _NEAR = 0.5  # share of a span's length: anchors closer to the surface than this count as near
-_NEAR_SHARE = 0.99  # of the anchors: with fewer of them near, they would hold F at another part of the surface
+_NEAR_SHARE = 0.99  # of the anchors: with fewer near, they would hold F at another part of the surface
 _GIVEN_CORNER = 0.5  # weight, in all directions, of a corner that the user gives
 
 

@@ -27,7 +27,7 @@ from .term import RoundWeights, Term, Weights
 _REACH = 0.03  # while F grows, surface points farther from F than this do not slide, and draw F in all directions
 _SLIDES = 3  # of the boundary parameters after each step: further ones hardly move them
 _RELAXATIONS = 1  # sweeps over the triangles that these flipped: after every step, so that flips do not pile up
-_PULL = 3e-4  # share of the surface's weight in the preconditioner: more would hold back what slides along the surface
+_PULL = 3e-4  # share of the surface's weight in the preconditioner: more would hold back slides along the surface
 _TOLERANCE, _ITERATIONS = 0.1, 20  # of a Newton direction, relative and at most: a better one does not save steps
 _SMOOTH_TOLERANCE, _SMOOTH_ITERATIONS = 1e-8, 5000  # of `smoothed`, whose result is a map and no direction
 

@@ -18,9 +18,9 @@ _SHORTEST_STEP = 1e-6
 _MEMORY = 4  # differences of Newton steps from which the next place is guessed: older ones belong to another shape
 _DAMPING = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
 _DAMPING_GROWTH = 3.0  # factor after each further one, and divisor after a full step
-FIRST_GAIN = 8e-3  # `StoppingRule.gain` of the first round of all: what it leaves the next ones lower anyway
-GAIN = 1e-3  # likewise of later ones
-LEAST_STEPS = 6  # a round: what unfolds a few spans hardly lowers the energy of the whole
+FIRST_GAIN = 8e-3  # `StoppingRule.gain` of the first round; the next rounds lower the rest anyway
+GAIN = 1e-3  # the same of later rounds
+LEAST_STEPS = 6  # a round: unfolding a few spans hardly lowers the whole energy
 _SMALL_GAINS = 2  # in a row end a round: a step may gain little by chance
 
 

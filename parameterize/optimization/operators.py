@@ -20,7 +20,7 @@ _ROWS = 4096  # in a piece of work
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseOperator:
-    """Map x to the sum of what the pieces of work compute from x; `add` receives these parts in order, and x."""
+    """Map x to the sum of the results of all pieces of work; `add` receives these results in order, and x."""
 
     pieces: list[Callable[[Floats], Any]]
     add: Callable[[list[Any], Floats], Floats]

@@ -22,7 +22,7 @@ class Optimized:
 
     @classmethod
     def of(cls, spline: SplineMap) -> "Optimized":
-        """Certify a map and, where that succeeds, check its boundary."""
+        """Certify a map and, once it is certified, check its boundary."""
         volume = spline.volume
         certificate = certify(volume)
         injective = check_boundary(volume).injective if certificate.verdict == "certified" else None

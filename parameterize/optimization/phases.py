@@ -21,15 +21,15 @@ from .state import MOST_WATCHED, State
 
 _log = logging.getLogger(__name__)
 
-FULL_PENALTY = 2500.0  # weight on det J once F has its shape: what the surface's data fold then unfolds against them
+FULL_PENALTY = 2500.0  # weight on det J once F has its shape: folds open even against the surface's data
 RAMP = (20.0, 100.0, 500.0, FULL_PENALTY)  # one a round, for a map that starts folded: it takes its shape through folds
 PATIENT_ROUNDS = 2  # of a stage: after them anchors let go, and the penalty grows at unproved spans
 FIRM_ROUNDS = 4  # after these the surface gives way at unproved spans, which more weight alone has not unfolded
 GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
-_CONTACT_WAY = 0.0625  # likewise where the boundary meets itself, of whose rounds there are few
+_CONTACT_WAY = 0.0625  # the same where the boundary meets itself: these rounds are few
 _STALLING = 8  # rounds in which the unproved spans are not halved: another start costs as much as waiting longer
-_SMOOTHING_ROUNDS = 2  # likewise; F is then smoothed there: no descent undoes some folds
-_MOST_SMOOTHED = 10  # spans that stay unproved: to smooth F near more of them would take its shape away
+_SMOOTHING_ROUNDS = 2  # the same; F is then smoothed there, as no descent undoes some folds
+_MOST_SMOOTHED = 10  # spans that stay unproved: smoothing F near more spans would take its shape away
 _MENDINGS = 6  # attempts to restore certified control points around spans that fold again
 
 

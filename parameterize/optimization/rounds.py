@@ -35,7 +35,7 @@ def optimize(
     surface: SurfaceFit,
     config: SplineConfig,
     schedule: Schedule,
-    weights: Weights = Weights(),  # noqa: B008 - frozen
+    weights: Weights = Weights(),
     *,
     history: History,
     progress: ProgressCallback = ignore,

@@ -28,6 +28,9 @@ _NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 class SlidingParameters:
     """Hold parameters (N, 3) on cube faces (N,), and the rows that yield F there.
 
+    The points to which parameters slide are not part of this class, because the samples of contact.py have none.
+    SurfaceFit, a term of the energy, adds the points, their metrics and their weights.
+
     triangles: (m, 3), between the points; with them `relax` and `slide` keep the layout on the cube one-to-one.
     """
 

@@ -14,7 +14,7 @@ from ..spline.spline_map import SplineMap
 from .energy import SplineEnergy
 from .optimized import Optimized
 
-MOST_WATCHED = 1000  # spans: where more are unproved, the penalty at the Gauss points has to unfold most of them first
+MOST_WATCHED = 1000  # spans: where more are unproved, the penalty at the Gauss points unfolds most first
 _CHECKPOINT = "spline"
 _NUMBERS = ("number", "certified", "unproved", "unproved_before", "fewest", "halved", "last_square", "best_square")
 
@@ -31,10 +31,10 @@ class State:
     number: int  # of rounds done, those on other knots among them
     halved: int  # the round in which the number of unproved spans was last halved
     certified: bool = False  # whether a round on these knots, one in which F does not grow, has certified the map
-    unproved: int = 0  # spans that the last round has left so
-    unproved_before: int = 0  # likewise the round before it
-    fewest: int = sys.maxsize  # spans unproved when their number was last halved
-    last_square: float = 0.0  # of what the last round's steps have led to: smoothing leads away for a while
+    unproved: int = 0  # the number of unproved spans after the last round
+    unproved_before: int = 0  # the number after the round before
+    fewest: int = sys.maxsize  # their number when it was last halved
+    last_square: float = 0.0  # of the map that the last round's steps gave: smoothing leads away for a while
     best_square: float = math.inf
     rounds: Counter[str] = field(default_factory=Counter)  # done on these knots, by phase
     seconds: dict[str, float] = field(default_factory=dict)  # of these

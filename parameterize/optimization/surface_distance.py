@@ -13,7 +13,7 @@ from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
 from .term import RoundWeights
 
-TANGENTIAL = 2e-4  # share of the distance within the tangent plane: holds what slides, and hardly draws F
+TANGENTIAL = 2e-4  # share of the distance within the tangent plane: holds sliding points, and hardly draws F
 
 
 class SurfaceFit:

@@ -225,6 +225,10 @@ class FastDiagonalization:
 
     matrices: three symmetric matrices A_d (n, n). mass: three matrices M_d. dtype: the precision of the vectors. The
     constructor solves three generalised eigenproblems; an application consists of products only.
+
+    `solve.linear.preconditioner` has a class of its own: there the inverse is scaled by the operator's diagonal, keeps
+    to the complement of a kernel, and is shared by processes. Both have in common SciPy's `eigh` for three pairs of
+    small matrices and the sum of eigenvalues: less code than a base class would take.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Distances of points to the boundary of a trivariate spline, and how distances are summarised."""
+"""Distances of points to the boundary of a trivariate spline, and their root mean square, mean and maximum."""
 
 from dataclasses import dataclass
 
@@ -43,8 +43,8 @@ def nearest_on_boundary(points: Array, volume: BSplineVolume, boundary: SampledB
     """Return the parameters (m, 3) of the spline's boundary points nearest to points (m, 3), and the distances (m,).
 
     The nearest point of the sampled triangles gives a cube face and parameters on it; Gauss-Newton steps in that face
-    then lower the distance to the spline itself. The distances are those of points on the spline's boundary, so never
-    less than the true ones.
+    then lower the distance to the spline itself. It is the distance of a point on the spline's boundary, so never less
+    than the true one.
     """
     _, triangle, weights = closest_triangles(points, boundary.points, boundary.triangles)
     corners = boundary.triangles[triangle]  # (m, 3)

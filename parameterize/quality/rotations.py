@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats, Mask
 
 _BLOCK = 256  # matrices at a time: they stay in the cache
-_STEPS = 8  # of Newton's method: as many as the least regular matrix takes in double precision
+_STEPS = 8  # of Newton's method: the least regular matrix takes 8 in double precision
 _REGULAR = 1e-3  # det J / |J|^3 above which a matrix is safely away from reflections
 
 
@@ -18,8 +18,8 @@ def closest_rotations(matrices: Floats) -> Floats:
     """Return the rotation closest to each matrix, in the same precision: (3, 3, m) -> (3, 3, m).
 
     Scaled Newton steps (Higham 1986) where det J is safely positive. Elsewhere these would end at a reflection or
-    divide by zero; those few are done by SVD with the smallest direction flipped. A matrix that is not finite gets some
-    rotation: the energy of both is not finite either.
+    divide by zero; these few matrices take an SVD with the smallest direction flipped. A matrix that is not finite
+    gets some rotation: the energy of both is not finite either.
     """
     flat, regular = _polar_factors(np.ascontiguousarray(matrices).reshape(9, -1))
     rotations: Floats = flat.reshape(matrices.shape)

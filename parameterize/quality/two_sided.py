@@ -1,4 +1,4 @@
-"""The distance between a surface and the boundary of a spline, both ways, at samples that cover all of the two.
+"""The distance between a surface and the boundary of a spline, both ways, at samples all over both.
 
 The vertices of a mesh alone miss the faces between them: a box has eight vertices. So its triangles are cut until every
 span of the spline's boundary has at least two samples a direction, and the spline's spans are sampled, too.
@@ -13,12 +13,12 @@ from ..cube.cutting import subdivide_finely
 from ..spline.bspline import breakpoints
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
-from ..surface.geometry import area_shares, doubled_areas
+from ..surface.geometry import area_shares, normals_and_areas
 from ..surface.nearest import distance_to_mesh
 from .distances import Distances, nearest_on_boundary
 
 _PER_SPAN = 2.0  # samples on the mesh a direction, where spans have the mean area
-_LEAST_SAMPLES = 4_000  # about, also for a spline of few spans; halving edges gives two to four times as many
+_LEAST_SAMPLES = 4_000  # about, also for a spline of few spans; halving edges gives two to four times this number
 _MOST_SAMPLES = 100_000  # on the mesh, unless it has more vertices itself
 
 
@@ -74,6 +74,6 @@ def two_sided(volume: BSplineVolume, vertices: Array, faces: IntArray) -> TwoSid
 def _spacing(volume: BSplineVolume, vertices: Array, faces: IntArray) -> float:
     """Return the length above which edges between samples on the mesh are cut."""
     u, v, w = (len(breakpoints(row)) - 1 for row in volume.knots)
-    area = float(np.linalg.norm(doubled_areas(vertices, faces), axis=1).sum()) / 2.0
+    area = float(normals_and_areas(vertices, faces)[1].sum())
     cells = max(_PER_SPAN**2 * 2 * (u * v + v * w + w * u), _LEAST_SAMPLES)
     return float(np.sqrt(area / cells))

@@ -1,7 +1,7 @@
 """B-splines: knot vectors, basis values and derivatives, collocation, knot insertion, tensor-product evaluation.
 
 A knot vector is *open*: its first and last `degree + 1` knots coincide. The basis has `len(knots) - degree - 1`
-functions. Recurrences are those of Piegl and Tiller, *The NURBS Book* (2nd ed.), chapter 2.
+functions. The recurrences are from Piegl and Tiller, *The NURBS Book* (2nd ed.), chapter 2.
 scipy.interpolate is slow to load: it is imported where it is used.
 """
 
@@ -181,6 +181,12 @@ def midpoints(knots: Array) -> Array:
 def halved(knots: Array) -> Array:
     """Return the knot vector in which every span is halved."""
     return np.sort(np.concatenate([knots, midpoints(knots)]))
+
+
+def with_full_knots(knots: Array, degree: int, values: Sequence[float]) -> Array:
+    """Return a knot vector in which each value is a knot `degree` times at least: there splines are only continuous."""
+    missing = [np.full(max(0, degree - int(np.count_nonzero(knots == value))), value) for value in values]
+    return np.sort(np.concatenate([knots, *missing]))
 
 
 def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:

@@ -32,6 +32,13 @@ class Interface:
         Whether the first direction of the one face is the second direction of the other.
     flipped : two bool
         Whether the two faces run in opposite ways along the first and the second direction of the first face.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
+    >>> print(iga_nn.MultiPatch(tuple(halves), (iga_nn.Interface((0, "u1"), (1, "u0")),)).interfaces[0])
+    p0_u1 = p1_u0
     """
 
     first: Face
@@ -41,6 +48,13 @@ class Interface:
 
     def __str__(self) -> str:
         return f"{face_label(*self.first)} = {face_label(*self.second)}"
+
+    @property
+    def ring(self) -> int | None:
+        """Return the direction along which a patch is glued to itself without a turn, None for other interfaces."""
+        (p, face_p), (q, face_q) = self.first, self.second
+        is_ring = p == q and face_p[0] == face_q[0] and not self.swapped and not any(self.flipped)
+        return axis_side(face_p)[0] if is_ring else None
 
     def turned(self, second: Floats) -> Floats:
         """Return an array (m_a, m_b, ...) of the second face in the order of the first."""

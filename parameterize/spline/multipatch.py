@@ -18,6 +18,7 @@ from .interface import (
     WEIGHT_TOLERANCE,
     Face,
     Interface,
+    axis_side,
     face_label,
     face_layer,
     gap,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TOLERANCE = 1e-6  # of the body's size: distance of two control points that are taken for one
+SAMPLES = 5  # points a direction at which two faces over the same corners are compared
 FLAT = 1e-9  # of the squared size: the area of a face that has shrunk to an edge or a point
 
 
@@ -89,10 +91,12 @@ class MultiPatch(Brief, Shown):
         """Return the body of patches, glued where two faces have the same control points.
 
         tolerance: the largest distance of two control points that are taken for one, as a share of the body's size;
-        they become one, that of the patch that comes first. Raises ValueError where two faces have the same control
-        points, but not the same degrees, knots and weights, and where three faces are the same.
+        they become one, that of the patch that comes first. Raises ValueError where two faces are the same
+        surface, but do not have the same degrees, knots and weights, and where three faces are the same.
         """
         given = tuple(patches)
+        if not given:
+            raise ValueError("a body has one patch or more")
         for patch in given:
             demand_volume(patch)
         points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in given])
@@ -223,18 +227,27 @@ def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float)
         ways = (way for way in orientations(faces[i], faces[j]) if knots_agree(patches, way))
         way = next((way for way in ways if gap(patches, way) <= tolerance), None)
         if way is None:
-            if _same_points(nets[i].reshape(-1, 3), nets[j].reshape(-1, 3), tolerance):
+            one, other = (_samples(patches[p], name) for p, name in (faces[i], faces[j]))
+            if _same_points(one, other, tolerance):
                 raise ValueError(
-                    f"{face_label(*faces[i])} and {face_label(*faces[j])} have the same control points, but other "
-                    "degrees, knots or weights: give both faces the same ones"
+                    f"{face_label(*faces[i])} and {face_label(*faces[j])} are the same surface, but of other degrees, "
+                    "knots or weights: give both faces the same ones"
                 )
             continue  # two surfaces over the same corners
-        for one, other in ((i, j), (j, i)):
-            if one in taken:
-                names = ", ".join(face_label(*faces[k]) for k in (one, other, taken[one]))
+        for k, partner in ((i, j), (j, i)):
+            if k in taken:
+                names = ", ".join(face_label(*faces[m]) for m in (k, partner, taken[k]))
                 raise ValueError(f"{names} are one surface: at most two patches meet at a face")
-            taken[one] = other
+            taken[k] = partner
         yield way
+
+
+def _samples(volume: BSplineVolume, face: str) -> Array:
+    """Return points (k, 3) of a face at even parameters, the same points however the parameters run."""
+    axis, side = axis_side(face)
+    even = np.linspace(0.0, 1.0, SAMPLES)
+    u, v, w = (np.array([float(side)]) if a == axis else even for a in range(3))
+    return volume.grid(u, v, w).reshape(-1, 3)
 
 
 def _corners(net: Array) -> Array:

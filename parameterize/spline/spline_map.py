@@ -19,7 +19,8 @@ class SplineMap:
 
     @classmethod
     def of(cls, volume: BSplineVolume) -> "SplineMap":
-        """Return the map of a volume whose degree is the same in all directions."""
+        """Return the map of a polynomial volume whose degree is the same in all directions."""
+        assert volume.weights is None, "the optimization moves control points, and knows no weights"
         return cls(volume.degrees[0], volume.knots, np.ascontiguousarray(np.moveaxis(volume.control_points, -1, 0)))
 
     @classmethod

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise, product
 from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ from .bspline import (
     interpolate_grid,
     open_uniform_knots,
     real_array,
+    with_full_knots,
 )
 from .rational import Orders, homogeneous, projected, quotients
 
@@ -270,6 +272,41 @@ class BSplineVolume(Brief, Shown):
             net = apply_along(insertion_into(self.knots[a], self.degrees[a], finer[a]), net, a)
         parts = (net,) if self.weights is None else projected(net)
         return BSplineVolume(self.degrees, finer, *parts)
+
+    def divided(
+        self, u: Sequence[float] = (), v: Sequence[float] = (), w: Sequence[float] = ()
+    ) -> "tuple[BSplineVolume, ...]":
+        """Return the volumes into which cuts at parameters divide the map, exactly; along w one comes after the other.
+
+        u, v, w: the parameters of the cuts, between 0 and 1; each volume's own parameters run from 0 to 1 again.
+        Raises ValueError for other parameters.
+
+        Examples
+        --------
+        >>> import iga_nn
+        >>> rod = iga_nn.BSplineVolume.from_function(lambda u, v, w: (4 * u, v, w), control_points=5)
+        >>> left, right = rod.divided(u=[0.25])
+        >>> right([[0, 0, 0], [1, 0, 0]])[:, 0].round(12)
+        array([1., 4.])
+        """
+        ends = [[0.0, *sorted(cuts), 1.0] for cuts in (u, v, w)]
+        if any(not 0.0 <= a < b <= 1.0 for row in ends for a, b in pairwise(row)):
+            raise ValueError(f"cuts must be different parameters between 0 and 1, got {(u, v, w)!r:.80}")
+        finer = map(with_full_knots, self.knots, self.degrees, (row[1:-1] for row in ends))
+        whole = self.on_knots(tuple(finer))  # type: ignore[arg-type]
+        return tuple(whole._between(part) for part in product(*map(pairwise, ends)))
+
+    def _between(self, ends: Sequence[tuple[float, float]]) -> "BSplineVolume":
+        """Return the part between two parameters in each direction, at which the spline is only continuous."""
+        window, rows = [], []
+        for row, degree, (low, high) in zip(self.knots, self.degrees, ends, strict=True):
+            first = int(np.searchsorted(row, low, side="right")) - 1 - degree
+            last = int(np.searchsorted(row, high))
+            inner = (row[first + degree + 1 : last] - low) / (high - low)
+            window.append(slice(first, last))
+            rows.append(np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)]))
+        weights = None if self.weights is None else self.weights[tuple(window)]
+        return BSplineVolume(self.degrees, (rows[0], rows[1], rows[2]), self.control_points[tuple(window)], weights)
 
     def face(self, axis: int, side: int) -> Array:
         """Return the control points of a boundary face, e.g. (n_v, n_w, 3) for axis 0; side 0 or 1."""

@@ -9,7 +9,7 @@ from ..spline.spline_map import SplineMap
 
 COARSE = 5 / 9  # of the spans a direction, in the first rounds: enough for the shape, at a fraction of the time
 _BOUNDARY_SHARE = 0.2  # weight of the surface's samples; those inside have the rest of 1, and so decide where F folds
-_FAIRNESS = 1e-7  # of the fit: holds what no sample determines, and hardly moves the rest
+_FAIRNESS = 1e-7  # of the fit: determines coefficients without samples, and hardly moves the rest
 
 
 def first_spline(inside: Array, places: Array, fit: SurfaceFit) -> SplineMap:

@@ -88,7 +88,7 @@ class Growth(Start):
 
 
 GROWTH = Growth("growth", "growth", "growing a map from a cube")
-# Where the first growth fails: far thinner parts keep their small det J, and what is squeezed does not buckle.
+# Where the first growth fails: far thinner parts keep their small det J, and squeezed parts do not buckle.
 STIFF = Growth(
     "stiff growth", "growth", "growing a stiffer map", turn=1, far=0.01, firm=12, stiffness=10.0, least_floor=0.05
 )

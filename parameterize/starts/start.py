@@ -43,7 +43,7 @@ class Task:
     device: str  # where the network is trained, "cpu" or "cuda"
     dtype: str  # its precision, "float32" or "float64"
     given_corners: IntArray | None
-    seconds: dict[str, float]  # which grow as the run goes on
+    seconds: dict[str, float]  # by step, of the run so far
     report: dict[str, Any]  # history and progress, as Trainer and optimize take them
 
     @property
@@ -125,7 +125,7 @@ def optimized(
     schedule: Schedule,
     task: Task,
     checkpoints: Checkpoints,
-    weights: Weights = Weights(),  # noqa: B008 - frozen
+    weights: Weights = Weights(),
 ) -> Attempt:
     """Return the attempt that the rounds make of a first map, on the knots of `fit`."""
     spline = task.config.spline

@@ -8,7 +8,7 @@ from .start import Attempt, Origin, Start
 
 @dataclass(frozen=True)
 class AttemptReport:
-    """What a start has led to.
+    """Describe the attempt of a start.
 
     Attributes
     ----------

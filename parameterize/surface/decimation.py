@@ -14,7 +14,7 @@ from .surface import Surface, surface_from_arrays
 def decimate(surface: Surface, max_faces: int) -> Surface:
     """Return the surface with at most `max_faces` triangles, or itself where it has no more.
 
-    Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), except those whose collapse would make
+    Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), unless the collapse would make
     triangles intersect. A notice has the counts and the largest distance moved; `sha256` is that of the new arrays.
     Raises MeshError for a limit below 4, and where the surface cannot be brought below it.
     """
@@ -34,6 +34,6 @@ def decimate(surface: Surface, max_faces: int) -> Surface:
         smaller.vertices[smaller.faces].mean(axis=1), doubled_areas(smaller.vertices, smaller.faces)
     )
     groups = renumbered(surface.groups, old)
-    # Notices before this one concern the given surface, those after it the decimated one.
+    # Earlier notices concern the given surface, later ones the decimated surface.
     notices = (*surface.notices, notice, *smaller.notices)
     return replace(smaller, source=surface.source, notices=notices, groups=groups)

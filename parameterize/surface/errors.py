@@ -53,7 +53,7 @@ def check_finite(vertices: Array, faces: IntArray) -> None:
 
 
 def without_unused_defects(vertices: Array, faces: IntArray) -> tuple[Array, tuple[str, ...]]:
-    """Return vertices (n, 3) with zeros in place of invalid ones that no face uses, and a notice of these."""
+    """Return vertices (n, 3) with zeros in place of invalid, unused vertices, and a notice of their number."""
     wrong = ~np.all(abs(vertices) <= LARGEST, axis=1)
     wrong[faces.ravel()] = False
     if not wrong.any():

@@ -84,6 +84,13 @@ def doubled_areas(vertices: Array, faces: IntArray) -> Array:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
+def normals_and_areas(vertices: Array, faces: IntArray) -> tuple[Array, Array]:
+    """Return the unit normals (m, 3) of triangles, zero where a triangle has no area, and their areas (m,)."""
+    cross = doubled_areas(vertices, faces)
+    lengths = np.linalg.norm(cross, axis=1)
+    return cross / np.maximum(lengths, 1e-300)[:, None], 0.5 * lengths
+
+
 def _summed(values: Array, faces: IntArray, count: int) -> Array:
     """Return the sums (count, ...) at the vertices of the values (m, ...) of the triangles around each."""
     sums = np.zeros((count, *values.shape[1:]))
@@ -101,9 +108,7 @@ def vertex_normals(vertices: Array, faces: IntArray) -> Array:
 
 def vertex_quadrics(vertices: Array, faces: IntArray, tangential: float) -> Array:
     """Return the area-weighted mean of n n^T over the triangles at each vertex, plus `tangential` times I (n, 3, 3)."""
-    cross = doubled_areas(vertices, faces)
-    area = np.linalg.norm(cross, axis=1)
-    normal = cross / np.maximum(area, 1e-300)[:, None]
+    normal, area = normals_and_areas(vertices, faces)
     share = area[:, None, None] * normal[:, :, None] * normal[:, None, :]
     sums, total = (_summed(values, faces, len(vertices)) for values in (share, area))
     return np.asarray(sums / np.maximum(total, 1e-300)[:, None, None] + tangential * np.eye(3))
@@ -120,6 +125,6 @@ def vertex_weights(vertices: Array, faces: IntArray, n_own: int) -> Array:
 
 def area_shares(vertices: Array, faces: IntArray) -> Array:
     """Return the share (n,) of the surface's area that is nearest to each vertex: a third of each triangle there."""
-    area = np.linalg.norm(doubled_areas(vertices, faces), axis=1)
+    _, area = normals_and_areas(vertices, faces)
     share = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
     return np.asarray(share / share.sum())

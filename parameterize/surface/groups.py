@@ -15,7 +15,7 @@ from .errors import MeshError
 
 Groups = Mapping[str, IntArray]  # name: numbers of faces, ascending
 
-MOST_VALUES = 64  # of an array of face data that divides the faces into groups
+MOST_VALUES = 64  # of face data, for these to be groups
 MOST_GROUPS = 1000
 LONGEST_NAME = 80
 
@@ -32,7 +32,7 @@ def gathered(parts: Iterable[tuple[str, ArrayLike]]) -> dict[str, IntArray]:
 def by_value(arrays: Mapping[str, ArrayLike], count: int) -> dict[str, IntArray]:
     """Return a group "NAME=VALUE" for each value of the arrays of `count` whole numbers.
 
-    Arrays of other sizes or types are no groups, nor those of one value or of more than `MOST_VALUES`.
+    Arrays of other sizes or types, of one value, or of more than `MOST_VALUES` give no groups.
     """
     parts = []
     for name, given in arrays.items():

@@ -4,7 +4,7 @@ import igl
 import numpy as np
 
 from ..arrays import Array, IntArray
-from .geometry import doubled_areas
+from .geometry import normals_and_areas
 
 
 def distance_to_mesh(points: Array, vertices: Array, faces: IntArray) -> Array:
@@ -16,15 +16,14 @@ def nearest_on_mesh(points: Array, vertices: Array, faces: IntArray) -> tuple[Ar
     """Return the nearest point of a triangle mesh to each point (m, 3), and the unit normal of its triangle."""
     _, triangle, weights = closest_triangles(points, vertices, faces)
     corners = vertices[faces[triangle]]  # (m, 3, 3)
-    cross = doubled_areas(vertices, faces[triangle])
-    normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    normals, _ = normals_and_areas(vertices, faces[triangle])
     return np.einsum("mk,mka->ma", weights, corners), normals
 
 
 def closest_triangles(points: Array, vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Array]:
     """Return the distance (m,) of points (m, 3) to a mesh, the nearest triangles (m,), and barycentric weights (m, 3).
 
-    The weights are those of the nearest point within its triangle.
+    The weights belong to the nearest point within its triangle.
     """
     target = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int64)

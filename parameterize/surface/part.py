@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray
 from ..display import Brief
-from .geometry import connected, directed_edges, doubled_areas
+from .geometry import connected, directed_edges, normals_and_areas
 from .groups import Groups
 
 NEAR = 1e-6  # of the box's diagonal: triangles whose distances differ by less are equally near
@@ -57,7 +57,7 @@ class PartSurface(Brief):
 
     def area(self, triangles: IntArray) -> float:
         """Return the area of triangles (k,) in the user's units."""
-        return 0.5 * float(np.linalg.norm(doubled_areas(self.vertices, self.faces[triangles]), axis=1).sum())
+        return float(normals_and_areas(self.vertices, self.faces[triangles])[1].sum())
 
     def nearest(self, points: ArrayLike, normals: ArrayLike | None = None) -> IntArray:
         """Return the triangle (k,) that is nearest to each of the points (k, 3).
@@ -114,18 +114,17 @@ class PartSurface(Brief):
 
     @cached_property
     def normals(self) -> Array:
-        """Return unit normals (m, 3); a triangle too low to have one has that of its neighbour at its longest side."""
-        cross = doubled_areas(self.vertices, self.faces)
-        double = np.linalg.norm(cross, axis=1)
+        """Return unit normals (m, 3); a triangle that is too low takes its neighbour's at the longest side."""
+        normals, areas = normals_and_areas(self.vertices, self.faces)
         corners = self.vertices[self.faces]
         lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)  # (m, 3)
         longest = lengths.argmax(axis=1)
         across = self._neighbours[np.arange(len(longest)), longest]
-        thin = (double <= THIN * self._diagonal * lengths.max(axis=1)) & (across >= 0)
+        thin = (2.0 * areas <= THIN * self._diagonal * lengths.max(axis=1)) & (across >= 0)
         source = np.where(thin, across, np.arange(len(longest)))
         for _ in range(4):  # slivers beside slivers: twice as far each time
             source = source[source]
-        return (cross / np.maximum(double, np.finfo(np.float64).tiny)[:, None])[source]
+        return normals[source]
 
     @cached_property
     def _around(self) -> tuple[IntArray, IntArray]:
@@ -147,7 +146,7 @@ def _best_aligned(
     starts: IntArray,
     around: IntArray,
 ) -> IntArray:
-    """Return the best aligned triangles (k,) within `reach` (k,) among those at the corners of `found` (k,)."""
+    """Return the best aligned triangles (k,) within `reach` (k,) among the triangles at the corners of `found` (k,)."""
     best = found.copy()
     for i in range(len(points)):
         agreement = np.dot(normals[found[i]], given[i])

@@ -52,7 +52,7 @@ def _components(faces: IntArray) -> list[IntArray]:
 
 
 def _inside(vertices: Array, faces: IntArray, groups: list[IntArray]) -> tuple[int, list[int]]:
-    """Return the number of the widest component, and the numbers of those with every vertex inside it."""
+    """Return the number of the widest component, and the numbers of the components that lie inside it."""
     listed = [vertices[np.unique(faces[group])] for group in groups[: LISTED + 1]]
     outer = int(np.argmax([np.linalg.norm(np.ptp(points, axis=0)) for points in listed]))
     nested = []

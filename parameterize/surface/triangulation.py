@@ -2,7 +2,7 @@
 
 Triangles that fill a plane polygon have its area in all, others more: the least area neither overlaps nor leaves the
 polygon, be it concave, slit to a hole (the slit's edge runs both ways) or not quite plane. Every way has n - 2
-triangles, so no hole ever opens. The minimum follows from those of shorter chains of corners (Barequet and Sharir,
+triangles, so no hole ever opens. The minimum follows from the minima of shorter chains of corners (Barequet and Sharir,
 "Filling gaps in the boundary of a polyhedron", CAGD 12, 1995).
 """
 
@@ -79,7 +79,7 @@ def _apices(points: Array) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _weight(a: Array, b: Array, c: Array) -> float:
-    """Return the area of a triangle and a trace of its shape, which decides where areas are the same."""
+    """Return the area of a triangle plus a small multiple of its shape, which decides between equal areas."""
     normal_squared = edges_squared = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3

@@ -1,4 +1,4 @@
-"""Repairs a mesh and says so: duplicate vertices, degenerate faces, inconsistent winding."""
+"""Repairs a mesh, with notices: duplicate vertices, degenerate faces, inconsistent winding."""
 
 import igl
 import numpy as np
@@ -32,7 +32,7 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     edges = edge_table(solid)[0]
     short = edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
     label = connected(short if closed else _close_pairs(vertices, solid), len(vertices))
-    welded = np.unique(label, return_index=True)[1][label][solid]  # the lowest vertex of those that are joined
+    welded = np.unique(label, return_index=True)[1][label][solid]  # the lowest number of the joined vertices
     apart = _distinct(welded)
     if closed and not is_closed(welded[apart]):
         welded = solid  # collapsing would tear the surface: keep its edges of no length

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ..arrays import Array, IntArray
-from ..surface.geometry import doubled_areas
+from ..surface.geometry import normals_and_areas
 
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
 _STEPS = np.array(list(np.ndindex(3, 3, 3))) - 1
@@ -58,8 +58,7 @@ def near_or_inside(vertices: Array, faces: IntArray, cell: float, margin: float)
     """
     corners = vertices[faces]
     grown = np.stack([corners.min(axis=1) - margin, corners.max(axis=1) + margin], axis=1) / cell  # (m, 2, 3)
-    normals = doubled_areas(vertices, faces)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    normals, _ = normals_and_areas(vertices, faces)
     heights = (normals * corners[:, 0]).sum(axis=1) / cell
     winding, found = igl.FastWindingNumberBVH(), []
     winding.init(vertices, faces)
@@ -107,7 +106,7 @@ class TriangleSampler:
     """Draw triangles with probability proportional to area, or all triangles where there are at most `count`."""
 
     def __init__(self, vertices: Array, faces: IntArray, count: int, device: torch.device) -> None:
-        area = np.linalg.norm(doubled_areas(vertices, faces), axis=1)
+        _, area = normals_and_areas(vertices, faces)
         self._cumulative = torch.as_tensor(np.cumsum(area / area.sum()))
         self._count = min(count, len(faces))
         self._device = device

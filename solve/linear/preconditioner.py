@@ -32,11 +32,12 @@ COLUMNS, LAYERS = 4096, 8  # in a piece of work
 class FastDiagonalization:
     """Apply D (U (x) U (x) U) L^-1 (U (x) U (x) U)^T D to residuals of the free coefficients.
 
-    vectors: per direction (n, n), generalized eigenvectors in columns. inverse, scaling: (n_u, n_v, n_w), the diagonals
-    L^-1 and D. singular: whether constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin
-    face); the preconditioner then stays in their orthogonal complement. local: the part that is added for a sheared map
-    (`shear`). weakness: the part that had to be left out, as a sentence for the report; "" for none. For a slab,
-    `inverse` has the columns that `space.to_columns` gives, and all other arrays have the slab's own rows.
+    vectors: per direction (n, n), generalized eigenvectors in columns; in a periodic direction (n, n - 1), whose first
+    and last rows are the same. inverse, scaling: the diagonals L^-1, of the eigenvectors, and D, (n_u, n_v, n_w).
+    singular: whether constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin face); the
+    preconditioner then stays in their orthogonal complement. local: the part that is added for a sheared map (`shear`).
+    weakness: the part that had to be left out, as a sentence for the report; "" for none. For a slab, `inverse` has the
+    columns that `space.to_columns` gives, and all other arrays have the slab's own rows.
     """
 
     space: TrialSpace
@@ -95,9 +96,9 @@ class FastDiagonalization:
 
     def _along_u(self, u: Array, x: Array, after: Array | None = None) -> Array:
         """Return x after a matrix along the first axis, and then a diagonal."""
-        result = np.empty_like(x)
-        columns, rows = x.reshape(len(x), -1), result.reshape(len(x), -1)
-        factors = None if after is None else after.reshape(len(x), -1)
+        result = np.empty((len(u), *x.shape[1:]), dtype=x.dtype)
+        columns, rows = x.reshape(len(x), -1), result.reshape(len(u), -1)
+        factors = None if after is None else after.reshape(len(u), -1)
 
         def multiply(start: int) -> None:
             piece = slice(start, start + COLUMNS)
@@ -110,7 +111,7 @@ class FastDiagonalization:
 
     def _across(self, v: Array, w: Array, x: Array, before: Array | None = None, after: Array | None = None) -> Array:
         """Return x after a diagonal, two matrices along the second and third axis, and another diagonal."""
-        result = np.empty_like(x)
+        result = np.empty((len(x), len(v), len(w)), dtype=x.dtype)
 
         def multiply(start: int) -> None:
             for i in range(start, min(start + LAYERS, len(x))):
@@ -155,11 +156,11 @@ def _without_local(operator: Operator) -> FastDiagonalization:
     reaction = mean_mass / float(np.prod(averages))
     values, vectors = zip(*(_eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
     spectrum = values[0][:, None, None] + values[1][space.columns, None] + values[2] + reaction
-    scaling = _scaling(operator, _diagonal(space, slopes, masses, reaction))
+    scaling = _scaling(operator, _unfolded(space, _diagonal(space, slopes, masses, reaction)))
     singular = not space.dirichlet and reaction == 0.0 and not any(stiff.values())
     if singular:
         spectrum[0, : int(space.columns.start == 0), 0] = np.inf
-    u, v, w = vectors
+    u, v, w = (_ends_joined(rows, 0) if axis in space.periodic else rows for axis, rows in enumerate(vectors))
     return FastDiagonalization(space, (u, v, w), 1.0 / spectrum, scaling, singular, operator.threads)
 
 
@@ -199,9 +200,31 @@ def _directional_matrices(
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
             # one function only is nonzero at the end, with value 1
             slope[end, end] += stiff[name] * averages[axis] / float(np.prod(averages))
-        slopes.append(slope[free, free])
-        masses.append(mass[free, free])
+        ring = axis in operator.space.periodic
+        slopes.append(_folded(slope) if ring else slope[free, free])
+        masses.append(_folded(mass) if ring else mass[free, free])
     return slopes, masses, averages
+
+
+def _folded(matrix: Array) -> Array:
+    """Return the matrix (n - 1, n - 1) of a direction whose first and last function are one."""
+    folded = matrix[:-1, :-1].copy()
+    folded[0] += matrix[-1, :-1]
+    folded[:, 0] += matrix[:-1, -1]
+    folded[0, 0] += matrix[-1, -1]
+    return folded
+
+
+def _ends_joined(values: Array, axis: int) -> Array:
+    """Return values with those of the first function repeated for the last one."""
+    return np.concatenate([values, np.take(values, [0], axis=axis)], axis=axis)
+
+
+def _unfolded(space: TrialSpace, diagonal: Array) -> Array:
+    """Return a diagonal on the own free coefficients, those at both ends of periodic directions included."""
+    for axis in space.periodic:
+        diagonal = _ends_joined(diagonal, axis)
+    return diagonal
 
 
 def _diagonal(space: TrialSpace, slopes: list[Array], masses: list[Array], reaction: float) -> Array:
@@ -222,6 +245,10 @@ def _scaling(operator: Operator, diagonal: Array | float) -> Array:
     """
     found = operator.diagonal()
     operator.space.add(found)
+    for axis in operator.space.periodic:
+        both = np.moveaxis(found, axis, 0)
+        both[0] += both[-1]
+        both[-1] = both[0]
     wanted = found[operator.space.window]
     # A folded map has diagonal entries below zero; their size is all a scaling can use.
     return np.sqrt(np.abs(np.divide(diagonal, wanted, out=np.zeros(wanted.shape), where=wanted != 0.0)))

@@ -13,6 +13,7 @@ import argparse
 import gzip
 import io
 import json
+import logging
 import multiprocessing
 import os
 import re
@@ -55,7 +56,7 @@ from mesh_files import (
 from reader_files import Ply, beside, faces, grid, msh2, msh2_binary, msh41, msh41_binary, save, vertices
 
 from iga_nn.errors import InputError, input_errors, one_line
-from iga_nn.io import gismo, mfem
+from iga_nn.io import gismo, mfem_writer
 from iga_nn.io import splinepy as spline_files
 from iga_nn.io.formats import is_volume, load_volume
 from iga_nn.models import resolve
@@ -252,6 +253,7 @@ def check(path):
 
 def read_volume(path):
     """What every command does first with a volume; of one patch, `iga-nn check` does the rest."""
+    logging.getLogger("iga_nn.io").setLevel(logging.ERROR)  # notices are no errors
     body = load_volume(path)
     if isinstance(body, BSplineVolume):
         certified_facts(body)
@@ -405,7 +407,7 @@ def checkpoint_reader():
 def foreign_readers():
     """Files of other programs, of one patch and of several; JSON where the package that reads it is installed."""
     volumes = [bent(3, 1), bent(3, 2), glued(3, 2), exact_ring()]
-    formats = {"gismo": (".xml", gismo.write_gismo), "mfem": (".mesh", mfem.write_mfem)}
+    formats = {"gismo": (".xml", gismo.write_gismo), "mfem": (".mesh", mfem_writer.write_mfem)}
     if find_spec("splinepy") is not None:
         formats["json"] = (".json", spline_files.write_json)
     for kind, (suffix, write) in formats.items():

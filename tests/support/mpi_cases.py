@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from rational_shapes import quarter_ring
 from volumes import mapped
 
 from parameterize.spline.volume import FACE_NAMES
@@ -54,6 +55,7 @@ def cases():
         "estimated": (n4, Poisson(source="1+x"), {"degree": 2}),
         "linear": (n4, Poisson(exact=WAVE), {"degree": 1}),
         "elasticity": (n3, body, {}),
+        "rational": (quarter_ring(), Poisson(exact=WAVE), {"degree": 3, "refine": 2}),
         "sheared": (sheared, Poisson(exact=WAVE), {"refine": 1}),
         "held": (n4, held, {"tolerance": 1e-13}),
         "cut": (n4, cut, {"tolerance": 1e-13}),

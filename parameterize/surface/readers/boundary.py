@@ -67,7 +67,7 @@ def _outward_faces(vertices: Array, kind: str, cells: IntArray) -> dict[int, Int
 
 
 def _without_repeats(faces: dict[int, IntArray]) -> dict[int, IntArray]:
-    """Return the faces of collapsed cells without repeated corners, and without those that have fewer than three."""
+    """Return the faces of collapsed cells without repeated corners; faces of fewer than three corners are left out."""
     kept: dict[int, list[IntArray]] = {}
     for size, table in faces.items():
         whole = np.all(np.diff(np.sort(table, axis=1), axis=1) > 0, axis=1)
@@ -105,7 +105,7 @@ def _met_once(faces: IntArray) -> Mask:
 
 
 def _places(rows: IntArray, table: IntArray) -> IntArray:
-    """Return for each row (m, k) where the table (n, k) has its vertices, -1 where it does not."""
+    """Return for each row (m, k) the number of the row with its vertices in a table (n, k), -1 without one."""
     numbers = _groups(np.concatenate([table, rows]))
     place = np.full(len(numbers), -1)
     place[numbers[: len(table)]] = np.arange(len(table))
@@ -116,7 +116,7 @@ HALVES = np.array([[[0, 1, 2], [0, 2, 3]], [[1, 2, 3], [1, 3, 0]]])  # by either
 
 
 def _without_matched_quads(faces: dict[int, IntArray]) -> dict[int, IntArray]:
-    """Return faces without the quadrangles both of whose halves are faces, too, and without these halves."""
+    """Return faces without quadrangles whose two halves are faces, too, and without these halves."""
     if 3 not in faces or 4 not in faces:
         return faces
     triangles, quads = faces[3], faces[4]

@@ -1,4 +1,4 @@
-"""Cells of every format by kind: surface cells become polygons, solid cells their boundary, others are named.
+"""Cells of every format by kind: surface cells become polygons, solid cells their boundary, others none.
 
 Kinds are called as meshio calls them, their corners ordered as VTK orders them (The VTK User's Guide, "Cell types").
 """
@@ -38,7 +38,7 @@ def from_cells(
 
     Solid cells give their boundary, and the surface cells that are none of their faces are kept beside it. Points and
     lines are left out with a notice. groups: numbers of cells by name, counted through all of `cells`; a face of the
-    boundary is in those of a surface cell with its corners, where there are none in those of the solid cell behind it.
+    boundary has the groups of the surface cell with its corners; without one, the groups of the solid cell behind it.
     Raises MeshError for every other kind, and where solid cells overlap.
     """
     if vertices.ndim != 2 or vertices.shape[1] != 3:
@@ -66,18 +66,18 @@ def from_cells(
         notices = (*notices, f"left out cells without area: {said}")
     owner = np.concatenate(owners)
     if solids:
-        outer, inner, told = boundary_and_inner(vertices, solids, polygons)
+        outer, inner, about = boundary_and_inner(vertices, solids, polygons)
         solid_owner = np.concatenate(solid_owners)
         outer_owner = _owners(outer, (polygons, owner), (solids, solid_owner), groups) if groups else NONE
         owner = np.concatenate([outer_owner, owner[inner]])
-        polygons, notices = outer + [polygons[i] for i in inner], (*notices, *told)
+        polygons, notices = outer + [polygons[i] for i in inner], (*notices, *about)
     if not polygons:
         raise MeshError("has no faces and no solid cells: export the volume or its surface")
     return Content(vertices, polygons, notices, renumbered(groups, owner) if groups else {})
 
 
 def _polygons(kind: str, rows: Rows, vertices: Array) -> list[list[int]]:
-    """Return the polygons of surface cells; raise MeshError for cells that are none."""
+    """Return the polygons of surface cells; raise MeshError for cells of other kinds."""
     if kind in CORNERS:
         return _as_table(kind, rows, vertices)[1].tolist()
     if kind not in SURFACES:

@@ -81,7 +81,7 @@ def number_array(words: Sequence[str], what: str, *, whole: bool = False) -> NDA
 
 @contextmanager
 def library(suffix: str) -> Iterator[None]:
-    """Raise MeshError for whatever a library's parser raises in the block, which neither prints nor logs."""
+    """Raise MeshError for any error of a library's parser in the block, whose output and logs are silenced."""
     logger = logging.getLogger("trimesh")
     before, logger.disabled = logger.disabled, True
     try:

@@ -58,7 +58,7 @@ def read_gmsh(data: bytes, _: int) -> Content:
 
 
 def _opened(sections: dict[bytes, bytes], form: re.Match[bytes], name: bytes) -> Source:
-    """Return the numbers of a section; a binary file says by a number 1 in which order its bytes stand."""
+    """Return the numbers of a section; in a binary file the number 1 shows the order of bytes."""
     what = f"${name.decode()} of the .msh"
     if form[2] == b"0":
         return Text(sections[name], what)
@@ -69,7 +69,7 @@ def _opened(sections: dict[bytes, bytes], form: re.Match[bytes], name: bytes) ->
 
 
 def _sections(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Yield name and content of each section, from the line $Name to $EndName; one that is cut off ends the file."""
+    """Yield name and content of each section, from $Name to $EndName; a section that is cut off ends the file."""
     at = 0
     while begin := BEGIN.search(data, at):
         stop = data.find(b"$End" + begin[1], begin.end())
@@ -175,7 +175,7 @@ def _elements_4(source: Source) -> Iterator[Block]:
 def _nodes_41(source: Source) -> Found:
     """Read the counts, then blocks `dimension entity parametric count`, their node numbers, their places.
 
-    The place of a parametric node is followed by as many parameters as its entity has dimensions.
+    Behind the place of a parametric node stand its parameters, one for each dimension of its entity.
     """
     found = [(np.empty(0, dtype=np.int64), np.empty((0, 3)))]
     for _ in range(source.large(4)[0]):

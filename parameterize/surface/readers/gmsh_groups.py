@@ -1,6 +1,6 @@
 """Physical groups of Gmsh: of surfaces, and of volumes for faces without a group of a surface.
 
-Elements of version 2 name their physical group, those of version 4 the entity of the geometry they are on, which may be
+Elements of version 2 name their physical group, elements of version 4 an entity of the geometry, which may be
 in several.
 """
 
@@ -42,7 +42,7 @@ def physical_of_entities(source: Source, version: str) -> Physical:
 
 
 def _listed(source: Source) -> list[int]:
-    """Read a count, then as many numbers."""
+    """Read a count and so many numbers."""
     count = source.large(1)[0]
     if count < 0:
         raise MeshError(f"an entity with {count} groups or neighbours in the .msh; {DAMAGED}")

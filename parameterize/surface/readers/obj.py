@@ -86,7 +86,7 @@ def _out_of_range(number: int, line: int, present: int) -> MeshError:
 
 
 def _records(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
-    """Yield number and words of each line; a record of numbers that ends in a backslash goes on in the next line."""
+    """Yield number and words of each line; a record of numbers that ends in a backslash continues in the next line."""
     numbered = enumerate(lines, 1)
     for number, line in numbered:
         words = _words(line)

@@ -38,7 +38,7 @@ def read_object(mesh: Any, kind: str, max_faces: int) -> RawMesh:
 
 
 def _read_trimesh(mesh: Any) -> Content:
-    """Return the triangles; whole numbers of the faces, also those among the metadata, are groups."""
+    """Return the triangles; whole numbers of the faces, also in the metadata, are groups."""
     faces = np.asarray(mesh.faces)
     held = {name: values for name, values in mesh.metadata.items() if isinstance(values, np.ndarray)}
     groups = by_value(_named({**held, **mesh.face_attributes}), len(faces))

@@ -2,7 +2,7 @@
 
 Geomview's manual ("OFF files") has a stream of words, in which a line's end matters only after a face: the rest of its
 line is a colour. Other programs write one vertex or face a line, with colours that the header does not announce, or
-let no line's end matter. A file is read in the first of these ways in which it comes out even.
+let no line's end matter. A file is read in each of these ways until one fits its number of words.
 """
 
 import re
@@ -19,7 +19,7 @@ HEADER = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF")
 
 @dataclass
 class Words:
-    """The words of a text, of which those from `at` on are still to be read; lines[k] is the line of word k."""
+    """The words of a text, read up to number `at`; lines[k] is the line of word k."""
 
     words: list[str]
     lines: list[int]

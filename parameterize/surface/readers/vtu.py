@@ -65,7 +65,7 @@ def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
 
 
 def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tuple[str, Rows]], Marks]:
-    """Return a piece's points (n, 3), its cells by kind and their numbers; nothing for a piece without cells."""
+    """Return a piece's points (n, 3), its cells by kind and their numbers; empty arrays for a piece without cells."""
     n, m = (header_count(piece.get(name, "")) for name in ("NumberOfPoints", "NumberOfCells"))
     if not m:
         return np.empty((0, 3)), [], {}
@@ -79,7 +79,7 @@ def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tu
     if sizes.min() < 0:
         raise MeshError(f"the offsets of the .vtu's cells decrease; {DAMAGED}")
     corners = decoder.numbers(_array(piece, "Cells", "connectivity"), int(ends[-1])).astype(np.int64)
-    order = np.argsort(types, kind="stable")  # in which they are returned
+    order = np.argsort(types, kind="stable")  # cells are returned kind by kind
     marks = {name: decoder.numbers(array, m)[order] for name, array in _marks(piece).items()}
     return places, _by_kind(types, sizes, ends, corners), marks
 

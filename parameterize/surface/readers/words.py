@@ -26,7 +26,7 @@ class Text:
 
     @property
     def left(self) -> int:
-        """Return how many words are left."""
+        """Return the number of words that are left."""
         return len(self._words) - self._at
 
     def whole(self, count: int) -> list[int]:

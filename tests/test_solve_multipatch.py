@@ -1,0 +1,169 @@
+"""Several patches are solved as one body: rates, iterations, data on faces, regions and patches, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cube_grids import box, frame, held_at, plate, ring, two
+
+import iga_nn
+from parameterize.conjugate_gradients import conjugate_gradients
+
+WAVE = "exp(X+Z)*sin(Y)"
+BODIES = {"two": two, "plate": plate, "frame": frame, "ring": ring}
+
+
+def last_rate(body, problem, levels=(0, 1)):
+    return iga_nn.convergence(body, problem, refine=levels)[-1].rate_l2
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4])
+@pytest.mark.parametrize("name", ["two", "plate", "ring"])
+def test_rates_with_dirichlet_data(name, degree):
+    spans, levels = (8, (0, 1)) if name == "ring" else (2, (1, 2))
+    assert last_rate(BODIES[name](spans, degree), iga_nn.Poisson(exact=WAVE), levels) > degree + 0.8
+
+
+@pytest.mark.parametrize("name", ["plate", "ring"])
+def test_rates_with_natural_data_and_one_face_held(name):
+    body = BODIES[name](8 if name == "ring" else 2, 2)
+    law = iga_nn.Poisson(exact=WAVE, kappa="1+x*x", neumann=held_at(body, "p0_v0"))
+    assert last_rate(body, law) > 2.7
+
+
+def test_rates_of_a_frame_of_genus_five():
+    assert last_rate(frame(2, 2), iga_nn.Poisson(exact=WAVE)) > 2.9
+
+
+def test_rates_of_elasticity():
+    body = plate(2, 2)
+    law = iga_nn.Elasticity(exact=("x*y*z*z", "sin(y)", "x*z"), traction=held_at(body, "p0_v0"))
+    assert last_rate(body, law, (1, 2)) > 2.8
+
+
+def test_rates_of_a_law_that_is_not_symmetric():
+    class Wind(iga_nn.Form):
+        symmetric = False
+
+        def flux(self, u, grad, x):
+            return 0.5 * grad
+
+        def react(self, u, grad, x):
+            return grad[:, 0] + 2.0 * grad[:, 1]
+
+    assert last_rate(plate(2, 2), iga_nn.Problem(Wind(), exact="sin(x)*y+z*z*z")) > 2.7
+
+
+def iterations(body, problem):
+    """To 1e-10 from a right-hand side without a pattern."""
+    system = iga_nn.discretize(body, problem, threads=1)
+    right = np.random.default_rng(0).uniform(-1.0, 1.0, system.right.shape)
+    found = conjugate_gradients(system.product, right, system.precondition, 1e-10, 200)
+    assert found.converged
+    return found.iterations
+
+
+@pytest.mark.parametrize(("name", "spans"), [("plate", 8), ("frame", 6)])
+def test_iterations_of_patches_in_a_grid(name, spans):
+    body = BODIES[name](spans)
+    assert iterations(body, iga_nn.Poisson(exact=WAVE)) <= 30
+    assert iterations(body, iga_nn.Poisson(exact=WAVE, neumann=held_at(body, "p0_u0"))) <= 60
+
+
+def test_a_ring_takes_few_more_iterations_than_the_cube_that_is_glued():
+    body = ring(16)
+    assert iterations(body, iga_nn.Poisson(exact=WAVE)) <= 1.25 * iterations(
+        body.patches[0], iga_nn.Poisson(exact=WAVE)
+    )
+
+
+def test_an_angle_is_no_solution_on_a_ring():
+    """A function with a jump where the ring is glued: its error stays."""
+    law = iga_nn.Poisson(exact=lambda x, y, z: np.arctan2(y, x), source="0", neumann={"v0": "0", "v1": "0"})
+    errors = [iga_nn.solve(ring(8), law, refine=level).report.l2_relative for level in (1, 2)]
+    assert min(errors) > 0.2 and errors[1] > 0.9 * errors[0]
+
+
+def test_natural_data_alone_leave_the_constant_to_the_mean():
+    body = ring(8, patches=4)
+    law = iga_nn.Poisson(exact="x+2*y+z", neumann=held_at(body, ""))
+    report = iga_nn.solve(body, law).report
+    assert report.converged and report.l2_relative < 2e-3
+    with pytest.raises(ValueError, match="incompatible Neumann data"):
+        iga_nn.solve(body, iga_nn.Poisson(source="1", neumann={f"{a}{i}": "0" for a in "uvw" for i in (0, 1)}))
+
+
+def test_a_rod_of_two_materials():
+    """The heat that flows through 1 / 1 + 1 / 4 is 0.8; the bar stretches by 1 + 1 / 2."""
+    body = two()
+    heat = iga_nn.solve(body, iga_nn.Poisson(kappa={0: 1.0, 1: 4.0}, value={"p0_u0": "0", "p1_u1": "1"}))
+    assert heat.probe([[1.0, 0.5, 0.5], [0.5, 0.2, 0.3], [3.0, 0.0, 0.0]]) == pytest.approx(
+        [0.8, 0.4, np.nan], nan_ok=True
+    )
+    assert heat.report.balance.reactions["value 'p0_u0'"] == pytest.approx((-0.8,))
+    assert heat.extremes("u").largest == pytest.approx(1.0)
+    law = iga_nn.Elasticity(young={0: 1.0, 1: 2.0}, poisson_ratio=0.0, fix="p0_u0", load={"p1_u1": (1, 0, 0)})
+    bar = iga_nn.solve(body, law)
+    assert bar.probe([[2.0, 0.5, 0.5]])[0] == pytest.approx([1.5, 0.0, 0.0], abs=1e-8)
+    assert bar.report.balance.load == pytest.approx((1.0, 0.0, 0.0), abs=1e-9)
+    assert bar.report.balance.imbalance < 1e-8
+
+
+def test_regions_cross_patches():
+    """A weak value and a load on regions that lie on several patches: the bar stretches by its length."""
+    body = plate(2, 2)
+    law = iga_nn.Elasticity(
+        young=1.0, poisson_ratio=0.0, fix="x < 0.001 and nx < -0.5", load={"nx > 0.5 and x > 2.5": (1, 0, 0)}
+    )
+    solution = iga_nn.solve(body, law)
+    assert solution.report.balance.load == pytest.approx((3.0, 0.0, 0.0), abs=1e-8)
+    (reaction,) = solution.report.balance.reactions.values()
+    assert reaction == pytest.approx((-3.0, 0.0, 0.0), abs=1e-6)
+
+
+def test_a_field_on_several_patches_is_a_datum():
+    body = two()
+    given = iga_nn.solve(body, iga_nn.Poisson(exact="x*y"))
+    found = iga_nn.solve(body, iga_nn.Poisson(source=given.field, boundary="0"))
+    expected = iga_nn.solve(body, iga_nn.Poisson(source="x*y", boundary="0"))
+    assert found.probe([[1.2, 0.5, 0.5]]) == pytest.approx(expected.probe([[1.2, 0.5, 0.5]]), rel=1e-5)
+    with pytest.raises(ValueError, match="found on another volume"):
+        iga_nn.solve(plate(2), iga_nn.Poisson(source=given.field, boundary="0"))
+
+
+def test_modes_of_a_ring_that_is_cut():
+    """The drum's frequencies do not depend on where the ring is cut."""
+    whole, cut = (iga_nn.modes(ring(8, patches=n), iga_nn.Poisson(source="0"), n=2) for n in (1, 4))
+    assert cut.frequencies == pytest.approx(whole.frequencies, rel=1e-3)
+    assert np.isfinite(cut.shapes[0].probe([[1.5, 0.0, 0.5]])).all()
+
+
+def test_one_patch_of_several_is_the_volume():
+    one = iga_nn.solve(iga_nn.MultiPatch((box((0, 0, 0)),)), iga_nn.Poisson(exact=WAVE))
+    alone = iga_nn.solve(box((0, 0, 0)), iga_nn.Poisson(exact=WAVE))
+    assert np.array_equal(one.patches[0].coefficients, alone.coefficients)
+    assert one.report.l2 == alone.report.l2
+
+
+@pytest.mark.parametrize(
+    ("law", "says"),
+    [
+        (lambda: iga_nn.Poisson(neumann={"p0_u1": None}), "p0_u1 is no outer face of the body"),
+        (lambda: iga_nn.Poisson(source="1", value={"p7_u1": "0"}), "p7_u1 is no outer face"),
+        (lambda: iga_nn.Poisson(source="1", boundary="0", kappa={0: 1.0}), "kappa has no entry for patch 1"),
+        (lambda: iga_nn.Elasticity(force=(0, 0, 1), young={1: 1.0}), "young has no entry for patch 0"),
+    ],
+)
+def test_data_that_do_not_fit_the_patches_are_refused(law, says):
+    with pytest.raises(ValueError, match=says):
+        iga_nn.solve(two(), law())
+
+
+def test_options_that_take_one_patch_say_so():
+    law = iga_nn.Poisson(source="1", boundary="0")
+    with pytest.raises(ValueError, match="several patches are solved on device='cpu', and without a start"):
+        iga_nn.solve(two(), law, start=iga_nn.solve(box((0, 0, 0)), law))
+    with pytest.raises(TypeError, match="volume must be a BSplineVolume"):
+        iga_nn.march(two(), law, "0", dt=0.1, steps=1)
+    with pytest.raises(ValueError, match="kappa is given by patch"):
+        iga_nn.solve(box((0, 0, 0)), iga_nn.Poisson(source="1", boundary="0", kappa={0: 1.0, 1: 2.0}))

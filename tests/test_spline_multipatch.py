@@ -1,0 +1,125 @@
+"""Patches are glued where their faces have the same trace, in every orientation, and nowhere else."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from cube_grids import box, frame, plate, ring, two
+
+import iga_nn
+from iga_nn import BSplineVolume, Interface, MultiPatch
+from parameterize.spline.bspline import greville
+from parameterize.spline.interface import face_layer
+from parameterize.spline.multipatch import shared_numbers
+
+
+def turned(volume, axes, flips):
+    """The same body under other parameters: directions exchanged and reversed."""
+    points, knots = volume.control_points.transpose(*axes, 3), [volume.knots[a] for a in axes]
+    points = points[tuple(slice(None, None, -1 if flip else 1) for flip in flips)]
+    knots = [1.0 - row[::-1] if flip else row for row, flip in zip(knots, flips, strict=True)]
+    return BSplineVolume(tuple(volume.degrees[a] for a in axes), tuple(knots), points)
+
+
+def uneven(corner):
+    """A cube with other degrees and knots in each direction."""
+    knots = (
+        np.array([0.0, 0, 0, 0.3, 1, 1, 1]),
+        np.array([0.0, 0, 0, 0, 0.2, 0.7, 1, 1, 1, 1]),
+        np.array([0.0, 0, 0.6, 1, 1]),
+    )
+    degrees = (2, 3, 1)
+    rows = [greville(row, degree) for row, degree in zip(knots, degrees, strict=True)]
+    return BSplineVolume(degrees, knots, np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1) + corner)
+
+
+@pytest.mark.parametrize("axes", list(permutations(range(3))))
+@pytest.mark.parametrize("flips", list(product((False, True), repeat=3)))
+def test_a_neighbour_is_found_however_its_parameters_run(axes, flips):
+    first, second = uneven((0, 0, 0)), turned(uneven((0, 1, 0)), axes, flips)
+    body = MultiPatch.from_patches([first, second])
+    (interface,) = body.interfaces
+    assert interface.first == (0, "v1")
+    nets = [face_layer(body.patches[p].control_points, face) for p, face in (interface.first, interface.second)]
+    assert np.array_equal(nets[0], interface.turned(nets[1]))
+    assert sum(map(len, body.outer)) == 10
+
+
+@pytest.mark.parametrize(
+    ("body", "interfaces"), [(two(), 1), (plate(), 8), (frame(), 24), (ring(), 1), (ring(patches=4), 4)]
+)
+def test_bodies_have_their_interfaces(body, interfaces):
+    assert len(body.interfaces) == interfaces
+    assert sum(map(len, body.outer)) == 6 * len(body) - 2 * interfaces
+
+
+def test_a_ring_is_glued_to_itself():
+    (interface,) = ring().interfaces
+    assert (interface.first, interface.second) == ((0, "u0"), (0, "u1"))
+    assert str(interface) == "p0_u0 = p0_u1"
+
+
+def test_shared_coefficients_have_one_number():
+    body = plate(1, 1)  # eight cubes of eight control points around a hole: 32 points in all
+    numbers, count = shared_numbers([patch.shape for patch in body], body.interfaces)
+    points = np.full((count, 3), np.nan)
+    for own, patch in zip(numbers, body, strict=True):
+        points[own] = patch.control_points
+    assert count == 32 and len(np.unique(points, axis=0)) == 32
+
+
+def test_nearly_equal_control_points_become_one():
+    left, right = box((0, 0, 0)), box((1, 0, 0))
+    moved = BSplineVolume(right.degrees, right.knots, right.control_points + 1e-9)
+    body = MultiPatch.from_patches([left, moved])
+    assert np.array_equal(body.patches[0].control_points[-1], body.patches[1].control_points[0])
+    assert MultiPatch.from_patches([left, moved], tolerance=1e-12).interfaces == ()
+
+
+def test_faces_over_the_same_corners_with_other_shapes_are_not_glued():
+    lens = BSplineVolume.from_function(lambda u, v, w: (u + 0.2 * (1 - u) * v * (1 - v), v, w), 5)
+    assert MultiPatch.from_patches([box((-1, 0, 0)), lens]).interfaces == ()
+
+
+def test_a_face_that_has_shrunk_to_an_edge_is_not_glued():
+    """Two wedges around a common edge: the faces that have become the edge are not an interface."""
+    wedges = [
+        BSplineVolume.from_function(lambda u, v, w, s=s: (s * u, u * (2 * v - 1) / 2, w), 3, degree=1)
+        for s in (1.0, -1.0)
+    ]
+    assert MultiPatch.from_patches(wedges).interfaces == ()
+
+
+@pytest.mark.parametrize(
+    ("patches", "says"),
+    [
+        (lambda: [], "one patch or more"),
+        (lambda: [box((0, 0, 0)), box((1, 0, 0)).refined()], "p0_u1 and p1_u0 are the same surface"),
+        (lambda: [box((0, 0, 0)), box((1, 0, 0)), box((1, 0, 0))], "are one surface: at most two"),
+    ],
+)
+def test_what_does_not_match_is_named(patches, says):
+    with pytest.raises(ValueError, match=says):
+        MultiPatch.from_patches(patches())
+
+
+@pytest.mark.parametrize(
+    ("interfaces", "says"),
+    [
+        ([Interface((0, "u1"), (1, "u1"))], "p0_u1 = p1_u1: the control points"),
+        ([Interface((0, "u1"), (1, "u0"), flipped=(True, False))], "the control points of the two faces differ"),
+        ([Interface((0, "u1"), (2, "u0"))], "no such face"),
+        ([Interface((0, "u1"), (1, "u7"))], "no such face"),
+        ([Interface((0, "u1"), (1, "u0"))] * 2, "p0_u1 is glued twice"),
+    ],
+)
+def test_interfaces_without_equal_traces_are_refused(interfaces, says):
+    with pytest.raises(ValueError, match=says):
+        MultiPatch((box((0, 0, 0)), box((1, 0, 0))), tuple(interfaces))
+
+
+def test_other_objects_are_refused():
+    with pytest.raises(TypeError, match="must be a BSplineVolume"):
+        iga_nn.MultiPatch.from_patches([box((0, 0, 0)), "volume.npz"])
