@@ -9,6 +9,7 @@ from volumes import mapped
 
 import iga_nn
 from iga_nn.cli.commands import main
+from iga_nn.figures import render as rendering
 from iga_nn.options import texts
 from iga_nn.report.patches import euler_number
 from solve.field import MultiPatchField
@@ -52,6 +53,31 @@ def test_a_patch_that_is_folded_back_is_not_certified(in_folder, capsys):
     assert "folded back      at p0_u1 = p1_u0" in said and "one sign of det J folded; one-to-one: no" in said
     page = (in_folder / "back" / "report.html").read_text()
     assert "Two patches lie on the same side of p0_u1 = p1_u0" in page
+
+
+def test_a_body_with_a_part_inside_another_overlaps(in_folder, capsys):
+    inside = mapped(lambda u, v, w: (0.3 + 0.1 * u, 0.3 + 0.1 * v, 0.3 + 0.1 * w), (3, 3, 3), (2, 2, 2))
+    iga_nn.MultiPatch.from_patches([*rod().patches, inside]).save("both.npz")
+    assert main(["solve", "poisson", "both.npz", "--refine", "0", "--out", "both"]) == 3
+    said = capsys.readouterr().out
+    assert "overlaps         parts of the body" in said and "det J > 0 certified; one-to-one: no" in said
+    facts = report_of(in_folder / "both")["parameterization"]
+    assert facts["overlap"] and facts["euler_number"] == 4
+    assert "Parts of the body overlap." in (in_folder / "both" / "report.html").read_text()
+
+
+@pytest.mark.pictures
+def test_figures_and_page_of_a_body(in_folder):
+    if not rendering.can_draw():
+        pytest.skip(f"VTK cannot draw on this machine; remedy: {rendering.REMEDY}")
+    ell().save("ell.npz")
+    given = ["ell.npz", "--exact=x*y", "--neumann", "p1_u1", "--refine", "0", "--out", "out"]
+    assert main(["solve", "poisson", *given]) == 0
+    assert "not_drawn" not in report_of(in_folder / "out")
+    for name in ("solution", "error", "named_faces"):
+        assert (in_folder / "out" / f"{name}.png").stat().st_size > 5000
+    page = (in_folder / "out" / "report.html").read_text()
+    assert "2 interfaces, 14 outer faces" in page and "flux κ ∂u/∂n on p1_u1" in page
 
 
 @pytest.mark.parametrize(("body", "number"), [(ell(), 2), (ring(3), 0), (ring(1), 0), (rod(), 2)])

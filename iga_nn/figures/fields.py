@@ -26,6 +26,7 @@ from .style import ColorRange, error_range, even_range
 SAMPLES = 121  # per direction of a face or mid-section
 LATTICE = 41  # per direction of the cube
 OF_SEVERAL = 81, 21  # the same of each of several patches
+MANY, OF_MANY = 8, (41, 11)  # patches, and the same of each of more: figures and pages keep their seconds and size
 KEPT = 2  # results of one function
 
 STRESS = "von Mises"  # the name of the field that a body is drawn in
@@ -63,7 +64,7 @@ Result = TypeVar("Result")
 
 def sampled(found_on: Sequence[Callable[[Grid], Array]]) -> Samples:
     """Return the samples of a function on each patch, which takes a tensor grid and gives (n_u, n_v, n_w, ...)."""
-    samples, lattice = (SAMPLES, LATTICE) if len(found_on) == 1 else OF_SEVERAL
+    samples, lattice = (SAMPLES, LATTICE) if len(found_on) == 1 else OF_SEVERAL if len(found_on) <= MANY else OF_MANY
     even, grids = np.linspace(0.0, 1.0, lattice), all_grids(samples)
     return Samples(
         [flat(found_at(grid)) for found_at in found_on for grid in grids],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -92,11 +93,11 @@ class PoissonOptions(ProblemOptions):
     Attributes:
         exact: exact solution, a formula, from which f and g follow; errors are reported. It is exp(X+Z)*sin(Y) where
             neither f nor g is given. A formula that starts with a minus is written --exact=-x.
-        source: f, a formula.
+        source: f, a formula; of several patches also one for each, as kappa.
         boundary: g, the values of u, a formula.
         kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz; of several patches
             also an entry for each: "p0: 1, p1: 2+x".
-        reaction: c, a formula.
+        reaction: c, a formula; of several patches also one for each, as kappa.
         neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for the flux of the exact solution.
         robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
             solution.
@@ -140,10 +141,10 @@ class PoissonOptions(ProblemOptions):
         with input_errors():
             return Poisson(
                 exact=self.exact,
-                source=self.source,
+                source=_by_patch("--source", self.source, str),
                 boundary=self.boundary,
-                kappa=None if self.kappa is None else texts.by_patch("--kappa", self.kappa, _entries),
-                reaction=self.reaction,
+                kappa=_by_patch("--kappa", self.kappa, _entries),
+                reaction=_by_patch("--reaction", self.reaction, str),
                 neumann=texts.faces("neumann", self.neumann),
                 robin=robin,
                 value=texts.on_regions("value", self.value, str),
@@ -154,6 +155,10 @@ class PoissonOptions(ProblemOptions):
 
 def _entries(text: str) -> list[str]:
     return text.split(",")
+
+
+def _by_patch(flag: str, text: str | None, read: Callable[[str], Any]) -> Any:
+    return None if text is None else texts.by_patch(flag, text, read)
 
 
 @dataclass(frozen=True)

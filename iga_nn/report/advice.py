@@ -77,6 +77,8 @@ def in_words(report: Report) -> list[str]:
         places = ", ".join(map(in_brackets, found["places"]))
         flat = f"; det J is zero, up to rounding, at {in_brackets(found['flat'])}" if "flat" in found else ""
         lines.append(f"not proved       on {found['spans']} spans, near {places}{flat}")
+    if quality.get("overlap"):
+        lines.append("overlaps         parts of the body lie in each other")
     lines += [f"folded back      at {interface}" for interface in quality.get("misglued", ())]
     if meeting := quality.get("boundary_meeting"):
         lines.append(f"meets itself     at {in_brackets(meeting['point'])}")

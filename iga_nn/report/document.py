@@ -173,7 +173,9 @@ def verdict(report: Report, folder: Path) -> Report:
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
     if distance := surface_distance(report):
         short["surface_distance"] = distance
-    defects = {name: quality[name] for name in ("unproved", "boundary_meeting", "misglued") if quality.get(name)}
+    defects = {
+        name: quality[name] for name in ("unproved", "boundary_meeting", "misglued", "overlap") if quality.get(name)
+    }
     short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
     if refinement := quality.get("refinement"):
         short["refinement"] = refinement

@@ -30,6 +30,7 @@ from ..figures import evaluate
 from ..figures.cutaway import cut_of, patches_of, seen_quarters
 from ..figures.evaluate import Body, Solved, fields_on, outer_faces
 from ..figures.fields import (
+    MANY,
     STRESS,
     Field,
     Samples,
@@ -52,7 +53,6 @@ Scene = dict[str, Any]
 LENGTH = 3  # in place of a component: the length of the vector
 COMPONENTS = {"|u|": LENGTH, "u_x": 0, "u_y": 1, "u_z": 2}  # fields that the page finds from the vectors
 PLANES = [(axis, side) for axis in range(3) for side in (0.0, 1.0)] + [(axis, 0.5) for axis in range(3)]
-MANY = 8  # patches: those of more have half as many points a direction, for the size of the page
 EVEN = 0.01  # of a field's range: where half of the boundary varies less, the view opens on the inside
 
 
@@ -189,7 +189,7 @@ class Drawn:
 def _scene(body: Body, frames: Sequence[Frame], coarser: int) -> Scene:
     """Return a scene of frames with the same fields; the distortion of the body joins the first frame's fields."""
     points, patches = points_of(body), as_multipatch(body).patches
-    drawn = Drawn(outer_faces(body), coarser if len(patches) <= MANY else 2)
+    drawn = Drawn(outer_faces(body), coarser if len(patches) <= MANY else 1)  # many have few samples already
     cloud = np.concatenate([where.reshape(-1, 3) for where in points.everywhere])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
     images = patches_of(body, points.patches)
