@@ -19,6 +19,7 @@ from ..version import __version__
 from .artifacts import REPORT, SOLVED
 
 SCHEMA = 1
+DEFECTS = ("unproved", "boundary_meeting", "misglued", "overlap")  # of the section `parameterization`
 
 Report = dict[str, Any]
 
@@ -173,9 +174,7 @@ def verdict(report: Report, folder: Path) -> Report:
         short["boundary_rms"] = {scale: values["rms"] for scale, values in quality["boundary"].items()}
     if distance := surface_distance(report):
         short["surface_distance"] = distance
-    defects = {
-        name: quality[name] for name in ("unproved", "boundary_meeting", "misglued", "overlap") if quality.get(name)
-    }
+    defects = {name: quality[name] for name in DEFECTS if quality.get(name)}
     short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
     if refinement := quality.get("refinement"):
         short["refinement"] = refinement
