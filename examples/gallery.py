@@ -46,6 +46,8 @@ def runs(full: bool) -> dict[str, Callable[[], Path]]:
         "export_files": lambda: module("export_files").main(),
         "elasticity": lambda: module("elasticity").main(),
         "rational_ring": lambda: module("rational_ring").main(),
+        "l_shape": lambda: module("l_shape").main(),
+        "plate_with_hole": lambda: module("plate_with_hole").main(),
         "bracket": lambda: module("bracket").main(),
         "batch": lambda: module("batch").main(mapping=mapping),
         **equations,

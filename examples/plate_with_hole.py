@@ -13,6 +13,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from common import draw
 
 import iga_nn
 
@@ -44,8 +45,8 @@ def displacement(x: np.ndarray, y: np.ndarray, along: int) -> np.ndarray:
     return (far + near - 2.0 / radius**3 * wave(3.0 * angle)) * (1.0 + RATIO) / 4.0  # 1 / (8 mu), Young's modulus 1
 
 
-def main(out: str | Path = "out/plate_with_hole") -> iga_nn.MultiPatch:
-    """Print the stress at the hole beside Kirsch's; returns the plate."""
+def main(out: str | Path = "out/plate_with_hole") -> Path:
+    """Print the stress at the hole beside Kirsch's; returns the picture of the displacement."""
     plate = iga_nn.MultiPatch.from_patches([sector(number) for number in range(PARTS)])
     pulled = [lambda x, y, z: displacement(x, y, 0), lambda x, y, z: displacement(x, y, 1), "0"]
     law = iga_nn.Elasticity(poisson_ratio=RATIO, fix={"u1": pulled}, symmetry="w0 or w1")
@@ -54,7 +55,7 @@ def main(out: str | Path = "out/plate_with_hole") -> iga_nn.MultiPatch:
     top = solution.patches[2].quantity("stress", [[0.0, 0.0, 0.5]])[0]  # at (0, 1)
     side = solution.patches[0].quantity("stress", [[0.0, 0.0, 0.5]])[0]  # at (1, 0)
     print(f"stress along the hole: {top[0, 0]:.3f} at its top (Kirsch: 3), {side[1, 1]:.3f} at its side (-1)")
-    return plate
+    return draw(out, plate, solution, "displacement of a pulled plate", exaggerate=0.1)
 
 
 if __name__ == "__main__":

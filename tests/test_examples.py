@@ -118,6 +118,18 @@ def test_rational_ring_is_lames(tmp_path, capsys):
     assert stress == pytest.approx(lame, rel=1e-3)
 
 
+def test_an_edge_that_points_inward_limits_the_rate(tmp_path, capsys):
+    assert shown(load("l_shape").main(out=tmp_path))
+    rates = [float(rate) for rate in re.findall(r"L2 rate ([\d.]+)", capsys.readouterr().out)]
+    assert rates[1] == pytest.approx(4.0 / 3.0, abs=0.15) and rates[3] > 3.8
+
+
+def test_a_plate_with_a_hole_has_three_times_the_stress(tmp_path, capsys):
+    assert shown(load("plate_with_hole").main(out=tmp_path))
+    top, side = re.findall(r"(-?[\d.]+) at its", capsys.readouterr().out)
+    assert float(top) == pytest.approx(3.0, rel=5e-3) and float(side) == pytest.approx(-1.0, rel=5e-3)
+
+
 def test_own_law_has_the_rates_of_its_degree_on_any_volume(tmp_path, capsys):
     benchmark_volume(2).save(tmp_path / "volume.npz")
     assert shown(load("own_law").main(tmp_path / "volume.npz", tmp_path))

@@ -38,15 +38,13 @@ class GluedPreconditioner:
 
     def __call__(self, residual: Array) -> Array:
         """Return the preconditioned residual (m,)."""
-        weighted = (residual / self.unknowns.copies)[None]
-        parts = []
-        for block, full in zip(self.blocks, self.unknowns.spread(weighted), strict=True):
-            found = np.zeros_like(full)
+        shares = self.unknowns.spread((residual / self.unknowns.copies)[None])
+        parts = self.coarse(shares)
+        for block, share, part in zip(self.blocks, shares, parts, strict=True):
             if block is not None:
                 window = block.space.window
-                found[:, *window] = block(np.ascontiguousarray(full[:, *window]))
-            parts.append(found)
-        result = self.unknowns.collect(parts)[0] / self.unknowns.copies + self.coarse(residual)
+                part[:, *window] += block(np.ascontiguousarray(share[:, *window]))
+        result = self.unknowns.collect(parts)[0] / self.unknowns.copies
         return result - result.mean() if self.singular else result
 
     @property
@@ -63,7 +61,6 @@ class Coarse:
     of Galerkin's matrix. vertices: for each patch the places (2, 2, 2) of its vertices, v where they are fixed.
     """
 
-    unknowns: Glued
     hats: Sequence[tuple[Array, Array, Array]]
     vertices: Sequence[IntArray]
     inverse: Array
@@ -87,22 +84,24 @@ class Coarse:
             np.add.at(matrix, np.ix_(flat, flat), _galerkin(operator))  # a patch glued to itself has a vertex twice
         hats = [_hats(operator.space) for operator in operators]
         inverse = np.linalg.pinv(matrix[:-1, :-1], rcond=RANK, hermitian=True)
-        return cls(unknowns, hats, vertices, np.asarray(inverse, dtype=np.float64))
+        return cls(hats, vertices, np.asarray(inverse, dtype=np.float64))
 
-    def __call__(self, residual: Array) -> Array:
-        """Return V (V^T A V)^+ V^T r of a residual r (m,)."""
+    def __call__(self, shares: Sequence[Array]) -> list[Array]:
+        """Return V (V^T A V)^+ V^T r as coefficients (1, n_u, n_v, n_w) of each patch.
+
+        shares: r, divided among the patches.
+        """
         if not len(self.inverse):
-            return np.zeros_like(residual)
-        coarse = np.zeros(len(self.inverse) + 1)
-        shares = self.unknowns.spread((residual / self.unknowns.copies)[None])
+            return [np.zeros_like(share) for share in shares]
+        right = np.zeros(len(self.inverse) + 1)
         for (u, v, w), places, share in zip(self.hats, self.vertices, shares, strict=True):
-            np.add.at(coarse, places, np.einsum("ijk,ia,jb,kc->abc", share[0], u, v, w, optimize=True))
-        values = np.append(self.inverse @ coarse[:-1], 0.0)
-        parts = [
-            np.einsum("abc,ia,jb,kc->ijk", values[places], u, v, w, optimize=True)[None]
+            along_u = (u.T @ share.reshape(len(u), -1)).reshape(2, len(v), len(w))
+            np.add.at(right, places, v.T @ along_u @ w)
+        values = np.append(self.inverse @ right[:-1], 0.0)
+        return [
+            (u @ (v @ values[places] @ w.T).reshape(2, -1)).reshape(1, len(u), len(v), len(w))
             for (u, v, w), places in zip(self.hats, self.vertices, strict=True)
         ]
-        return self.unknowns.collect(parts)[0] / self.unknowns.copies
 
 
 def _hats(space: TrialSpace) -> tuple[Array, Array, Array]:
