@@ -15,7 +15,7 @@ from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES
 
-from .evaluate import Body
+from .evaluate import PER_PATCH, Body
 from .fields import Samples
 from .palette import face_colors
 from .render import Patch, View, plain_patch, view_of
@@ -86,7 +86,7 @@ def visible(body: Body, patches: Sequence[Patch], left_out: Mask) -> list[Patch]
     """
     shown = []
     for number, parts in enumerate(seen_quarters(body, left_out)):
-        own = list(zip(patches[9 * number : 9 * number + 9], parts, strict=True))
+        own = list(zip(patches[PER_PATCH * number : PER_PATCH * (number + 1)], parts, strict=True))
         shown += [patch for patch, part in own if part.all()]
         partly = ((patch, part) for patch, part in own if part.any() and not part.all())
         shown += [_quarter(patch, sides) for patch, part in partly for sides in np.argwhere(part).tolist()]

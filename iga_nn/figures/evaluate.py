@@ -18,6 +18,7 @@ Solved = SplineField | MultiPatchField  # a solution on a body
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 
 SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
+PER_PATCH = len(FACE_NAMES) + len(SECTIONS)  # faces and sections
 MAP = "viridis"  # colour map; perceptually uniform
 FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # also distinct for the colour-blind
 
@@ -49,7 +50,7 @@ def points_on(volume: BSplineVolume, grid: Grid) -> Array:
 def outer_faces(body: Body) -> list[int]:
     """Return the places of the faces that are not glued among the nine faces and sections of each patch."""
     each = enumerate(as_multipatch(body).outer)
-    return [9 * i + FACE_NAMES.index(name) for i, names in each for name in names]
+    return [PER_PATCH * i + FACE_NAMES.index(name) for i, names in each for name in names]
 
 
 def fields_on(solution: Solved) -> tuple[SplineField, ...]:

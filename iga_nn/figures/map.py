@@ -14,7 +14,7 @@ from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .cutaway import cut_of, octant_label, patches_of, visible
-from .evaluate import Body, face_window, outer_faces, points_on
+from .evaluate import PER_PATCH, Body, face_window, outer_faces, points_on
 from .fields import SAMPLES, distortion_of, points_of
 from .inside import show_inside
 from .render import NAMELESS, Patch, check_drawable, draw, plain_patch, view_of
@@ -39,7 +39,7 @@ def draw_faces(path: str | Path | None, body: Body, marks: Array | None = None) 
 def _names_of(body: MultiPatch) -> dict[str, Array]:
     """Return the names of the outer faces of patches, each with the point in the middle of the face."""
     patches = points_of(body).patches
-    named = {face_label(k // 9, FACE_NAMES[k % 9]): patches[k] for k in outer_faces(body)}
+    named = {face_label(k // PER_PATCH, FACE_NAMES[k % PER_PATCH]): patches[k] for k in outer_faces(body)}
     return {name: points[len(points) // 2, len(points) // 2] for name, points in named.items()}
 
 

@@ -28,7 +28,7 @@ from solve.forms.form import Quantity
 
 from ..figures import evaluate
 from ..figures.cutaway import cut_of, patches_of, seen_quarters
-from ..figures.evaluate import Body, Solved, fields_on, outer_faces
+from ..figures.evaluate import PER_PATCH, Body, Solved, fields_on, outer_faces
 from ..figures.fields import (
     MANY,
     STRESS,
@@ -203,7 +203,7 @@ def _scene(body: Body, frames: Sequence[Frame], coarser: int) -> Scene:
         "low": low.tolist(),
         "high": high.tolist(),
         "view": np.stack([view.right, view.up, view.towards]).tolist(),
-        "outer": [divmod(k, 9) for k in drawn.faces],  # patch and face
+        "outer": [divmod(k, PER_PATCH) for k in drawn.faces],  # patch and face
         "cut": _cut(list(seen_quarters(body, left_out)), drawn.faces),
         "places": drawn.packed(points, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
         "axes": [] if isinstance(body, MultiPatch) else list(AXES),  # along which there are sections through the cube
@@ -225,8 +225,8 @@ def _cut(seen: Sequence[Mask], outer: Sequence[int]) -> dict[str, list[tuple[flo
     These are outer faces by their numbers, with their quarters (`_bits`); and planes inside: patch, direction, its
     parameter, and quarters. Glued faces are such planes, too.
     """
-    faces = [(number, _bits(seen[k // 9][k % 9])) for number, k in enumerate(outer)]
-    inside = [(i, k) for i in range(len(seen)) for k in range(9) if 9 * i + k not in set(outer)]
+    faces = [(number, _bits(seen[k // PER_PATCH][k % PER_PATCH])) for number, k in enumerate(outer)]
+    inside = [(i, k) for i in range(len(seen)) for k in range(PER_PATCH) if PER_PATCH * i + k not in set(outer)]
     planes = [(i, *PLANES[k], _bits(seen[i][k])) for i, k in inside]
     return {"faces": [row for row in faces if row[-1]], "planes": [row for row in planes if row[-1]]}
 
@@ -243,8 +243,8 @@ def _colors(body: Body, outer: Sequence[int]) -> dict[str, Any]:
         labels = [face_label(i, name) for i in range(len(body)) for name in FACE_NAMES]
     named = np.reshape(labels, (-1, len(FACE_NAMES)))
     return {
-        "colors": [str(colors[divmod(k, 9)]) for k in outer],
-        "labels": [str(named[divmod(k, 9)]) for k in outer],
+        "colors": [str(colors[divmod(k, PER_PATCH)]) for k in outer],
+        "labels": [str(named[divmod(k, PER_PATCH)]) for k in outer],
         "legend": color_labels(body),
     }
 
