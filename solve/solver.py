@@ -68,7 +68,7 @@ def solve_problem(
         Verdict of the map's certificate, if known; a verdict other than "certified" gives a notice.
     device : str
         "cpu", or "cuda" for the iteration on a GPU (Poisson's equation without Robin faces).
-    start : SplineField, optional
+    start : SplineField or MultiPatchField, optional
         Solution in a subspace, such as the space of one refinement less: the iteration starts there instead of at zero,
         which saves a third of the iterations on maps that need many.
     estimate : bool, optional

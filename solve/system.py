@@ -129,15 +129,19 @@ class System:
             found.append(full)
         return found
 
-    def vector(self, field: SplineField) -> Array:
+    def vector(self, field: SplineField | MultiPatchField) -> Array:
         """Return the free coefficients (N,) of a field in this space, or in a space that this one contains.
 
         Raises ValueError for any other field.
         """
-        (patch,) = self.patches
-        full = embedded(field.coefficients, field.degrees, field.knots, patch.space)
-        full = full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0)
-        return full[:, *patch.space.window].ravel()
+        fields = field.patches if isinstance(field, MultiPatchField) else (field,)
+        if len(fields) != len(self.patches):
+            raise ValueError(f"the field has {len(fields)} patches, the body {len(self.patches)}")
+        found = []
+        for own, patch in zip(fields, self.patches, strict=True):
+            full = embedded(own.coefficients, own.degrees, own.knots, patch.space)
+            found.append(full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))
+        return self.unknowns.chosen(found).ravel()
 
     def _splines(self, full: Sequence[Array]) -> list[SplineField]:
         """Return the splines of coefficients (c, n_u, n_v, n_w), gathered from all processes."""
@@ -173,8 +177,8 @@ class System:
     def solve_with(self, options: IterationOptions) -> Solution | MultiPatchSolution:
         """Return the solution of `solve` for options in one object."""
         check_device(options.device, self.problem)
-        if len(self.patches) > 1 and (options.device != "cpu" or options.start is not None):
-            raise ValueError("several patches are solved on device='cpu', and without a start")
+        if isinstance(self.body, MultiPatch) and options.device != "cpu":
+            raise ValueError(f"several patches are solved on device='cpu' only, got device={options.device!r}")
         with one_blas_thread():
             solution = self._solve(options)
         for notice in solution.report.notices if self.space.rank == 0 else ():

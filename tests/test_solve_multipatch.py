@@ -159,10 +159,17 @@ def test_data_that_do_not_fit_the_patches_are_refused(law, says):
         iga_nn.solve(two(), law())
 
 
+def test_a_coarser_solution_is_a_start():
+    body, law = ring(8, patches=4), iga_nn.Poisson(exact=WAVE)
+    coarse = iga_nn.solve(body, law)
+    fine, started = (iga_nn.solve(body, law, refine=1, start=start).report for start in (None, coarse))
+    assert started.iterations < fine.iterations and started.l2 == pytest.approx(fine.l2, rel=1e-6)
+    with pytest.raises(ValueError, match="the field has 2 patches, the body 4"):
+        iga_nn.solve(body, law, refine=1, start=iga_nn.solve(two(), law))
+
+
 def test_options_that_take_one_patch_say_so():
     law = iga_nn.Poisson(source="1", boundary="0")
-    with pytest.raises(ValueError, match="several patches are solved on device='cpu', and without a start"):
-        iga_nn.solve(two(), law, start=iga_nn.solve(box((0, 0, 0)), law))
     with pytest.raises(TypeError, match="volume must be a BSplineVolume"):
         iga_nn.march(two(), law, "0", dt=0.1, steps=1)
     with pytest.raises(ValueError, match="kappa is given by patch"):

@@ -83,9 +83,7 @@ def level_of(solution: Found) -> dict[str, Any]:
 def each_level(
     body: Body, problem: BoundaryValueProblem, levels: Sequence[int], options: SolveOptions
 ) -> Iterator[Found]:
-    """Solve level after level and yield the solutions.
-
-    The solve of a scalar problem on a volume starts at the last solution.
+    """Solve level after level and yield the solutions; the solve of a scalar problem starts at the last solution.
 
     All processes of an MPI job call this together.
     """
@@ -98,7 +96,7 @@ def each_level(
             raise InputError(f"refine {level}: the memory does not suffice; {remedy}") from None
         log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
         yield solution
-        if problem.form.components == 1 and isinstance(solution, Solution):
+        if problem.form.components == 1:
             options = replace(options, start=solution)
 
 

@@ -35,6 +35,9 @@ class Unknowns(Protocol):
     def collect(self, integrals: Sequence[Array]) -> Array:
         """Return the vector (c, ...) of integrals (c, n_u, n_v, n_w) over each patch, copies of an unknown added."""
 
+    def chosen(self, coefficients: Sequence[Array]) -> Array:
+        """Return the vector (c, ...) of the coefficients (c, n_u, n_v, n_w) of a function on each patch."""
+
     def completed(self, known: Sequence[Array]) -> list[Array]:
         """Return all fixed coefficients of each patch from those that its own data fix, (c, n_u, n_v, n_w) each."""
 
@@ -73,6 +76,11 @@ class Window:
         (result,) = integrals
         self.space.add(result)
         return np.ascontiguousarray(result[..., *self.space.window])
+
+    def chosen(self, coefficients: Sequence[Array]) -> Array:
+        """Return the vector (c, m_u, m_v, m_w) of the coefficients of a function."""
+        (full,) = coefficients
+        return np.ascontiguousarray(full[:, *self.space.window])
 
     def completed(self, known: Sequence[Array]) -> list[Array]:
         """Return the known coefficients."""
@@ -134,6 +142,13 @@ class Glued:
     def collect(self, integrals: Sequence[Array]) -> Array:
         """Return the vector (c, m) of integrals (c, n_u, n_v, n_w) over each patch, copies added."""
         return np.ascontiguousarray(self._sums(integrals, self.places, self.shape[0] + 1)[:, :-1])
+
+    def chosen(self, coefficients: Sequence[Array]) -> Array:
+        """Return the vector (c, m) of the coefficients of a function that is continuous across interfaces."""
+        padded = np.zeros((len(coefficients[0]), self.shape[0] + 1))
+        for own, part in zip(self.places, coefficients, strict=True):
+            padded[:, own] = part
+        return padded[:, :-1].copy()
 
     @staticmethod
     def _sums(parts: Sequence[Array], rows: Sequence[IntArray], length: int) -> Array:
