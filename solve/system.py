@@ -29,7 +29,7 @@ from .field import MultiPatchField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
 from .linear.krylov import generalized_residuals
-from .linear.patches import Coarse, GluedPreconditioner
+from .linear.patches import Coarse, GluedPreconditioner, shares_of
 from .linear.preconditioner import FastDiagonalization
 from .options import IterationOptions, SolveOptions, check_device
 from .patch_system import PatchProblem, PatchSystem
@@ -352,7 +352,9 @@ def _preconditioners(
     found = []
     for component in range(len(systems[0].blocks)):
         blocks = [system.blocks[component] for system in systems]
+        operators = [system.operators[component] for system in systems]
         is_open = all(block is not None and block.singular for block in blocks)
-        coarse = Coarse.of(unknowns, [system.operators[component] for system in systems], interfaces)
-        found.append(GluedPreconditioner(unknowns, tuple(block and block.held() for block in blocks), coarse, is_open))
+        held = tuple(block and block.held() for block in blocks)
+        weights, coarse = shares_of(unknowns, operators), Coarse.of(unknowns, operators, interfaces)
+        found.append(GluedPreconditioner(unknowns, weights, held, coarse, is_open))
     return tuple(found)

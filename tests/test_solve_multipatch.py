@@ -70,6 +70,14 @@ def test_iterations_of_patches_in_a_grid(name, spans):
     assert iterations(body, iga_nn.Poisson(exact=WAVE, neumann=held_at(body, "p0_u0"))) <= 60
 
 
+def test_jumps_of_the_material_take_few_more_iterations():
+    body = plate(4)
+    even, jumping = ({i: 1.0 if i % 2 else size for i in range(8)} for size in (1.0, 1e4))
+    problems = (iga_nn.Poisson(exact="x+y", source="0", kappa=kappa) for kappa in (even, jumping))
+    plain, with_jumps = (iterations(body, problem) for problem in problems)
+    assert with_jumps <= plain + 5
+
+
 def test_a_ring_takes_few_more_iterations_than_the_cube_that_is_glued():
     body = ring(16)
     assert iterations(body, iga_nn.Poisson(exact=WAVE)) <= 1.25 * iterations(

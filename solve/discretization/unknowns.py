@@ -129,11 +129,6 @@ class Glued:
         order = np.where(self.fixed, self.shape[0], np.cumsum(~self.fixed) - 1)
         return [order[own] for own in self.numbers]
 
-    @cached_property
-    def copies(self) -> Array:
-        """Return the number (m,) of coefficients that each unknown stands for."""
-        return self._sums([np.ones((1, *space.shape)) for space in self.spaces], self.places, self.shape[0] + 1)[0, :-1]
-
     def spread(self, x: Array) -> list[Array]:
         """Return the coefficients (c, n_u, n_v, n_w) of each patch of a vector (c, m), zero where they are fixed."""
         padded = np.concatenate([x, np.zeros((len(x), 1))], axis=1)

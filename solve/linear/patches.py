@@ -1,7 +1,7 @@
 """Preconditions several patches: the preconditioners of the patches, averaged, and trilinear functions of the vertices.
 
-M = Q^+ (preconditioner of each patch, natural at interfaces) Q^+T + V (V^T A V)^+ V^T. The first part is a sum of
-overlapping subspaces; the second, Galerkin's matrix on the functions that are trilinear on each patch, moves patches
+M = R (preconditioner of each patch, natural at interfaces) R^T + V (V^T A V)^+ V^T, where R averages the copies of each
+unknown by weights. The first part is a sum of overlapping subspaces; the second, Galerkin's matrix on the functions that are trilinear on each patch, moves patches
 that no boundary data hold as a whole (Toselli, Widlund, Domain Decomposition Methods, 2005, sections 2.2 and 5).
 """
 
@@ -27,24 +27,28 @@ RANK = 1e-10  # of the largest eigenvalue of the coarse matrix: smaller ones bel
 class GluedPreconditioner:
     """Apply the preconditioner of one component of a law on several patches to vectors (m,).
 
-    blocks: the preconditioners of the patches, natural at interfaces; None for a patch without unknowns. singular:
+    weights: (1, n_u, n_v, n_w) for each patch, the share of the patch in each unknown; the shares of an unknown sum to
+    one. blocks: the preconditioners of the patches, natural at interfaces; None for a patch without unknowns. singular:
     whether a constant is free.
     """
 
     unknowns: Glued
+    weights: tuple[Array, ...]
     blocks: tuple[FastDiagonalization | None, ...]
     coarse: "Coarse"
     singular: bool = False
 
     def __call__(self, residual: Array) -> Array:
         """Return the preconditioned residual (m,)."""
-        shares = self.unknowns.spread((residual / self.unknowns.copies)[None])
+        spread = zip(self.weights, self.unknowns.spread(residual[None]), strict=True)
+        shares = [weight * full for weight, full in spread]
         parts = self.coarse(shares)
-        for block, share, part in zip(self.blocks, shares, parts, strict=True):
+        for block, weight, share, part in zip(self.blocks, self.weights, shares, parts, strict=True):
             if block is not None:
                 window = block.space.window
                 part[:, *window] += block(np.ascontiguousarray(share[:, *window]))
-        result = self.unknowns.collect(parts)[0] / self.unknowns.copies
+            part *= weight
+        result = self.unknowns.collect(parts)[0]
         return result - result.mean() if self.singular else result
 
     @property
@@ -102,6 +106,20 @@ class Coarse:
             (u @ (v @ values[places] @ w.T).reshape(2, -1)).reshape(1, len(u), len(v), len(w))
             for (u, v, w), places in zip(self.hats, self.vertices, strict=True)
         ]
+
+
+def shares_of(unknowns: Glued, operators: Sequence[Operator]) -> tuple[Array, ...]:
+    """Return the weights of `GluedPreconditioner`: the diagonals of the operators over their sum.
+
+    An interface between two materials then belongs to the stiffer patch. On a plate of 8 patches, whose conductivities
+    are 1 and 10 000 by turns, that takes 18 iterations, with equal shares 107.
+    """
+    diagonals = [np.abs(operator.diagonal())[None] for operator in operators]
+    sums = unknowns.spread(unknowns.collect(diagonals))
+    return tuple(
+        np.divide(own, total, out=np.zeros_like(own), where=total > 0.0)
+        for own, total in zip(diagonals, sums, strict=True)
+    )
 
 
 def _hats(space: TrialSpace) -> tuple[Array, Array, Array]:
