@@ -1,8 +1,9 @@
 """Preconditions several patches: the preconditioners of the patches, averaged, and trilinear functions of the vertices.
 
 M = R (preconditioner of each patch, natural at interfaces) R^T + V (V^T A V)^+ V^T, where R averages the copies of each
-unknown by weights. The first part is a sum of overlapping subspaces; the second, Galerkin's matrix on the functions that are trilinear on each patch, moves patches
-that no boundary data hold as a whole (Toselli, Widlund, Domain Decomposition Methods, 2005, sections 2.2 and 5).
+unknown by weights. The first part is a sum of overlapping subspaces; the second, Galerkin's matrix on the functions
+that are trilinear on each patch, moves patches that no boundary data hold as a whole (Toselli, Widlund, Domain
+Decomposition Methods, 2005, sections 2.2 and 5).
 """
 
 from collections.abc import Sequence
