@@ -511,7 +511,7 @@ def test_a_page_without_its_packages_says_what_to_install(tmp_path):
         (["--port", "70000"], "port 70000"),
         (["--max-upload", "0"], "max upload 0"),
         (["--host", "0.0.0.0"], "--host"),
-        (["--control-points", "2"], "control points 2"),
+        (["--control-points", "2"], "at least 4 control points, got 2"),
         (["--resume"], "Unknown option: --resume"),
         (["--corners", "corners.json"], "Unknown option: --corners"),
     ],
