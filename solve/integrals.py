@@ -1,14 +1,16 @@
 """Integrates over a body, or over regions of its boundary: volume, mass, areas, averages, resultants."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import breakpoints, gauss_points
-from parameterize.spline.orientation import FACES, exact_points
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.interface import axis_side, face_label
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.orientation import exact_points
+from parameterize.spline.volume import BSplineVolume
 
 from .discretization.space import TrialSpace, same_smoothness
 from .discretization.surface_rule import SurfaceRule, surface_rule
@@ -18,13 +20,15 @@ from .forms.form import Quantity
 from .forms.frame import UnitFrame
 from .forms.region import Region, regions_of
 from .quantities import at_points, grid_values, quantity_of, slabs
-from .solution import Solution
+from .solution import MultiPatchSolution, Solution
 
 Integrand = Quantity | Callable[[Points], ArrayLike]
+Patch = BSplineVolume | Solution
+Body = Patch | MultiPatch | MultiPatchSolution
 
 
 def integrate(
-    body: BSplineVolume | Solution,
+    body: Body,
     what: str | Integrand | None = None,
     over: Regions | None = None,
 ) -> Array:
@@ -32,7 +36,7 @@ def integrate(
 
     Parameters
     ----------
-    body : BSplineVolume or Solution
+    body : BSplineVolume, MultiPatch, Solution or MultiPatchSolution
         The domain of the integral.
     what : str or function, optional
         The integrand; by default 1, so that the integral is the volume or the area. For a solution the name of a
@@ -60,17 +64,17 @@ def integrate(
     >>> bool(0.1 < mean < 0.2)
     True
     """
-    if not isinstance(body, BSplineVolume | Solution):
+    if not isinstance(body, Body):
         raise TypeError(f"body must be a volume or a solution, got {body!r:.80}")
     if over is None:
-        return _over_body(body, what)
+        return np.asarray(sum(_over_patch(patch, what) for patch in _patches(body)))
     total: Array | float = 0.0
-    for rule in _surface_rules(body, over):
-        total = total + np.tensordot(rule.weights, _at_points(body, what, rule), axes=(0, 0))
+    for patch, rule in _surface_rules(body, over):
+        total = total + np.tensordot(rule.weights, _at_points(patch, what, rule), axes=(0, 0))
     return np.asarray(total)
 
 
-def resultant(solution: Solution, over: Regions) -> Array:
+def resultant(solution: Solution | MultiPatchSolution, over: Regions) -> Array:
     """Return the integral of a law's flux through regions, outward (c,): of elasticity the force that acts on the body.
 
     The flux is a derivative of the solution, so its integral is less accurate than a solution's values. The reactions
@@ -78,7 +82,7 @@ def resultant(solution: Solution, over: Regions) -> Array:
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or MultiPatchSolution
         Solution of any law.
     over : Region, str or list of these
         Regions of the boundary, as in `integrate`.
@@ -97,20 +101,31 @@ def resultant(solution: Solution, over: Regions) -> Array:
     >>> bool(abs(iga_nn.resultant(solution, faces)[0]) < 1e-8)  # as much goes in as out
     True
     """
-    if not isinstance(solution, Solution):
+    if not isinstance(solution, Solution | MultiPatchSolution):
         raise TypeError(f"a resultant is that of a solution, got {solution!r:.80}")
     total = np.zeros(solution.problem.form.components)
-    for rule in _surface_rules(solution, over):
-        flux = at_points(solution, solution.problem.form, "flux", rule.at.parameters)  # (m, c, 3)
+    for patch, rule in _surface_rules(solution, over):
+        assert isinstance(patch, Solution)
+        flux = at_points(patch, patch.problem.form, "flux", rule.at.parameters)  # (m, c, 3)
         total += np.einsum("mcd,dm,m->c", flux, rule.at.normal, rule.weights)
     return total
 
 
-def _volume_of(body: BSplineVolume | Solution) -> BSplineVolume:
+def _patches(body: Body) -> Sequence[Patch]:
+    """Return the patches of a body, or the solutions on them."""
+    return body.patches if isinstance(body, MultiPatch | MultiPatchSolution) else (body,)
+
+
+def _maps(body: Body) -> BSplineVolume | MultiPatch:
+    """Return the maps of a body or of a solution."""
+    return body if isinstance(body, BSplineVolume | MultiPatch) else body.geometry
+
+
+def _volume_of(body: Patch) -> BSplineVolume:
     return body if isinstance(body, BSplineVolume) else body.geometry
 
 
-def _counts(body: BSplineVolume | Solution) -> list[int]:
+def _counts(body: Patch) -> list[int]:
     """Return the numbers of Gauss points a span and direction: exact for a volume; of a solution, as for errors."""
     volume = _volume_of(body)
     spans = ([len(breakpoints(row)) - 1 for row in spline.knots] for spline in (body, volume))
@@ -118,8 +133,8 @@ def _counts(body: BSplineVolume | Solution) -> list[int]:
     return [max(of_map, own + 2) for of_map, own in zip(exact_points(volume, parts), body.degrees, strict=True)]
 
 
-def _over_body(body: BSplineVolume | Solution, what: str | Integrand | None) -> Array:
-    """Return the integral (...) over the body."""
+def _over_patch(body: Patch, what: str | Integrand | None) -> Array:
+    """Return the integral (...) over a patch."""
     pairs = [gauss_points(knots, count) for knots, count in zip(body.knots, _counts(body), strict=True)]
     rows, weights = ([part.ravel() for part in parts] for parts in zip(*pairs, strict=True))
     total: Array | float = 0.0
@@ -132,50 +147,51 @@ def _over_body(body: BSplineVolume | Solution, what: str | Integrand | None) -> 
     return np.asarray(total)
 
 
-def _surface_rules(body: BSplineVolume | Solution, over: Regions) -> Iterator[SurfaceRule]:
-    """Yield the quadrature rules, one a face of the cube, of the part of the boundary that is in one of the regions.
+def _surface_rules(body: Body, over: Regions) -> Iterator[tuple[Patch, SurfaceRule]]:
+    """Yield the quadrature rules, one an outer face, of the part of the boundary that is in one of the regions.
 
-    Raises ValueError where that part is empty.
+    Each rule comes with its patch. Raises ValueError where that part is empty.
     """
-    volume, regions = _volume_of(body), _placed(body, over)
-    degree = max(_counts(body)) - 1  # a rule has a point more
-    rows = [same_smoothness(knots, old, degree) for knots, old in zip(body.knots, body.degrees, strict=True)]
-    space = TrialSpace((degree, degree, degree), (rows[0], rows[1], rows[2]))
-    found = False
-    for name, face in zip(FACE_NAMES, FACES, strict=True):
+    regions, glued, found = _placed(body, over), as_multipatch(_maps(body)), False
+    for number, (patch, names) in enumerate(zip(_patches(body), glued.outer, strict=True)):
+        degree = max(_counts(patch)) - 1  # a rule has a point more
+        rows = [same_smoothness(knots, old, degree) for knots, old in zip(patch.knots, patch.degrees, strict=True)]
+        space = TrialSpace((degree, degree, degree), (rows[0], rows[1], rows[2]))
+        for face in names:
+            name = face_label(number, face) if isinstance(_maps(body), MultiPatch) else face
 
-        def codes(x: Array, normal: Array, name: str = name) -> IntArray:
-            return np.any([region.holds(x, normal, name) for region in regions], axis=0).astype(np.int64)
+            def codes(x: Array, normal: Array, name: str = name) -> IntArray:
+                return np.any([region.holds(x, normal, name) for region in regions], axis=0).astype(np.int64)
 
-        rule = surface_rule(volume, space, *face, codes)
-        if rule is not None:
-            found = True
-            yield rule
+            rule = surface_rule(_volume_of(patch), space, *axis_side(face), codes)
+            if rule is not None:
+                found = True
+                yield patch, rule
     if not found:
         raise ValueError(
             f"over {', '.join(repr(str(region)) for region in regions)}: no part of the boundary lies there"
         )
 
 
-def _placed(body: BSplineVolume | Solution, over: Regions) -> list[Region]:
+def _placed(body: Body, over: Regions) -> list[Region]:
     """Return regions with X, Y, Z measured in the body, and with the surface of the solution's problem."""
     if not over or not isinstance(over, Region | str | list | tuple):
         raise ValueError(f"over: give regions, such as 'nz > 0.9' or 'u0', got {over!r:.80}")
     regions = regions_of(over)
-    frame = UnitFrame.of(_volume_of(body)) if any(region.is_scaled for region in regions) else None
-    conditions = body.problem.conditions if isinstance(body, Solution) else ()
+    frame = UnitFrame.of(_maps(body)) if any(region.is_scaled for region in regions) else None
+    conditions = body.problem.conditions if isinstance(body, Solution | MultiPatchSolution) else ()
     surface = next((c.region.surface for c in conditions if c.region.surface is not None), None)
     return [region.placed(frame, surface) for region in regions]
 
 
-def _on_grid(body: BSplineVolume | Solution, what: str | Integrand | None, u: Array, v: Array, w: Array) -> Array:
+def _on_grid(body: Patch, what: str | Integrand | None, u: Array, v: Array, w: Array) -> Array:
     """Return the values (..., n_u, n_v, n_w) of the integrand on a grid of parameters."""
     if what is not None and isinstance(body, Solution):
         return grid_values(body, quantity_of(body.problem.form, what), u, v, w)  # type: ignore[arg-type]
     return _of_position(what, Points.on(_volume_of(body), u, v, w))
 
 
-def _at_points(body: BSplineVolume | Solution, what: str | Integrand | None, rule: SurfaceRule) -> Array:
+def _at_points(body: Patch, what: str | Integrand | None, rule: SurfaceRule) -> Array:
     """Return the values (m, ...) of the integrand at the points of a rule."""
     if what is not None and isinstance(body, Solution):
         return at_points(body, body.problem.form, what, rule.at.parameters)  # type: ignore[arg-type]

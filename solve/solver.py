@@ -188,6 +188,9 @@ def _on_patches(
         raise ValueError(
             f"{unknown[0]} is no outer face of the body; its faces are {', '.join(sorted(outer)) or 'u0 to w1'}"
         )
+    for name, numbers in problem.by_patch.items() if several else ():
+        if beyond := sorted(numbers - set(range(len(glued))), key=str):
+            raise ValueError(f"{name}: there is no patch {beyond[0]!r}; the body has {len(glued)}, from 0 on")
     patches = []
     for i, (volume, faces) in enumerate(zip(glued.patches, glued.outer, strict=True)):
         own = placed.on_patch(i, faces) if several else placed

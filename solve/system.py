@@ -315,14 +315,14 @@ def build(
 
     patches: the problem on each patch. shift: the factor of the mass matrix in A, which is added to the law's matrix.
     """
-    start, interfaces = time.process_time(), as_multipatch(body).interfaces
+    start, glued = time.process_time(), as_multipatch(body)
     with one_blas_thread():
         systems = tuple(PatchSystem.of(patch, options, shift) for patch in patches)
-        _demand_held(problem, systems, shift)
-        unknowns = unknowns_of([patch.space for patch in systems], interfaces)
+        _demand_held(glued, problem, systems, shift)
+        unknowns = unknowns_of([patch.space for patch in systems], glued.interfaces)
         known = unknowns.completed([system.known for system in systems])
         systems = tuple(replace(system, known=own) for system, own in zip(systems, known, strict=True))
-        blocks = _preconditioners(unknowns, systems, interfaces)
+        blocks = _preconditioners(unknowns, systems, glued.interfaces)
         if blocks[0].singular and isinstance(systems[0].matrix, FormOperator):
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
@@ -334,13 +334,21 @@ def build(
     return System(body, problem, systems, unknowns, blocks, right, setup)
 
 
-def _demand_held(problem: BoundaryValueProblem, systems: Sequence[PatchSystem], shift: float) -> None:
-    """Raise ValueError where a region has no area, and where supports leave a body without a shift free to move."""
+def _demand_held(body: MultiPatch, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], shift: float) -> None:
+    """Raise ValueError where a region has no area, and where a part of a body without a shift is free to move."""
     space, volumes = systems[0].space, [system.volume for system in systems]
-    faces = [face for system in systems for face in system.weak]
-    demand_area(problem, faces, space, volumes)
-    if shift == 0.0 and problem.conditions and not any(system.space.dirichlet for system in systems):
-        demand_supports(problem, faces, space, volumes)
+    demand_area(problem, [face for system in systems for face in system.weak], space, volumes)
+    if shift != 0.0:
+        return
+    parts = body.parts
+    for numbers in parts:
+        part = [systems[number] for number in numbers]
+        faces = [face for system in part for face in system.weak]
+        if problem.conditions and not any(system.space.dirichlet for system in part):
+            demand_supports(problem, faces, space, [system.volume for system in part])
+        if len(parts) > 1 and all(block is not None and block.singular for system in part for block in system.blocks):
+            named = ", ".join(f"p{number}" for number in numbers)
+            raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
 
 
 def _preconditioners(

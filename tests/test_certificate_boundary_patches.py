@@ -150,4 +150,4 @@ def test_a_body_without_a_boundary_is_refused():
     point = BSplineVolume.uniform(np.zeros((2, 2, 2, 3)), degree=1)
     glued = tuple(Interface((0, f"{name}0"), (0, f"{name}1")) for name in "uvw")
     with pytest.raises(ValueError, match="every face is glued"):
-        check_boundary(MultiPatch((point,), glued))
+        MultiPatch((point,), glued)

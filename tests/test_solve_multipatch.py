@@ -159,6 +159,8 @@ def test_one_patch_of_several_is_the_volume():
         (lambda: iga_nn.Poisson(neumann={"p0_u1": None}), "p0_u1 is no outer face of the body"),
         (lambda: iga_nn.Poisson(source="1", value={"p7_u1": "0"}), "p7_u1 is no outer face"),
         (lambda: iga_nn.Poisson(source="1", boundary="0", kappa={0: 1.0}), "kappa has no entry for patch 1"),
+        (lambda: iga_nn.Poisson(source="1", boundary="0", kappa=dict.fromkeys(range(3), 1.0)), "there is no patch 2"),
+        (lambda: iga_nn.Elasticity(force=(0, 0, 1), young=dict.fromkeys((0, 1, 7), 1.0)), "young: there is no patch 7"),
         (lambda: iga_nn.Elasticity(force=(0, 0, 1), young={1: 1.0}), "young has no entry for patch 0"),
     ],
 )
@@ -182,3 +184,23 @@ def test_options_that_take_one_patch_say_so():
         iga_nn.march(two(), law, "0", dt=0.1, steps=1)
     with pytest.raises(ValueError, match="kappa is given by patch"):
         iga_nn.solve(box((0, 0, 0)), iga_nn.Poisson(source="1", boundary="0", kappa={0: 1.0, 1: 2.0}))
+
+
+def test_a_part_that_nothing_holds_is_named():
+    apart = iga_nn.MultiPatch.from_patches([box((0, 0, 0)), box((2, 0, 0))])
+    with pytest.raises(ValueError, match="nothing fixes the solution on p1, a part of its own"):
+        iga_nn.solve(apart, iga_nn.Poisson(source="0", value={"p0_u0": "1"}))
+    with pytest.raises(ValueError, match="no support holds the body|free to move"):
+        iga_nn.solve(apart, iga_nn.Elasticity(fix="p0_u0", load={"p1_u1": (1, 0, 0)}))
+    both = iga_nn.solve(apart, iga_nn.Poisson(exact="x*y"))
+    assert both.report.converged and both.report.l2_relative < 1e-6
+
+
+def test_integrals_over_several_patches():
+    body = plate()
+    assert iga_nn.integrate(body) == pytest.approx(8.0)
+    assert iga_nn.integrate(body, over="nz > 0.5") == pytest.approx(8.0)
+    assert iga_nn.integrate(body, over="p0_u0") == pytest.approx(1.0)
+    solution = iga_nn.solve(body, iga_nn.Poisson(exact="x"))
+    assert iga_nn.integrate(solution, "u")[0] == pytest.approx(12.0)
+    assert iga_nn.resultant(solution, over="nx > 0.5 and x > 2") == pytest.approx([3.0])

@@ -96,6 +96,7 @@ def test_a_face_that_has_shrunk_to_an_edge_is_not_glued():
     ("patches", "says"),
     [
         (lambda: [], "one patch or more"),
+        (lambda: [box((0, 0, 0))] * 2, "every face is glued"),
         (lambda: [box((0, 0, 0)), box((1, 0, 0)).refined()], "p0_u1 and p1_u0 are the same surface"),
         (lambda: [box((0, 0, 0)), box((1, 0, 0)), box((1, 0, 0))], "are one surface: at most two"),
     ],
@@ -109,7 +110,7 @@ def test_what_does_not_match_is_named(patches, says):
     ("interfaces", "says"),
     [
         ([Interface((0, "u1"), (1, "u1"))], "p0_u1 = p1_u1: the control points"),
-        ([Interface((0, "u1"), (1, "u0"), flipped=(True, False))], "the control points of the two faces differ"),
+        ([Interface((0, "u1"), (1, "u0"), flipped=(True, False))], "the control points or weights of the two faces"),
         ([Interface((0, "u1"), (2, "u0"))], "no such face"),
         ([Interface((0, "u1"), (1, "u7"))], "no such face"),
         ([Interface((0, "u1"), (1, "u0"))] * 2, "p0_u1 is glued twice"),
@@ -123,3 +124,17 @@ def test_interfaces_without_equal_traces_are_refused(interfaces, says):
 def test_other_objects_are_refused():
     with pytest.raises(TypeError, match="must be a BSplineVolume"):
         iga_nn.MultiPatch.from_patches([box((0, 0, 0)), "volume.npz"])
+
+
+@pytest.mark.parametrize("tolerance", [-1.0, np.nan, 1.0, "a", None])
+def test_a_tolerance_is_a_share(tolerance):
+    with pytest.raises(ValueError, match="tolerance must be a share of the body's size"):
+        MultiPatch.from_patches([box((0, 0, 0))], tolerance=tolerance)
+
+
+def test_faces_that_nearly_match_are_told_but_not_glued():
+    body = MultiPatch.from_patches([box((0, 0, 0)), box((1.00001, 0, 0)), box((2.00001, 0, 0)), box((4, 0, 0))])
+    ((pair, distance),) = body.nearly_glued
+    assert str(pair) == "p0_u1 = p1_u0" and distance == pytest.approx(1e-5)
+    assert body.parts == [[0], [1, 2], [3]]
+    assert plate().nearly_glued == [] and len(plate().parts) == 1

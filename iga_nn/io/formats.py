@@ -8,6 +8,7 @@ point data `u`, the others as a second file beside the volume's. `io.gismo`, `io
 for ParaView. IGES and STEP have no trivariate splines.
 """
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -32,6 +33,9 @@ from ..type_check import check_type
 from . import gismo, mfem_writer, splinepy, view, vtk
 from .reading import ENDINGS, READERS, kind_of, read_body
 
+log = logging.getLogger(__name__)
+
+SHOWN = 3  # pairs of faces in a notice
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
 
@@ -117,6 +121,10 @@ def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BSplineVolume
         if kind is None and source.suffix != ".npz":
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
         body = read_body(source, kind, tolerance) if kind in READERS else _load_archive(source)
+    if isinstance(body, MultiPatch) and (near := body.nearly_glued):
+        pairs = ", ".join(f"{pair} ({distance:.2g} apart)" for pair, distance in near[:SHOWN])
+        more = f" and {len(near) - SHOWN} more" if len(near) > SHOWN else ""
+        log.warning("%s: faces that nearly match are not glued: %s%s; a larger tolerance glues them", path, pairs, more)
     rows = [row for patch in as_multipatch(body) for row in patch.knots]
     if min(float(np.diff(np.unique(row)).min()) for row in rows) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TOLERANCE = 1e-6  # of the body's size: distance of two control points that are taken for one
+NEAR = 1e3  # times the tolerance: faces so near to each other are perhaps meant to be one
 SAMPLES = 5  # points a direction at which two faces over the same corners are compared
 FLAT = 1e-9  # of the squared size: the area of a face that has shrunk to an edge or a point
 
@@ -85,6 +87,8 @@ class MultiPatch(Brief, Shown):
                 raise ValueError(f"interface {interface}: degrees or knots along the two faces differ")
             if gap(self.patches, interface) > 0.0:
                 raise ValueError(f"interface {interface}: the control points or weights of the two faces differ")
+        if len(seen) == len(FACE_NAMES) * len(self.patches):
+            raise ValueError("every face is glued, so that the body has no boundary: is a patch given twice?")
 
     @classmethod
     def from_patches(cls, patches: Sequence[BSplineVolume], tolerance: float = TOLERANCE) -> "MultiPatch":
@@ -99,6 +103,8 @@ class MultiPatch(Brief, Shown):
             raise ValueError("a body has one patch or more")
         for patch in given:
             demand_volume(patch)
+        if not (isinstance(tolerance, Real) and 0.0 <= tolerance < 1.0):
+            raise ValueError(f"tolerance must be a share of the body's size, from 0 to 1, got {tolerance!r:.80}")
         points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in given])
         size = float(np.ptp(points, axis=0).max())
         found = tuple(_interfaces(given, tolerance * size, size))
@@ -145,6 +151,30 @@ class MultiPatch(Brief, Shown):
             return cls(patches, interfaces)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
+
+    @property
+    def nearly_glued(self) -> list[tuple[Interface, float]]:
+        """Return pairs of outer faces that almost have the same control points, with the largest distance of two.
+
+        They are not glued: `from_patches` does so with a larger tolerance. Faces farther apart than NEAR times the
+        default tolerance are not looked at.
+        """
+        points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in self.patches])
+        size = float(np.ptp(points, axis=0).max())
+        try:
+            found = list(_interfaces(self.patches, NEAR * TOLERANCE * size, size))
+        except ValueError:  # faces that from_patches would refuse: they are no pair
+            return []
+        glued = {interface.first for interface in self.interfaces}
+        return [(one, gap(self.patches, one)) for one in found if one.first not in glued]
+
+    @property
+    def parts(self) -> list[list[int]]:
+        """Return the numbers of the patches that are connected through interfaces, one list a part."""
+        pairs = np.array([(i.first[0], i.second[0]) for i in self.interfaces], dtype=np.int64).reshape(-1, 2)
+        graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(len(self),) * 2)
+        count, labels = connected_components(graph, directed=False)
+        return [np.flatnonzero(labels == part).tolist() for part in range(count)]
 
     @cached_property
     def outer(self) -> tuple[tuple[str, ...], ...]:

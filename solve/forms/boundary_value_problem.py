@@ -173,6 +173,11 @@ class BoundaryValueProblem:
         in_regions = {name for condition in self.conditions for name in condition.region.patch_faces}
         return {name for name in (*on_faces, *self.natural) if PATCH_FACE.fullmatch(name)} | in_regions
 
+    @property
+    def by_patch(self) -> dict[str, set[int]]:
+        """Return the numbers of the patches for which data are given one by one, by the name of the datum."""
+        return {datum.name: set(datum.patches) for datum in self.data.values() if isinstance(datum, ByPatch)}
+
     def on_patch(self, patch: int, outer: Collection[str]) -> Self:
         """Return the problem of one patch of several, with data on the patch's outer faces alone.
 

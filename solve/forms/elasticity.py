@@ -128,6 +128,12 @@ class Elasticity(LawWithData):
         young, nu = _values(self.young)[0], _values(self.poisson_ratio)[0]
         return young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), young / (2.0 * (1.0 + nu))
 
+    @property
+    def by_patch(self) -> dict[str, set[int]]:
+        """Return the numbers of the patches for which data are given one by one, by the name of the datum."""
+        given = {name: getattr(self, name) for name in ("young", "poisson_ratio")}
+        return super().by_patch | {name: set(own) for name, own in given.items() if isinstance(own, Mapping)}
+
     def on_patch(self, patch: int, outer: Collection[str]) -> Self:
         """Return the problem of one patch of several, with the material of the patch."""
         other = super().on_patch(patch, outer)
