@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
@@ -240,6 +241,19 @@ class MultiPatchSolution(MultiPatchField, Shown):
     def field(self) -> MultiPatchField:
         """Return the splines without the report, as a datum for another problem on the same body."""
         return MultiPatchField(tuple(patch.field for patch in self.patches))
+
+    def quantity(self, what: str | Quantity, points: ArrayLike) -> Array:
+        """Return a quantity (m, ...) at points (m, 3) in space; NaN outside of the body.
+
+        what: a name or a function, as in `Solution.quantity`; at parameters of a patch use `patches[i].quantity`.
+        """
+        owners, where = self.geometry.locate(points)
+        first = self.patches[0].quantity(what, np.where((owners == 0)[:, None], where, np.nan))
+        for number, patch in enumerate(self.patches[1:], start=1):
+            here = owners == number
+            if here.any():
+                first[here] = patch.quantity(what, where[here])
+        return first
 
     def extremes(self, what: str | Quantity) -> Extremes:
         """Return the least and the largest value of a quantity of one number a point, and their places."""

@@ -164,7 +164,7 @@ def prepared(
 ) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
     """Check body and problem; return the problem placed in the body, and the problem on each patch."""
     placed, patches = _on_patches(body, problem, options)
-    if all(part.stop <= part.start for patch in patches for part in patch.space.free):
+    if all(any(part.stop <= part.start for part in patch.space.free) for patch in patches):
         raise ValueError(
             f"degree {patches[0].space.degrees} leaves no unknown inside the volume: raise refine or degree"
         )

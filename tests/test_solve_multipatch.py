@@ -204,3 +204,17 @@ def test_integrals_over_several_patches():
     solution = iga_nn.solve(body, iga_nn.Poisson(exact="x"))
     assert iga_nn.integrate(solution, "u")[0] == pytest.approx(12.0)
     assert iga_nn.resultant(solution, over="nx > 0.5 and x > 2") == pytest.approx([3.0])
+
+
+def test_quantities_at_points_of_several_patches():
+    solution = iga_nn.solve(plate(), iga_nn.Poisson(exact="x*y"))
+    gradients = solution.quantity("gradient", [[0.5, 2.5, 0.5], [2.5, 0.5, 0.5], [1.5, 1.5, 0.5]])[:, 0]
+    assert gradients[:2] == pytest.approx(np.array([[2.5, 0.5, 0.0], [0.5, 2.5, 0.0]]), abs=1e-6)
+    assert np.isnan(gradients[2]).all()
+
+
+def test_a_space_without_unknowns_is_refused():
+    with pytest.raises(ValueError, match="leaves no unknown inside the volume: raise refine or degree"):
+        iga_nn.solve(box((0, 0, 0), 1, 1), iga_nn.Poisson(exact="x"))
+    report = iga_nn.solve(two(1, 1), iga_nn.Poisson(exact="x"), refine=1).report
+    assert report.converged

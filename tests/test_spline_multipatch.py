@@ -111,8 +111,7 @@ def test_what_does_not_match_is_named(patches, says):
     [
         ([Interface((0, "u1"), (1, "u1"))], "p0_u1 = p1_u1: the control points"),
         ([Interface((0, "u1"), (1, "u0"), flipped=(True, False))], "the control points or weights of the two faces"),
-        ([Interface((0, "u1"), (2, "u0"))], "no such face"),
-        ([Interface((0, "u1"), (1, "u7"))], "no such face"),
+        ([Interface((0, "u1"), (2, "u0"))], "there are 2 patches, from 0 on"),
         ([Interface((0, "u1"), (1, "u0"))] * 2, "p0_u1 is glued twice"),
     ],
 )
@@ -138,3 +137,20 @@ def test_faces_that_nearly_match_are_told_but_not_glued():
     assert str(pair) == "p0_u1 = p1_u0" and distance == pytest.approx(1e-5)
     assert body.parts == [[0], [1, 2], [3]]
     assert plate().nearly_glued == [] and len(plate().parts) == 1
+
+
+@pytest.mark.parametrize("face", [(0, "u7"), 0, (1,), ("0", "u0"), "p0_u1"])
+def test_a_face_is_a_number_and_a_name(face):
+    with pytest.raises(ValueError, match="a face is the number of a patch and a name"):
+        Interface((0, "u1"), face)
+
+
+def test_interfaces_are_objects():
+    with pytest.raises(TypeError, match="interfaces must be Interface objects, got 'p0_u1 = p1_u0'"):
+        MultiPatch((box((0, 0, 0)), box((1, 0, 0))), ("p0_u1 = p1_u0",))
+
+
+def test_points_are_located_in_their_patches():
+    owners, where = plate().locate([[0.25, 0.5, 0.5], [2.5, 2.5, 0.1], [1.5, 1.5, 0.5]])
+    assert owners.tolist() == [0, 7, -1]
+    assert where[:2] == pytest.approx(np.array([[0.25, 0.5, 0.5], [0.5, 0.5, 0.1]])) and np.isnan(where[2]).all()

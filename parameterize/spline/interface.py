@@ -46,6 +46,11 @@ class Interface:
     swapped: bool = False
     flipped: tuple[bool, bool] = (False, False)
 
+    def __post_init__(self) -> None:
+        for face in (self.first, self.second):
+            if not (isinstance(face, tuple) and len(face) == 2 and isinstance(face[0], int) and face[1] in FACE_NAMES):
+                raise ValueError(f'a face is the number of a patch and a name, as (0, "u1"), got {face!r:.80}')
+
     def __str__(self) -> str:
         return f"{face_label(*self.first)} = {face_label(*self.second)}"
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -77,9 +78,11 @@ class MultiPatch(Brief, Shown):
             demand_volume(patch)
         seen: set[Face] = set()
         for interface in self.interfaces:
+            if not isinstance(interface, Interface):
+                raise TypeError(f"interfaces must be Interface objects, got {interface!r:.80}")
             for number, face in (interface.first, interface.second):
-                if face not in FACE_NAMES or not 0 <= number < len(self.patches):
-                    raise ValueError(f"interface {interface}: there is no such face")
+                if not 0 <= number < len(self.patches):
+                    raise ValueError(f"interface {interface}: there are {len(self.patches)} patches, from 0 on")
                 if (number, face) in seen:
                     raise ValueError(f"{face_label(number, face)} is glued twice")
                 seen.add((number, face))
@@ -151,6 +154,20 @@ class MultiPatch(Brief, Shown):
             return cls(patches, interfaces)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
+
+    def locate(self, points: ArrayLike) -> tuple[IntArray, Array]:
+        """Return the patches (m,) and the parameters (m, 3) of points (m, 3) in space, -1 and NaN outside of the body.
+
+        On an interface the patch with the smaller number is taken. Raises ValueError as `BSplineVolume.locate`.
+        """
+        where = self.patches[0].locate(points)
+        owners: IntArray = np.where(np.isnan(where[:, 0]), -1, 0)
+        for number, patch in enumerate(self.patches[1:], start=1):
+            missing = np.flatnonzero(owners < 0)
+            if len(missing):
+                where[missing] = patch.locate(np.atleast_2d(np.asarray(points, dtype=np.float64))[missing])
+                owners[missing] = np.where(np.isnan(where[missing, 0]), -1, number)
+        return owners, where
 
     @property
     def nearly_glued(self) -> list[tuple[Interface, float]]:
