@@ -253,8 +253,13 @@ def check(path):
 
 def read_volume(path):
     """What every command does first with a volume; of one patch, `iga-nn check` does the rest."""
-    logging.getLogger("iga_nn.io").setLevel(logging.ERROR)  # notices are no errors
-    body = load_volume(path)
+    notices = logging.getLogger("iga_nn.io")
+    level = notices.level
+    notices.setLevel(logging.ERROR)  # notices are no errors
+    try:
+        body = load_volume(path)
+    finally:
+        notices.setLevel(level)
     if isinstance(body, BSplineVolume):
         certified_facts(body)
 
