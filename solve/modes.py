@@ -28,7 +28,7 @@ SPARE = 4  # vectors more than are wanted, and half as many as these again: the 
 ROUND = 8  # iterations before the first look at the residuals; each round is as long as all before
 AT_REST = 1e-7  # share of the shift below which an eigenvalue is that of a rigid motion
 INNER, INNER_MOST = 0.1, 500  # tolerance and iterations of the solves that precondition: K of a slender body is hard
-RIGID = {1: 1, 3: 6}  # motions of a free body that take no energy, by the law's components
+RIGID = {1: 1, 3: 6}  # motions of a free part of a body that take no energy, by the law's components
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,7 +159,8 @@ def modes(
     options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature)
     system = discretized(body, law, options, shift)
     system = system.at_rest()
-    rigid = RIGID.get(len(system.right), len(system.right)) if shift else 0
+    of_part = RIGID.get(len(system.right), len(system.right))
+    rigid = of_part * len(as_multipatch(body).parts) if shift else 0
     if n + rigid > len(system.load):
         raise ValueError(f"n {n}: the space has {len(system.load)} unknowns, fewer modes; raise refine or lower n")
     values, vectors, residuals, iterations = _lowest(system, n + rigid, tolerance, max_iterations)

@@ -218,3 +218,10 @@ def test_a_space_without_unknowns_is_refused():
         iga_nn.solve(box((0, 0, 0), 1, 1), iga_nn.Poisson(exact="x"))
     report = iga_nn.solve(two(1, 1), iga_nn.Poisson(exact="x"), refine=1).report
     assert report.converged
+
+
+def test_a_body_of_two_free_parts_has_twelve_rigid_motions():
+    free = {f"{axis}{side}": ("0", "0", "0") for axis in "uvw" for side in (0, 1)}
+    apart = iga_nn.MultiPatch.from_patches([box((0, 0, 0), 1, 2), box((2, 0, 0), 1, 2)])
+    found = iga_nn.modes(apart, iga_nn.Elasticity(traction=free), n=2)
+    assert found.rigid == 12 and found.frequencies[0] > 0.01
