@@ -123,6 +123,8 @@ def test_interfaces_without_equal_traces_are_refused(interfaces, says):
 def test_other_objects_are_refused():
     with pytest.raises(TypeError, match="must be a BSplineVolume"):
         iga_nn.MultiPatch.from_patches([box((0, 0, 0)), "volume.npz"])
+    with pytest.raises(TypeError, match="patches must be a list of volumes, got BSplineVolume"):
+        iga_nn.MultiPatch.from_patches(box((0, 0, 0)))
 
 
 @pytest.mark.parametrize("tolerance", [-1.0, np.nan, 1.0, "a", None])
@@ -143,6 +145,11 @@ def test_faces_that_nearly_match_are_told_but_not_glued():
 def test_a_face_is_a_number_and_a_name(face):
     with pytest.raises(ValueError, match="a face is the number of a patch and a name"):
         Interface((0, "u1"), face)
+
+
+def test_two_directions_are_flipped_or_not():
+    with pytest.raises(ValueError, match="flipped must be two truth values"):
+        Interface((0, "u1"), (1, "u0"), flipped=(True,))
 
 
 def test_interfaces_are_objects():

@@ -50,6 +50,8 @@ class Interface:
         for face in (self.first, self.second):
             if not (isinstance(face, tuple) and len(face) == 2 and isinstance(face[0], int) and face[1] in FACE_NAMES):
                 raise ValueError(f'a face is the number of a patch and a name, as (0, "u1"), got {face!r:.80}')
+        if not (isinstance(self.flipped, tuple) and len(self.flipped) == 2):
+            raise ValueError(f"flipped must be two truth values, got {self.flipped!r:.80}")
 
     def __str__(self) -> str:
         return f"{face_label(*self.first)} = {face_label(*self.second)}"

@@ -101,6 +101,8 @@ class MultiPatch(Brief, Shown):
         they become one, that of the patch that comes first. Raises ValueError where two faces are the same
         surface, but do not have the same degrees, knots and weights, and where three faces are the same.
         """
+        if not isinstance(patches, Sequence):
+            raise TypeError(f"patches must be a list of volumes, got {type(patches).__name__}")
         given = tuple(patches)
         if not given:
             raise ValueError("a body has one patch or more")

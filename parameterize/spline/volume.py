@@ -289,6 +289,8 @@ class BSplineVolume(Brief, Shown):
         >>> right([[0, 0, 0], [1, 0, 0]])[:, 0].round(12)
         array([1., 4.])
         """
+        if not all(isinstance(cuts, Sequence | np.ndarray) for cuts in (u, v, w)):
+            raise ValueError(f"cuts must be lists of parameters, such as u=[0.5], got {(u, v, w)!r:.80}")
         ends = [[0.0, *sorted(cuts), 1.0] for cuts in (u, v, w)]
         if any(not 0.0 <= a < b <= 1.0 for row in ends for a, b in pairwise(row)):
             raise ValueError(f"cuts must be different parameters between 0 and 1, got {(u, v, w)!r:.80}")

@@ -103,7 +103,8 @@ class BoundaryValueProblem:
                 raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
             for face in faces:
                 if face not in FACE_NAMES and not PATCH_FACE.fullmatch(str(face)):
-                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {', '.join(FACE_NAMES)}")
+                    names = f"{', '.join(FACE_NAMES)}, and p2_u0 of patch 2 of several"
+                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {names}")
         if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
             raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
         if both := neumann.keys() & robin.keys():
