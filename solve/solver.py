@@ -13,7 +13,7 @@ from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 
 from .assembly import assemble_data, balanced
-from .discretization.on_regions import demand_area
+from .discretization.on_regions import demand_area, demand_supports
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.slab import shared_space
 from .discretization.space import trial_space
@@ -217,6 +217,8 @@ def check_problem(body: BSplineVolume | MultiPatch, problem: BoundaryValueProble
         loads.append(load)
         faces += [face for face in matrix.faces.values() if isinstance(face, WeakFace)]
     demand_area(problem, faces, patches[0].space, [patch.volume for patch in patches])
+    if problem.fixes_nothing and problem.conditions:
+        demand_supports(problem, faces, patches[0].space, [patch.volume for patch in patches])
     if problem.fixes_nothing and not problem.form.has_reaction:
         unknowns = unknowns_of([patch.space for patch in patches], as_multipatch(body).interfaces)
         balanced(unknowns.collect(loads), unknowns, patches[0].space)

@@ -344,10 +344,13 @@ def _demand_held(body: MultiPatch, problem: BoundaryValueProblem, systems: Seque
     for numbers in parts:
         part = [systems[number] for number in numbers]
         faces = [face for system in part for face in system.weak]
-        if problem.conditions and not any(system.space.dirichlet for system in part):
-            demand_supports(problem, faces, space, [system.volume for system in part])
+        named = ", ".join(f"p{number}" for number in numbers)
+        try:
+            if problem.conditions and not any(system.space.dirichlet for system in part):
+                demand_supports(problem, faces, space, [system.volume for system in part])
+        except ValueError as error:
+            raise ValueError(f"{named}: {error}" if len(parts) > 1 else str(error)) from None
         if len(parts) > 1 and all(block is not None and block.singular for system in part for block in system.blocks):
-            named = ", ".join(f"p{number}" for number in numbers)
             raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
 
 

@@ -190,7 +190,7 @@ def test_a_part_that_nothing_holds_is_named():
     apart = iga_nn.MultiPatch.from_patches([box((0, 0, 0)), box((2, 0, 0))])
     with pytest.raises(ValueError, match="nothing fixes the solution on p1, a part of its own"):
         iga_nn.solve(apart, iga_nn.Poisson(source="0", value={"p0_u0": "1"}))
-    with pytest.raises(ValueError, match="no support holds the body|free to move"):
+    with pytest.raises(ValueError, match="p1: no support holds the body"):
         iga_nn.solve(apart, iga_nn.Elasticity(fix="p0_u0", load={"p1_u1": (1, 0, 0)}))
     both = iga_nn.solve(apart, iga_nn.Poisson(exact="x*y"))
     assert both.report.converged and both.report.l2_relative < 1e-6
