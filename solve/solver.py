@@ -177,21 +177,13 @@ def _on_patches(
     body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions
 ) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
     """Return the problem placed in the body, and the problem on each patch."""
-    glued = as_multipatch(body)
+    glued, several = as_multipatch(body), isinstance(body, MultiPatch)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
-    if isinstance(body, MultiPatch) and options.comm is not None and options.comm.size > 1:
+    if several and options.comm is not None and options.comm.size > 1:
         raise ValueError("a body of several patches is solved by one process: leave comm out")
-    placed, several = problem.on(body), isinstance(body, MultiPatch)
-    outer = {face_label(i, face) for i, faces in enumerate(glued.outer) for face in faces if several}
-    if unknown := sorted(problem.patch_faces - outer):
-        raise ValueError(
-            f"{unknown[0]} is no outer face of the body; its faces are {', '.join(sorted(outer)) or 'u0 to w1'}"
-        )
-    for name, numbers in problem.by_patch.items() if several else ():
-        if beyond := sorted(numbers - set(range(len(glued))), key=str):
-            raise ValueError(f"{name}: there is no patch {beyond[0]!r}; the body has {len(glued)}, from 0 on")
-    patches = []
+    _demand_known_patches(glued, problem, several)
+    placed, patches = problem.on(body), []
     for i, (volume, faces) in enumerate(zip(glued.patches, glued.outer, strict=True)):
         own = placed.on_patch(i, faces) if several else placed
         space = trial_space(volume, options.refine, options.degree, own.dirichlet, faces)
@@ -199,6 +191,20 @@ def _on_patches(
         rings = tuple(way for way in own_ways if way is not None)
         patches.append(PatchProblem(volume, own, replace(space, periodic=rings)))
     return placed, patches
+
+
+def _demand_known_patches(body: MultiPatch, problem: BoundaryValueProblem, several: bool) -> None:
+    """Raise ValueError for data of faces that are not outer faces of the body, and of patches that it does not have.
+
+    several: whether faces are called by their patches, too, as "p2_u0".
+    """
+    outer = {face_label(i, face) for i, faces in enumerate(body.outer) for face in faces if several}
+    if unknown := sorted(problem.patch_faces - outer):
+        faces = ", ".join(sorted(outer)) or "u0 to w1"
+        raise ValueError(f"{unknown[0]} is no outer face of the body; its faces are {faces}")
+    for name, numbers in problem.by_patch.items() if several else ():
+        if beyond := sorted(numbers - set(range(len(body))), key=str):
+            raise ValueError(f"{name}: there is no patch {beyond[0]!r}; the body has {len(body)}, from 0 on")
 
 
 def check_problem(body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, comm: Any = None) -> None:

@@ -42,7 +42,7 @@ def test_one_patch_is_written_as_a_volume(tmp_path):
         ("interfaces", lambda rows: rows[:, :6], "interfaces must have 7 whole numbers a row"),
         ("interfaces", lambda rows: 1.0 * rows, "interfaces must have 7 whole numbers a row"),
         ("interfaces", lambda rows: rows + [0, 6, 0, 0, 0, 0, 0], "faces are 0 to 5"),
-        ("interfaces", lambda rows: rows - [9, 0, 0, 0, 0, 0, 0], "there is no such face"),
+        ("interfaces", lambda rows: rows - [9, 0, 0, 0, 0, 0, 0], "there are 3 patches, from 0 on"),
         ("interfaces", lambda rows: np.concatenate([rows, rows]), "is glued twice"),
         ("p1_control_points", lambda points: points + 1e-9, "the control points or weights of the two faces differ"),
         ("p1_control_points", lambda points: points * np.nan, "patch 1: control_points must be finite"),

@@ -24,6 +24,7 @@ from ..forms.mass import WithMass
 from . import kernels
 from .quadrature import GaussRule, geometry_planes, operator_rule
 from .space import TrialSpace
+from .unknowns import Window
 
 
 class FaceTerm(Protocol):
@@ -99,12 +100,8 @@ class MatrixFree:
 
     def apply_free(self, free: Array) -> Array:
         """Return the product restricted to this process's free coefficients, of shape (c, ..) or (..)."""
-        full = np.zeros((*free.shape[:-3], *self.space.shape))
-        full[..., *self.space.window] = free
-        self.space.fill(full)
-        result = self.apply(full)
-        self.space.add(result)
-        return np.ascontiguousarray(result[..., *self.space.window])
+        window = Window(self.space)
+        return window.collect([self.apply(*window.spread(free))])
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
         """Add the part of some points of u to the product with coefficients (c, n_u, n_v, n_w)."""
