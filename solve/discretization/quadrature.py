@@ -14,7 +14,7 @@ from scipy.sparse import csr_array, hstack
 from scipy.sparse.linalg import splu
 
 from parameterize.arrays import Array, Knots
-from parameterize.spline.bspline import basis_derivatives, gauss_points, greville, midpoints, sparse_rows
+from parameterize.spline.bspline import basis_derivatives, breakpoints, gauss_points, greville, midpoints, sparse_rows
 from parameterize.spline.volume import BSplineVolume
 
 from ..field import Points
@@ -27,6 +27,7 @@ SPARE_POINTS = (0, 1, 2)  # the numbers of further points with which it is tried
 LARGEST_STEP = 0.4  # of a weight over itself, and of a point over the distance to its neighbour
 QUADRATURES = ("spline", "gauss", "gauss+1")
 SAMPLES = 6  # places a direction, each three neighbouring spans, at which a map is measured
+MANY_POINTS = 4  # degree from which on the rules of spline spaces suffice beside glued faces
 LIMIT = 0.03  # trained maps reach 0.06 and more after two refinements, the twisted cube 0.02 with 14 elements
 TIMES = (1.0, 2.0, 2.0, 1.0, 2.0, 1.0)  # number of times that each of the six entries stands in a symmetric matrix
 
@@ -96,8 +97,8 @@ def operator_rule(space: TrialSpace, quadrature: str, rough: bool = True) -> Gau
         return gauss_rule(space)
     if quadrature == "gauss+1":
         return gauss_rule(space, [degree + 1 for degree in space.degrees])
-    each = zip(space.whole.knots, space.degrees, space.gauss_points, strict=True)
-    return _tensor_rule(space, [_fewest_points(*direction, rough) for direction in each])
+    each = zip(space.whole.knots, space.degrees, space.gauss_points, space.glued_ends, strict=True)
+    return _tensor_rule(space, [_with_ends(*direction, rough) for direction in each])
 
 
 def rule_of(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array], quadrature: str) -> GaussRule:
@@ -106,6 +107,29 @@ def rule_of(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points],
     tensor: the law's tensor, as in `is_rough`. quadrature: a name, as in `operator_rule`.
     """
     return operator_rule(space, quadrature, quadrature == "spline" and is_rough(volume, space.whole, tensor))
+
+
+def _with_ends(knots: Array, degree: int, gauss: int, glued: tuple[bool, bool], rough: bool) -> tuple[Array, Array]:
+    """Return points and weights of a direction; spans beside a glued face have degree + 1 Gauss points.
+
+    glued: whether the first and the last face is glued: there the solution is only continuous. With the points of
+    `_fewest_points` everywhere, errors on the frame of 20 patches with one face held were 67 % larger at degree 2 and
+    20 % at degree 3, with these spans 19 % and 4 %; from degree 4 on nothing is gained.
+    """
+    breaks = breakpoints(knots)
+    first, last = int(glued[0]), len(breaks) - 1 - int(glued[1])
+    if degree >= MANY_POINTS or not any(glued):
+        return _fewest_points(knots, degree, gauss, rough)
+    if first >= last:
+        return gauss_on_spans(knots, degree + 1)
+    low, high = breaks[first], breaks[last]
+    inner = knots[(knots > low) & (knots < high)]
+    middle = _fewest_points(np.concatenate([[low] * (degree + 1), inner, [high] * (degree + 1)]), degree, gauss, rough)
+    points, weights = (
+        np.concatenate([on_spans[:first].ravel(), own, on_spans[last:].ravel()])
+        for on_spans, own in zip(gauss_points(knots, degree + 1), middle, strict=True)
+    )
+    return points, weights
 
 
 def _fewest_points(knots: Array, degree: int, gauss: int, rough: bool) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from parameterize.arrays import Array, Knots
 from parameterize.spline.bspline import apply_along, breakpoints, halved, insertion_into
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 Window = tuple[slice, slice, slice]
 
@@ -71,6 +71,11 @@ class TrialSpace:
             degree + int(_is_only_continuous(knots, degree) or len(breakpoints(knots)) == 2)
             for knots, degree in zip(self.whole.knots, self.degrees, strict=True)
         )
+
+    @property
+    def glued_ends(self) -> list[tuple[bool, bool]]:
+        """Return for each direction whether its first and its last face is glued to another face."""
+        return [(f"{axis}0" not in self.outer, f"{axis}1" not in self.outer) for axis in AXES]
 
     @property
     def is_only_continuous(self) -> bool:
