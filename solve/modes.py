@@ -14,7 +14,7 @@ from parameterize.arrays import Array
 from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.display import Brief
 from parameterize.files import save_arrays
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.multipatch import MultiPatch, as_multipatch, size_of
 from parameterize.spline.volume import BSplineVolume
 
 from .diagnostics import ConvergenceError
@@ -198,7 +198,7 @@ def _stiffness(body: BSplineVolume | MultiPatch, law: BoundaryValueProblem) -> f
     glued, placed = as_multipatch(body), law.on(body)
     own = placed.on_patch(0, glued.outer[0]) if isinstance(body, MultiPatch) else placed
     x = glued.patches[0].grid([0.5], [0.5], [0.5]).reshape(3, 1)
-    length = np.ptp(np.concatenate([patch.control_points.reshape(-1, 3) for patch in glued]), axis=0).max()
+    length = size_of(glued)
     return float(own.form.tensor(x)[0, 0] / length**2)
 
 

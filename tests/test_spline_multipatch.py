@@ -6,6 +6,7 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
+from bodies import turned
 from cube_grids import box, frame, plate, ring, two
 
 import iga_nn
@@ -13,14 +14,6 @@ from iga_nn import BSplineVolume, Interface, MultiPatch
 from parameterize.spline.bspline import greville
 from parameterize.spline.interface import face_layer
 from parameterize.spline.multipatch import shared_numbers
-
-
-def turned(volume, axes, flips):
-    """The same body under other parameters: directions exchanged and reversed."""
-    points, knots = volume.control_points.transpose(*axes, 3), [volume.knots[a] for a in axes]
-    points = points[tuple(slice(None, None, -1 if flip else 1) for flip in flips)]
-    knots = [1.0 - row[::-1] if flip else row for row, flip in zip(knots, flips, strict=True)]
-    return BSplineVolume(tuple(volume.degrees[a] for a in axes), tuple(knots), points)
 
 
 def uneven(corner):

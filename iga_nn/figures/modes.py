@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from parameterize.spline.multipatch import as_multipatch
+from parameterize.spline.multipatch import as_multipatch, size_of
 from solve import Modes
 
 from .evaluate import Body, all_grids, fields_on, flat, outer_faces
@@ -22,7 +22,7 @@ def draw_modes(path: str | Path | None, body: Body, modes: Modes) -> Figure:
     shown = list(zip(modes.frequencies, modes.shapes, strict=True))[:MOST]
     figure, axes = panels_of(-(-len(shown) // COLUMNS), min(COLUMNS, len(shown)))
     volumes, grids = as_multipatch(body).patches, all_grids(SAMPLES)
-    size = float(np.ptp(np.concatenate([patch.control_points.reshape(-1, 3) for patch in volumes]), axis=0).max())
+    size = size_of(volumes)
     faces = [(k // len(grids), grids[k % len(grids)]) for k in outer_faces(body)]
     still = [flat(volumes[number].grid(*grid)) for number, grid in faces]
     for panel, (frequency, shape) in zip(axes.flat, shown, strict=False):

@@ -7,7 +7,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.spline.interface import Face, face_label, face_layer, gap, orientations
-from parameterize.spline.multipatch import FLAT, TOLERANCE, MultiPatch, net_area
+from parameterize.spline.multipatch import FLAT, TOLERANCE, MultiPatch, net_area, size_of
 from parameterize.spline.volume import LARGEST, BSplineVolume
 
 log = logging.getLogger(__name__)
@@ -92,7 +92,7 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
             apart = min(gap(body.patches, way) for way in orientations(faces[0], faces[-1]))
             reason = "or weights do not fit together"
             if np.isfinite(apart):
-                share = apart / _size(body)
+                share = apart / size_of(body)
                 close = f"; load_volume(path, tolerance={1.1 * share:.1e}) makes them one" if share < CLOSE else ""
                 reason = f"are {apart:.3g} apart, {share:.1e} of the body's size{close}"
             raise ValueError(f"interface {names}: the file says that they are one, but their control points {reason}")
@@ -104,9 +104,4 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
 def _has_area(body: MultiPatch, face: Face) -> bool:
     """Return whether a face is a surface, and not shrunk to an edge or a point, where nothing is glued."""
     net = face_layer(body.patches[face[0]].control_points, face[1])
-    return net_area(net) > FLAT * _size(body) ** 2
-
-
-def _size(body: MultiPatch) -> float:
-    points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in body])
-    return float(np.ptp(points, axis=0).max())
+    return net_area(net) > FLAT * size_of(body) ** 2

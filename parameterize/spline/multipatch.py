@@ -1,6 +1,6 @@
 """Defines MultiPatch: spline volumes glued along whole faces, and the numbers of the control points that they share."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Real
@@ -110,8 +110,7 @@ class MultiPatch(Brief, Shown):
             demand_volume(patch)
         if not (isinstance(tolerance, Real) and 0.0 <= tolerance < 1.0):
             raise ValueError(f"tolerance must be a share of the body's size, from 0 to 1, got {tolerance!r:.80}")
-        points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in given])
-        size = float(np.ptp(points, axis=0).max())
+        size = size_of(given)
         found = tuple(_interfaces(given, tolerance * size, size))
         labels, _ = shared_numbers([patch.shape for patch in given], found)
         return cls(_merged(given, labels), found)
@@ -178,8 +177,7 @@ class MultiPatch(Brief, Shown):
         They are not glued: `from_patches` does so with a larger tolerance. Faces farther apart than NEAR times the
         default tolerance are not looked at.
         """
-        points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in self.patches])
-        size = float(np.ptp(points, axis=0).max())
+        size = size_of(self.patches)
         try:
             found = list(_interfaces(self.patches, NEAR * TOLERANCE * size, size))
         except ValueError:  # faces that from_patches would refuse: they are no pair
@@ -206,6 +204,16 @@ class MultiPatch(Brief, Shown):
 
     def __iter__(self) -> Iterator[BSplineVolume]:
         return iter(self.patches)
+
+
+def all_control_points(patches: Iterable[BSplineVolume]) -> Array:
+    """Return the control points (m, 3) of patches, those on interfaces once for each patch."""
+    return np.concatenate([patch.control_points.reshape(-1, 3) for patch in patches])
+
+
+def size_of(patches: Iterable[BSplineVolume]) -> float:
+    """Return the longest side of the box of all control points."""
+    return float(np.ptp(all_control_points(patches), axis=0).max())
 
 
 def as_multipatch(body: BSplineVolume | MultiPatch) -> MultiPatch:
@@ -249,7 +257,7 @@ def _merged(patches: Sequence[BSplineVolume], labels: Sequence[IntArray]) -> tup
     Its weight goes with it, except to patches whose weights there are other ones by a factor.
     """
     every = np.concatenate([label.ravel() for label in labels])
-    points = np.concatenate([patch.control_points.reshape(-1, 3) for patch in patches])
+    points = all_control_points(patches)
     _, first = np.unique(every, return_index=True)
     own = [np.ones(patch.shape) if patch.weights is None else patch.weights for patch in patches]
     chosen, weights = points[first], np.concatenate([row.ravel() for row in own])[first]

@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation
+from parameterize.spline.interface import axis_side
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import Points
@@ -108,7 +109,7 @@ def has_face(space: TrialSpace, name: str) -> bool:
 
 def face_rule(volume: BSplineVolume, space: TrialSpace, name: str) -> FaceRule:
     """Return the rule of a face, one of FACE_NAMES."""
-    axis, side = divmod(FACE_NAMES.index(name), 2)
+    axis, side = axis_side(name)
     rule = gauss_rule(space, [degree + 1 for degree in space.degrees])
     b, c = (a for a in range(3) if a != axis)
     points, area = face_geometry(volume, rule.points, axis, side)

@@ -12,8 +12,9 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation
+from parameterize.spline.interface import axis_side
 from parameterize.spline.rational import Orders, quotients
-from parameterize.spline.volume import AXES, FACE_NAMES, UNITS, BSplineVolume
+from parameterize.spline.volume import AXES, UNITS, BSplineVolume
 
 from ..field import Points
 from ..forms.boundary_value_problem import BoundaryValueProblem
@@ -109,7 +110,7 @@ def _from_face(
     A wave on a face, whose factor in the law is S, decays like exp(-k t) along the parameter t across the face, where
     k^2 times the factor of t's own direction is S.
     """
-    axis, side = divmod(FACE_NAMES.index(face), 2)
+    axis, side = axis_side(face)
     counts = [1 if a == axis else degree + 2 for a, degree in enumerate(space.degrees)]
     rule, one = gauss_rule(space, counts), np.ones(1)
     u, v, w = (float(side) * one if a == axis else rule.points[a] for a in range(3))

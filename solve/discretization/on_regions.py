@@ -11,6 +11,8 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array, in_brackets
 from parameterize.spline.bspline import basis_derivatives, breakpoints, sparse_rows
+from parameterize.spline.interface import axis_side
+from parameterize.spline.multipatch import all_control_points, size_of
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import Points
@@ -43,7 +45,7 @@ def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: Tria
     found = []
     for name in FACE_NAMES:
         if name not in space.dirichlet and has_face(space, name):
-            axis, side = divmod(FACE_NAMES.index(name), 2)
+            axis, side = axis_side(name)
             rule = surface_rule(volume, space, axis, side, _coder(problem, name))
             if rule is not None:
                 found.append(_Builder(volume, problem, space, name, rule).face())
@@ -57,7 +59,7 @@ def demand_area(problem: BoundaryValueProblem, faces: Sequence[WeakFace], space:
     """
     for i, condition in enumerate(problem.conditions):
         if not condition.is_strong and space.total(sum(face.weights[face.holds(i)].sum() for face in faces)) == 0.0:
-            points = np.concatenate([volume.control_points.reshape(-1, 3) for volume in volumes])
+            points = all_control_points(volumes)
             low, high = (in_brackets(ends.tolist()) for ends in (points.min(axis=0), points.max(axis=0)))
             raise ValueError(
                 f"{condition.role}: no part of the boundary lies there; the body lies between {low} and {high}"
@@ -77,8 +79,7 @@ def demand_supports(
         return
     if area == 0.0:
         raise ValueError("no support holds the body: give fix, roller, symmetry or spring")
-    points = np.concatenate([volume.control_points.reshape(-1, 3) for volume in volumes])
-    size = float(np.ptp(points, axis=0).max())
+    size = size_of(volumes)
     middle = space.total(sum(face.x @ weights for face, weights in zip(faces, holding, strict=True))) / area
     gram = 0.0
     for face in faces:
@@ -124,7 +125,7 @@ class _Builder:
         projector, given = self._held(x, normal)
         gamma, slowest = self._gamma(x, normal)
         loads, factor = self._natural(x, normal, projector)
-        axis, side = divmod(FACE_NAMES.index(self.name), 2)
+        axis, side = axis_side(self.name)
         tables, slope = self._tables(axis, side)
         ends = [tuple(-end if a == axis else slice(None) for a in range(3)) for end in ((1, 2) if side else (0, -1))]
         inside = np.einsum("ccm->m", projector) > 0.5
@@ -237,7 +238,7 @@ class _Builder:
         largest eigenvalue of the law's matrix n . C . n (a polynomial of degree p on [0, 1] has f(0)^2 <= (p + 1)^2 int
         f^2), times a factor for the map's change across the span.
         """
-        at, (axis, side) = self.rule.at, divmod(FACE_NAMES.index(self.name), 2)
+        at, (axis, side) = self.rule.at, axis_side(self.name)
         strength = np.linalg.eigvalsh(self.problem.form.matrix_along(normal, x))[..., -1]
         breaks = breakpoints(self.space.whole.knots[axis])
         span = breaks[-1] - breaks[-2] if side else breaks[1] - breaks[0]

@@ -192,8 +192,3 @@ def unknowns_of(spaces: Sequence[TrialSpace], interfaces: Sequence[Interface]) -
     if len(spaces) == 1 and not interfaces:
         return Window(spaces[0])
     return Glued.of(spaces, interfaces)
-
-
-def vertex_numbers(count: int, interfaces: Sequence[Interface]) -> tuple[tuple[IntArray, ...], int]:
-    """Return for each of `count` patches the numbers (2, 2, 2) of its vertices, and how many vertices a body has."""
-    return shared_numbers([(2, 2, 2)] * count, interfaces)

@@ -13,12 +13,12 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import greville
-from parameterize.spline.interface import Interface
-from parameterize.spline.volume import FACE_NAMES
+from parameterize.spline.interface import Interface, face_layer
+from parameterize.spline.multipatch import shared_numbers
 
 from ..discretization.operator import Operator
 from ..discretization.space import TrialSpace
-from ..discretization.unknowns import Glued, vertex_numbers
+from ..discretization.unknowns import Glued
 from .preconditioner import FastDiagonalization
 
 RANK = 1e-10  # of the largest eigenvalue of the coarse matrix: smaller ones belong to motions that nothing resists
@@ -73,13 +73,11 @@ class Coarse:
     @classmethod
     def of(cls, unknowns: Glued, operators: Sequence[Operator], interfaces: Sequence[Interface]) -> "Coarse":
         """Return the coarse solve of the operators of one component on the patches."""
-        numbers, count = vertex_numbers(len(operators), interfaces)
-        corners = [
-            np.asarray(own[:: len(own) - 1, :: own.shape[1] - 1, :: own.shape[2] - 1]) for own in unknowns.numbers
-        ]
+        numbers, count = shared_numbers([(2, 2, 2)] * len(operators), interfaces)
         fixed = np.zeros(count, dtype=bool)
-        for own, corner in zip(numbers, corners, strict=True):
-            fixed[own] |= unknowns.fixed[corner]
+        for own, coefficients in zip(numbers, unknowns.numbers, strict=True):
+            n_u, n_v, n_w = coefficients.shape
+            fixed[own] |= unknowns.fixed[coefficients[:: n_u - 1, :: n_v - 1, :: n_w - 1]]
         free = count - int(fixed.sum())
         order = np.where(fixed, free, np.cumsum(~fixed) - 1)
         vertices = [order[own] for own in numbers]
@@ -139,7 +137,6 @@ def _galerkin(operator: Operator) -> Array:
     small = replace(operator, space=TrialSpace((1, 1, 1), (ends, ends, ends), ()), faces={})
     matrix = np.stack([small.apply(unit.reshape(2, 2, 2)).ravel() for unit in np.eye(8)])
     for name, face in operator.faces.items():
-        axis, side = divmod(FACE_NAMES.index(name), 2)
-        on_face = np.take(np.arange(8).reshape(2, 2, 2), side, axis=axis).ravel()
+        on_face = face_layer(np.arange(8).reshape(2, 2, 2), name).ravel()
         matrix[on_face, on_face] += 0.25 * face.stiffness(operator.component)
     return matrix
