@@ -1,4 +1,4 @@
-"""SampledBoundary: points on the six faces of a trivariate spline, and the triangles between them."""
+"""SampledBoundary: points on the faces of a body's boundary, and the triangles between them."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from .bspline import breakpoints, divided_spans
-from .orientation import FACES
+from .interface import axis_side
+from .multipatch import MultiPatch, as_multipatch
 from .volume import BSplineVolume
 
 SAMPLES = 160  # a direction and cube face, at least
@@ -15,12 +16,16 @@ PER_SPAN = 3  # samples a direction in every span, at least
 
 @dataclass(frozen=True, eq=False)
 class SampledBoundary:
-    """The spline's boundary, sampled on a grid on each face of the cube, and the triangles between the samples."""
+    """The boundary of a body, sampled on a grid on each face that is not glued, and the triangles between the samples.
 
-    parameters: Array  # (n, 3), face after face in the order of FACE_NAMES
+    A face has the number 6 * patch + face, in the order of FACE_NAMES.
+    """
+
+    parameters: Array  # (n, 3), face after face
     points: Array  # (n, 3)
     triangles: IntArray  # (m, 3), wound outwards where F keeps orientation
     cube_faces: IntArray  # (m,) of the triangles
+    sample_faces: IntArray  # (n,) of the samples
 
     @classmethod
     def of(cls, volume: BSplineVolume, samples: int = SAMPLES) -> "SampledBoundary":
@@ -38,19 +43,23 @@ class SampledBoundary:
         return cls.on(volume, u, v, w)
 
     @classmethod
-    def on(cls, volume: BSplineVolume, *rows: Array) -> "SampledBoundary":
-        """Sample all six faces at three rows of parameters, each from 0 to 1."""
-        parameters, points, triangles, cube_faces, count = [], [], [], [], 0
-        for k, (axis, side) in enumerate(FACES):
-            u, v, w = (np.array([float(side)]) if d == axis else row for d, row in enumerate(rows))
-            parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
-            points.append(volume.grid(u, v, w).reshape(-1, 3))
-            face = _halved_cells(*(len(row) for d, row in enumerate(rows) if d != axis))
-            inwards = (side == 1) == (axis == 1)  # (u, w) is left-handed seen along v
-            triangles.append(count + (face[:, ::-1] if inwards else face))
-            cube_faces.append(np.full(len(face), k))
-            count += len(parameters[-1])
-        return cls(*(np.concatenate(parts) for parts in (parameters, points, triangles, cube_faces)))
+    def on(cls, body: BSplineVolume | MultiPatch, *rows: Array) -> "SampledBoundary":
+        """Sample all faces of the boundary at three rows of parameters, each from 0 to 1; patches keep orientation."""
+        body = as_multipatch(body)
+        parameters, points, triangles, cube_faces, sample_faces, count = [], [], [], [], [], 0
+        for patch, (volume, names) in enumerate(zip(body, body.outer, strict=True)):
+            for axis, side in map(axis_side, names):
+                u, v, w = (np.array([float(side)]) if d == axis else row for d, row in enumerate(rows))
+                parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
+                points.append(volume.grid(u, v, w).reshape(-1, 3))
+                face = _halved_cells(*(len(row) for d, row in enumerate(rows) if d != axis))
+                inwards = (side == 1) == (axis == 1)  # (u, w) is left-handed seen along v
+                triangles.append(count + (face[:, ::-1] if inwards else face))
+                number = 6 * patch + 2 * axis + side
+                cube_faces.append(np.full(len(face), number))
+                sample_faces.append(np.full(len(parameters[-1]), number))
+                count += len(parameters[-1])
+        return cls(*(np.concatenate(parts) for parts in (parameters, points, triangles, cube_faces, sample_faces)))
 
 
 def _halved_cells(n_a: int, n_b: int) -> IntArray:

@@ -21,6 +21,7 @@ from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
 from ..progress import timed
+from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
@@ -74,8 +75,9 @@ class Task:
         coarse: the number of spans a direction in the first rounds, as a share of that in the last rounds.
         """
         spline = self.config.spline
+        nets = Nets(spline.degree, (coarse_knots(spline, coarse),))
         return SurfaceFit(
-            SlidingParameters(coarse_knots(spline, coarse), spline.degree, layout.places, layout.faces),
+            SlidingParameters(nets, layout.places, triangles=layout.faces),
             layout.points,
             vertex_quadrics(layout.points, layout.faces, TANGENTIAL),
             vertex_weights(layout.points, layout.faces, layout.n_own),
