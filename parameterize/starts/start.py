@@ -21,6 +21,8 @@ from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
 from ..progress import timed
+from ..skeleton.graph import Skeleton
+from ..skeleton.solid import skeleton_of
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
@@ -28,7 +30,7 @@ from ..surface.surface import Surface
 
 _log = logging.getLogger(__name__)
 
-Origin = Literal["network", "growth", "extension"]
+Origin = Literal["network", "growth", "extension", "blocks"]
 MOST_POINTS = (
     30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
 )
@@ -62,6 +64,11 @@ class Task:
         """Return the vertices (n, 3) and the faces (m, 3) of the surface at volume 1, with long edges cut."""
         longest = self.config.spline.longest_edge
         return subdivide_finely(self.surface.unit_vertices, self.surface.faces, longest, self.own + MOST_POINTS)
+
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        """Return the skeleton of the solid at volume 1. Raises SkeletonError where it has none."""
+        return skeleton_of(self.surface.unit_vertices, self.surface.faces, self.surface.genus)
 
     @cached_property
     def sphere(self) -> CubeLayout:
