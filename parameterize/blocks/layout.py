@@ -1,8 +1,4 @@
-"""Defines Block and BlockLayout: rods and junctions of straight pieces, glued by whole faces, as a start inside a body.
-
-The faces of a block have the names and the order of a patch's: u0, u1, v0, v1, w0, w1. A face is an array of corners
-(2, 2, 3) across a block and (2, m, 3) along it, in the order u, v, w of its two directions.
-"""
+"""Defines BlockLayout: blocks glued by whole faces, a thin start inside a body with handles or limbs."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,52 +6,26 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, Mask
-from ..spline.interface import Face, Interface, face_label, face_layer, orientations, varying
+from ..arrays import Array, IntArray, Mask
+from ..skeleton.graph import Skeleton
+from ..spline.interface import Face, Interface, face_label, orientations, varying
 from ..spline.volume import FACE_NAMES
+from .block import Block
+from .draft import Draft
+from .inside import Body
+from .rings import PARTS
+from .rods import Rod
+from .splitting import split
+
+__all__ = ["Block", "BlockLayout", "LayoutError", "block_layout"]
+
+SPANS = 6  # across each block
+_LONGEST = 4  # times the spans across: those along a rod at most
+_REPAIRS = 40  # rounds in which what is folded, or leaves the body, is made thinner
 
 
-@dataclass(frozen=True, eq=False)
-class Block:
-    """A rod of quadrilateral sections: bilinear across it, linear from each section to the next.
-
-    Attributes
-    ----------
-    name : str
-        What it is of the body, for messages and reports.
-    sections : (m, 2, 2, 3) array
-        The corners [u][v] of m >= 2 sections, evenly spaced in w from 0 to 1, at volume 1. (u, v, w) is right-handed.
-    spans : three int
-        The number of knot spans along u, v and w.
-    """
-
-    name: str
-    sections: Array
-    spans: tuple[int, int, int]
-
-    def __post_init__(self) -> None:
-        if len(self.sections) < 2 or self.sections.shape[1:] != (2, 2, 3):
-            raise ValueError(f"block {self.name}: sections must be (m >= 2, 2, 2, 3), got {self.sections.shape}")
-        if min(self.spans) < 1:
-            raise ValueError(f"block {self.name}: each direction needs one span or more, got {self.spans}")
-
-    def face(self, name: str) -> Array:
-        """Return the corners of a face: (2, 2, 3) of w0 and w1, (2, m, 3) of the others."""
-        return face_layer(np.moveaxis(self.sections, 0, 2), name)
-
-    def points(self, places: Array) -> Array:
-        """Return the points (..., 3) at parameters (..., 3) in the unit cube."""
-        u, v, w = np.moveaxis(places, -1, 0)[..., None]
-        last = len(self.sections) - 2
-        below = np.clip((w[..., 0] * (last + 1)).astype(np.int64), 0, last)
-        along = w * (last + 1) - below[..., None]
-        corners = self.sections[below], self.sections[below + 1]
-        low, high = (
-            (1 - u) * ((1 - v) * c[..., 0, 0, :] + v * c[..., 0, 1, :])
-            + u * ((1 - v) * c[..., 1, 0, :] + v * c[..., 1, 1, :])
-            for c in corners
-        )
-        return np.asarray((1 - along) * low + along * high)
+class LayoutError(ValueError):
+    """Says in one line why no start of blocks fits into a body, and what can be done."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +81,47 @@ class BlockLayout:
 
     def __len__(self) -> int:
         return len(self.blocks)
+
+
+def block_layout(skeleton: Skeleton, vertices: Array, faces: IntArray, spans: int = SPANS) -> BlockLayout:
+    """Return a thin start inside a body: rods along the branches of its skeleton, a block at each junction.
+
+    Limbs have closed ends in their tips. The faces that are not glued form one closed surface of the body's genus.
+
+    skeleton: of the body, in the same units. vertices, faces: (n, 3), (m, 3) the surface, wound outward. spans: the
+    number of knot spans across each block; along a rod they are as long as across, up to four times as many.
+
+    Raises LayoutError for a skeleton without branches, and where blocks stay folded, or outside, however thin.
+    """
+    if not skeleton.branches:
+        raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
+    body = Body(vertices, faces)
+    draft = Draft(split(skeleton, body), body)
+    for _ in range(_REPAIRS):
+        faults = draft.repaired()
+        if not faults:
+            break
+    else:
+        raise LayoutError(f"no start of blocks fits into the body: {faults[0]}; make that part of the surface thicker")
+    return BlockLayout.from_blocks(list(_blocks(draft, spans)))
+
+
+def _blocks(draft: Draft, spans: int) -> Iterator[Block]:
+    """Yield the junctions, then the rods of a draft."""
+    for node in draft.junctions:
+        yield Block(f"junction {node}", np.moveaxis(draft.corners(node), 2, 0), (spans, spans, spans))
+    for number, rod in draft.rods.items():
+        sections = draft.sections(number)
+        parts = PARTS if number in draft.quarters else 1
+        step = (len(sections) - 1) // parts
+        for k in range(parts):
+            name = f"rod {number}" if parts == 1 else f"rod {number}, part {k}"
+            yield Block(name, sections[k * step : (k + 1) * step + 1], (spans, spans, _spans_along(rod, parts, spans)))
+
+
+def _spans_along(rod: Rod, parts: int, spans: int) -> int:
+    """Return the spans along a part of a rod: as long as those across."""
+    return int(np.clip(round(spans * rod.length / (parts * rod.body_width)), spans, _LONGEST * spans))
 
 
 def _interfaces(blocks: Sequence[Block]) -> Iterator[Interface]:
