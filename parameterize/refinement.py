@@ -26,7 +26,7 @@ from .optimization.spans import in_blocks
 from .optimization.surface_distance import SurfaceFit
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
-from .quality.quality import arap_grid
+from .quality.distortion import arap_grid
 from .quality.two_sided import two_sided
 from .spline.bspline import breakpoints, midpoints
 from .spline.spline_map import SplineMap
