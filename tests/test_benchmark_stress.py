@@ -65,6 +65,14 @@ def test_each_kind_is_a_sound_surface(number):
     assert len(surface.crossings) == 0 and 1500 <= len(surface.faces) <= 3000
 
 
+@pytest.mark.parametrize("number", [1006, 1009, 1011])
+def test_the_later_kinds_have_limbs_and_handles(number):
+    vertices, faces = shapes["hard_triangles"](number)
+    euler = len(vertices) - len(faces) // 2
+    assert euler == 2 - 2 * shapes["genus_of"](number) and 4000 <= len(faces) <= 8000
+    assert len(np.unique(faces)) == len(vertices)
+
+
 def test_equal_numbers_are_equal_shapes_and_others_are_not():
     kind, triangles = stress.KINDS.index("spiky"), shapes["_triangles"]
 
@@ -77,7 +85,10 @@ def test_equal_numbers_are_equal_shapes_and_others_are_not():
 
 def test_kinds_take_turns(tmp_path):
     kinds = [stress.kind_of(number) for number in range(40)]
-    assert {kinds.count(kind) for kind in stress.KINDS} == {4}
+    assert {kinds.count(kind) for kind in shapes["FIRST_KINDS"]} == {4}
+    assert [stress.kind_of(number) for number in range(1000, 1004)] == ["limbed", "graph"] * 2
+    assert [shapes["genus_of"](number) for number in range(1000, 1020, 2)] == [0] * 10
+    assert sorted(shapes["genus_of"](number) for number in range(1001, 1081, 2)) == sorted([*range(1, 9)] * 5)
     chosen = stress._options(["--count", "16", "--kinds", "thin", "long", "--out", str(tmp_path)])
     assert chosen.numbers == (3, 5, 13, 15)
 
@@ -152,7 +163,13 @@ def test_a_shape_that_cannot_be_made_is_a_row(formula, monkeypatch):
 
 
 def test_bad_arguments_are_one_line(tmp_path, capsys):
-    for given, word in ((("--count", "0"), "--count 0"), (("--kinds", "round"), "round"), (("--jobs", "0"), "--jobs")):
+    refused = (
+        (("--count", "0"), "--count 0"),
+        (("--kinds", "round"), "round"),
+        (("--kinds", "graph"), "--first 1000"),
+        (("--jobs", "0"), "--jobs"),
+    )
+    for given, word in refused:
         with pytest.raises(SystemExit) as stop:
             stress.main([*given, "--out", str(tmp_path)])
         assert stop.value.code == 2 and word in capsys.readouterr().err

@@ -1,8 +1,10 @@
-"""Random closed surfaces of genus 0 that are hard to fill with one cube, made by formula: equal numbers, equal shapes.
+"""Random closed surfaces that are hard to fill, made by formula: equal numbers, equal shapes.
 
-A unit ball is deformed, or parts are joined by their distance fields, and the result is turned at random; its 1 500 to
-3 000 triangles are spread so that they come out even, or evened out afterwards. Where the surface then intersects
-itself, or parts have grown together, the same shape is made anew, milder.
+The first thousand numbers are surfaces of genus 0 that are hard to fill with one cube; from 1000 on there are bodies
+with limbs, and thick graphs of genus 1 to 8. A unit ball is deformed, or parts are joined by their distance fields, and
+the result is turned at random; its 1 500 to 3 000 triangles (4 000 to 8 000 of the later ones) are spread so that they
+come out even, or evened out afterwards. Where the surface then intersects itself, or parts have grown together, the
+same shape is made anew, milder.
 """
 
 from __future__ import annotations
@@ -10,11 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import igl
 import numpy as np
-import pyvista as pv
-from numpy.typing import NDArray
+from distance_fields import Array, Field, IntArray, Triangles, box, capsule, contour, evened, has_genus, joined
 from processes import compute_measured
+from random_bodies import graph, limbed
 from scipy.spatial.transform import Rotation
 
 from iga_nn.batch.task import Task
@@ -23,27 +24,32 @@ from iga_nn.workflow.worker_run import Ended
 from parameterize.surface.surface import MeshError, Surface, surface_from_arrays
 from parameterize.surface.topology import crossing_faces
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Field = Callable[[Array], Array]  # points (n, 3) -> values (n,)
 FINE = 10_000  # points of a ball whose triangles are evened out
 FACES = (1500, 3000)
+ROD_FACES = (4000, 8000)  # the same for rods: some ten around each
 SEED = 2025
 MILDER = 0.85  # of the severity, each time a shape is made anew
 TRIES = 20
 CELL = 0.02  # of the grid on which a distance field's surface is found
+ROD_CELL = 0.04  # the same for rods, whose radius is .08 and more
+LATER = 1000  # from here on the kinds of LATER_KINDS take turns; below, numbers keep their surfaces
+GENERA = 8  # of the thick graphs: 1 to 8 take turns
 
 
 def hard_shape(number: int) -> Surface:
     """Surface `number` (0, 1, ...): kinds take turns; named by number and kind."""
-    kind = kind_of(number)
-    name, severity = f"{number:03d}-{kind}", 1.0
+    return surface_from_arrays(*hard_triangles(number), name_of(number))
+
+
+def hard_triangles(number: int) -> Triangles:
+    """Vertices and faces of surface `number`, of the genus that it is to have and without crossings."""
+    kind, genus, severity = kind_of(number), genus_of(number), 1.0
     for _ in range(TRIES):
-        vertices, faces = _triangles(kind, np.random.default_rng([SEED, number]), severity)
-        if not len(crossing_faces(vertices, faces)) and _is_sphere(faces):
-            return surface_from_arrays(vertices, faces, name)
+        vertices, faces = _triangles(kind, np.random.default_rng([SEED, number]), severity, genus)
+        if not len(crossing_faces(vertices, faces)) and has_genus(faces, genus):
+            return vertices, faces
         severity *= MILDER
-    raise MeshError(f"{name}: intersects itself even after {TRIES} tries")
+    raise MeshError(f"{name_of(number)}: intersects itself even after {TRIES} tries")
 
 
 def compute_shape(task: Task, number: int, batch: str) -> Ended:
@@ -57,30 +63,39 @@ def compute_shape(task: Task, number: int, batch: str) -> Ended:
     return compute_measured(task, number, batch)
 
 
+def name_of(number: int) -> str:
+    """Number and kind."""
+    return f"{number:03d}-{kind_of(number)}"
+
+
 def kind_of(number: int) -> str:
     """One of KINDS."""
-    return KINDS[number % len(KINDS)]
+    kinds = FIRST_KINDS if number < LATER else LATER_KINDS
+    return kinds[number % len(kinds)]
 
 
-def _is_sphere(faces: IntArray) -> bool:
-    """Whether the triangles are one surface without handles."""
-    return bool(igl.euler_characteristic(faces) == 2 and igl.facet_components(faces)[0] == 1)
+def genus_of(number: int) -> int:
+    """Handles of surface `number`."""
+    return 1 + number // len(LATER_KINDS) % GENERA if kind_of(number) == "graph" else 0
 
 
-def _triangles(kind: str, rng: np.random.Generator, severity: float) -> tuple[Array, IntArray]:
+def _triangles(kind: str, rng: np.random.Generator, severity: float, genus: int = 0) -> Triangles:
     """Vertices and faces, deformed and turned, of even edges."""
-    count = int(rng.integers(*FACES))
+    count = int(rng.integers(*(ROD_FACES if kind in LATER_KINDS else FACES)))
     if kind in STRETCH:
         points, faces = _stretched_ball(count // 2 + 2, STRETCH[kind])
         vertices = SHAPES[kind](points, rng, severity)
     else:
         if kind in SOLIDS:
-            fine, faces = _contour(SOLIDS[kind](rng, severity))
+            fine, faces = contour(SOLIDS[kind](rng, severity), CELL)
+        elif kind in LATER_KINDS:
+            solid = graph(rng, severity, genus) if genus else limbed(rng, severity)
+            fine, faces = contour(solid, ROD_CELL)
         else:
             points, faces = ball(FINE)
             fine = SHAPES[kind](points, rng, severity)
-        vertices, faces, *_ = igl.decimate(fine, faces, count, block_intersections=True)
-    return vertices @ Rotation.random(rng=rng).as_matrix(), np.asarray(faces, dtype=np.int64)
+        vertices, faces = evened(fine, faces, count)
+    return vertices @ Rotation.random(rng=rng).as_matrix(), faces
 
 
 def _stretched_ball(count: int, stretch: float) -> tuple[Array, IntArray]:
@@ -93,18 +108,6 @@ def _stretched_ball(count: int, stretch: float) -> tuple[Array, IntArray]:
     radius = np.sqrt(1.0 - x**2)
     points = np.stack([x, radius * np.cos(GOLDEN_ANGLE * k), radius * np.sin(GOLDEN_ANGLE * k)], axis=1)
     return points, outward_hull(points * [stretch, 1.0, 1.0])
-
-
-def _contour(distance: Field) -> tuple[Array, IntArray]:
-    """Vertices and faces of the surface where a distance field, positive outside [-4, 4]^3, is zero."""
-    axis = np.arange(-4.0, 4.0, 4.0 * CELL)
-    near = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    near = near[distance(near) < 8.0 * CELL]
-    low = near.min(axis=0) - 4.0 * CELL
-    counts = np.ceil((near.max(axis=0) + 4.0 * CELL - low) / CELL).astype(int) + 1
-    grid = pv.ImageData(dimensions=counts, spacing=(CELL,) * 3, origin=low)
-    surface = grid.contour([0.0], scalars=distance(np.asarray(grid.points, dtype=np.float64)), method="marching_cubes")
-    return np.asarray(surface.points, dtype=np.float64), surface.faces.reshape(-1, 4)[:, :0:-1].astype(np.int64)
 
 
 # The kinds; severity 1 is the hardest
@@ -176,7 +179,7 @@ def bulb(rng: np.random.Generator, severity: float) -> Field:
     stalk, length = head / (1.0 + severity * rng.uniform(2.0, 5.0)), rng.uniform(0.5, 1.1)
     top = np.array([rng.uniform(-0.4, 0.4), rng.uniform(-0.4, 0.4), body + length + head])
     ends = np.zeros(3), top
-    return _joined(0.06, _capsule(ends[0], ends[0], body), _capsule(*ends, stalk), _capsule(ends[1], ends[1], head))
+    return joined(0.06, capsule(ends[0], ends[0], body), capsule(*ends, stalk), capsule(ends[1], ends[1], head))
 
 
 def fingers(rng: np.random.Generator, severity: float) -> Field:
@@ -184,28 +187,28 @@ def fingers(rng: np.random.Generator, severity: float) -> Field:
     count, radius = int(rng.integers(3, 6)), rng.uniform(0.13, 0.18)
     gap = radius * rng.uniform(0.7, 1.2) / severity
     places = (np.arange(count) - 0.5 * (count - 1)) * (2.0 * radius + gap)
-    palm = _box(np.zeros(3), np.array([places[-1] + 0.5 * radius, radius, rng.uniform(0.4, 0.7)]), 0.8 * radius)
+    palm = box(np.zeros(3), np.array([places[-1] + 0.5 * radius, radius, rng.uniform(0.4, 0.7)]), 0.8 * radius)
     tips = rng.uniform(1.2, 1.9, count)
     lean = rng.uniform(-0.3, 0.3, count) * gap  # of the tips: no two touch
     parts = [
-        _capsule(np.array([x, 0.0, 0.2]), np.array([x + aside, rng.uniform(-0.1, 0.1), tip]), radius)
+        capsule(np.array([x, 0.0, 0.2]), np.array([x + aside, rng.uniform(-0.1, 0.1), tip]), radius)
         for x, tip, aside in zip(places, tips, lean, strict=True)
     ]
-    return _joined(0.04, palm, *parts)
+    return joined(0.04, palm, *parts)
 
 
 def flap(rng: np.random.Generator, severity: float) -> Field:
     """A body with one or two thin wings that lie along it, joined at one end, with a narrow gap."""
     body, length = rng.uniform(0.4, 0.6), rng.uniform(0.6, 1.0)
     thickness, gap = rng.uniform(0.06, 0.1), rng.uniform(0.1, 0.16) / severity
-    parts = [_capsule(np.array([0.0, 0.0, -length]), np.array([0.0, 0.0, length]), body)]
+    parts = [capsule(np.array([0.0, 0.0, -length]), np.array([0.0, 0.0, length]), body)]
     for side in (-1.0, 1.0)[: int(rng.integers(1, 3))]:
         x = side * (body + gap + thickness)
         half = np.array([thickness, rng.uniform(0.25, 0.5), rng.uniform(0.7, 1.0) * length])
-        parts.append(_box(np.array([x, 0.0, -0.1]), half, 0.9 * thickness))
+        parts.append(box(np.array([x, 0.0, -0.1]), half, 0.9 * thickness))
         root = np.array([x, 0.0, half[2] - 0.3])
-        parts.append(_capsule(root * [0.0, 1.0, 1.0], root, 0.2))
-    return _joined(0.03, *parts)
+        parts.append(capsule(root * [0.0, 1.0, 1.0], root, 0.2))
+    return joined(0.03, *parts)
 
 
 def folded(rng: np.random.Generator, severity: float) -> Field:
@@ -229,7 +232,7 @@ def folded(rng: np.random.Generator, severity: float) -> Field:
     def distance(points: Array) -> Array:
         flattened = points * [1.0, 0.0, 1.0]
         across = np.maximum(np.abs(points[:, 1]) - half, 0.0)
-        along = [_capsule(a, b, 0.0)(flattened) for a, b in zip(ends[0], ends[1], strict=False)]
+        along = [capsule(a, b, 0.0)(flattened) for a, b in zip(ends[0], ends[1], strict=False)]
         return np.hypot(np.min(along, axis=0), across) - thickness
 
     return distance
@@ -238,7 +241,9 @@ def folded(rng: np.random.Generator, severity: float) -> Field:
 Shape = Callable[[Array, np.random.Generator, float], Array]
 SHAPES: dict[str, Shape] = {s.__name__: s for s in (bumpy, bent, spiky, thin, flat, long)}
 SOLIDS = {s.__name__: s for s in (bulb, fingers, flap, folded)}
-KINDS = (*SHAPES, *SOLIDS)
+FIRST_KINDS = (*SHAPES, *SOLIDS)
+LATER_KINDS = ("limbed", "graph")
+KINDS = (*FIRST_KINDS, *LATER_KINDS)
 STRETCH = {"bent": 5.0, "long": 10.0, "thin": 0.1, "flat": 0.1}  # about what a kind does to the ball's x axis
 
 
@@ -255,37 +260,6 @@ def _plate(points: Array, thickness: float) -> Array:
     rho = np.hypot(points[:, 1], points[:, 2])
     height = np.sign(points[:, 0]) * np.sqrt(np.clip(1.0 - rho**4, 0.0, 1.0))
     return np.stack([points[:, 1], points[:, 2], thickness * height], axis=1)
-
-
-def _capsule(a: Array, b: Array, radius: float) -> Field:
-    """The distance to all that is nearer than a radius to the segment from a to b; a ball where they are equal."""
-    along = b - a
-    square = max(float(along @ along), 1e-30)
-
-    def distance(points: Array) -> Array:
-        share = np.clip((points - a) @ along / square, 0.0, 1.0)
-        return np.linalg.norm(points - a - share[:, None] * along, axis=1) - radius
-
-    return distance
-
-
-def _box(middle: Array, half: Array, rounding: float) -> Field:
-    """The distance to a box with rounded edges; half: its half widths (3,), the rounding included."""
-    return lambda points: np.linalg.norm(np.maximum(np.abs(points - middle) - half + rounding, 0.0), axis=1) - rounding
-
-
-def _joined(fillet: float, *parts: Field) -> Field:
-    """The union of parts; where two meet, a fillet of about that radius."""
-
-    def distance(points: Array) -> Array:
-        values = parts[0](points)
-        for part in parts[1:]:
-            other = part(points)
-            near = np.maximum(fillet - np.abs(values - other), 0.0) / fillet
-            values = np.minimum(values, other) - 0.25 * fillet * near**2
-        return values
-
-    return distance
 
 
 def _twisted(points: Array, rate: float) -> Array:

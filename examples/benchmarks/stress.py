@@ -1,11 +1,12 @@
-"""Random hard surfaces of genus 0 (hard_shapes.py), default settings: which share ends certified, by kind.
+"""Random hard surfaces (hard_shapes.py), default settings: which share ends certified, by kind.
 
     python examples/benchmarks/stress.py --first 40 --count 120
+    python examples/benchmarks/stress.py --first 1000 --count 80
     python examples/benchmarks/stress.py --kinds thin flat --out out/stress
 
-Runs the surfaces as `iga-nn batch` does, with one thread each: the same command skips what is finished and goes on from
-checkpoints. stress.csv and stress.md are written anew after each; a surface's mesh is in surfaces/, and report.html in
-its folder shows where it is not certified.
+From number 1000 on they have limbs or handles. Runs the surfaces as `iga-nn batch` does, with one thread each: the
+same command skips what is finished and goes on from checkpoints. stress.csv and stress.md are written anew after each;
+a surface's mesh is in surfaces/, and report.html in its folder shows where it is not certified.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 from statistics import fmean, median
 
 import processes
-from hard_shapes import KINDS, compute_shape, kind_of
+from hard_shapes import KINDS, LATER, compute_shape, kind_of, name_of
 
 from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
@@ -41,6 +42,8 @@ LOOKS = {  # what a reader should picture
     "fingers": "a palm with 3 to 5 fingers close together",
     "flap": "a body with thin wings that lie along it",
     "folded": "a sheet folded once or twice, its layers close together",
+    "limbed": "a body with 4 to 8 limbs, some of them forked",
+    "graph": "rods around a graph in space, with 1 to 8 handles",
 }
 
 
@@ -135,6 +138,9 @@ def _options(argv: list[str] | None) -> Options:
     numbers = tuple(
         number for number in range(given.first, given.first + given.count) if kind_of(number) in given.kinds
     )
+    if not numbers:
+        kinds = " ".join(given.kinds)
+        parser.error(f"--kinds {kinds}: no surface of these numbers is one; limbed and graph begin at --first {LATER}")
     return Options(numbers, mapping, given.jobs, given.out)
 
 
@@ -158,7 +164,7 @@ def _parser() -> argparse.ArgumentParser:
 def _tasks(options: Options) -> list[Task]:
     """The runs; the worker makes the mesh."""
     out = options.out.absolute()
-    names = [f"{number:03d}-{kind_of(number)}" for number in options.numbers]
+    names = [name_of(number) for number in options.numbers]
     return [Task(name, str(out / "surfaces" / f"{name}.obj"), out / name, options.mapping, None) for name in names]
 
 

@@ -1,8 +1,8 @@
 """Starts from thin blocks along the solid's skeleton, which the rounds draw to the surface.
 
 A body with handles is no image of one cube, and limbs are squeezed on it. Blocks with square sections along the
-branches of the curve skeleton, glued by whole faces at blocks where branches meet, follow both. No layout of the surface
-is made: points of the surface take the nearest places on the blocks anew before each round (reassignment.py).
+branches of the curve skeleton, glued by whole faces at blocks where branches meet, follow both. The surface is not laid
+out on them: its points take the nearest places on the blocks anew before each round (reassignment.py).
 """
 
 from dataclasses import dataclass
@@ -49,7 +49,8 @@ def thin_blocks(layout: BlockLayout, degree: int) -> SplineMap:
     """Return the map whose control points are points of the layout's rods, at the Greville points of uniform knots."""
     knots = [tuple(open_uniform_knots(degree + spans, degree) for spans in block.spans) for block in layout.blocks]
     nets = Nets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
-    points = [_points(block, [greville(row, degree) for row in rows]) for block, rows in zip(layout.blocks, knots)]
+    pairs = zip(layout.blocks, knots, strict=True)
+    points = [_points(block, [greville(row, degree) for row in rows]) for block, rows in pairs]
     return SplineMap(nets, nets.merged(nets.joined(points)))
 
 

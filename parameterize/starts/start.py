@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..arrays import Array, IntArray
+from ..blocks.layout import BlockLayout, block_layout
 from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
 from ..config import Config
@@ -69,6 +70,11 @@ class Task:
     def skeleton(self) -> Skeleton:
         """Return the skeleton of the solid at volume 1. Raises SkeletonError where it has none."""
         return skeleton_of(self.surface.unit_vertices, self.surface.faces, self.surface.genus)
+
+    @cached_property
+    def layout(self) -> BlockLayout:
+        """Return thin blocks along the skeleton. Raises SkeletonError and LayoutError where there are none."""
+        return block_layout(self.skeleton, self.surface.unit_vertices, self.surface.faces)
 
     @cached_property
     def sphere(self) -> CubeLayout:
