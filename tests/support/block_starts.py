@@ -36,13 +36,13 @@ def torus(major=1.0, minor=0.35, around=72, across=28):
     return BlockLayout.from_blocks(blocks), scale * points + 0.5, faces
 
 
-def double_torus():
+def double_torus(cells=100):
     """A junction and two rods, each of which leaves it and comes back: layout, vertices at volume 1, faces.
 
     Two tori of radii 0.8 and 0.33 around (-1, 0, 0) and (1, 0, 0) with a smooth minimum of their distances. The
     junction is a diamond in the plane, its corners in the north, east, south and west.
     """
-    points, faces = _implicit(_two_tori, (2.4, 1.4, 0.6), 100)
+    points, faces = _implicit(_two_tori, (2.4, 1.4, 0.6), cells)
     scale = signed_volume(points, faces) ** (-1 / 3)
     half, high, north, east = 0.2, 0.18, 0.34, 0.4
     compass = {"n": (0, north), "e": (east, 0), "s": (0, -north), "w": (-east, 0)}
