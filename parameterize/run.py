@@ -249,9 +249,7 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     return np.asarray(numbers, dtype=np.int64)
 
 
-def _in_users_units(
-    found: Optimized, fit: SurfaceFit, task: Task
-) -> tuple[BSplineVolume | MultiPatch, BoundaryMap]:
+def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSplineVolume | MultiPatch, BoundaryMap]:
     """Return the map and its boundary map; parameters are first brought close to this map's closest points."""
     surface, spline = task.surface, found.spline
     if not spline.nets.one_cube:

@@ -19,6 +19,7 @@ from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import DeterminantPenalty
 from .distortion import Distortion
 from .edge_attraction import EdgeAnchors
+from .face_attraction import faces_towards
 from .normals import FacingPenalty, facing_penalty
 from .operators import weighted_sum
 from .reassignment import reassign
@@ -47,6 +48,7 @@ class SplineEnergy:
         self.anchors = EdgeAnchors(surface)
         self._facing: FacingPenalty | None = None
         self._contact: ContactPenalty | None = None
+        self._approach: SurfaceFit | None = None
         self._weights, self._grows = weights, False
         self._round = RoundWeights(0.0, weights.surface)
         self.determinants = DeterminantPenalty(nets, nets.knots)
@@ -67,6 +69,8 @@ class SplineEnergy:
     @property
     def outer(self) -> tuple[Term, ...]:
         """Return the terms of the boundary that are in effect at present."""
+        if self._approach is not None:
+            return (self._approach,)
         terms: tuple[Term | None, ...] = (self.surface, self.anchors, self._contact, self._facing)
         return tuple(term for term in terms if term is not None)
 
@@ -98,6 +102,7 @@ class SplineEnergy:
         if not self.nets.one_cube:
             self._measure_in(box_lengths(SplineMap(self.nets, control).body))
             reassign(self.surface, control)
+            self._approach = None if share is None else faces_towards(self.surface, control)
         self.distortion.start_round(control, penalty)
         if self._weights.least_floor < 1.0:
             self.determinants.lower_floors(self.distortion.lower_floors(control, self._weights.least_floor))
@@ -105,7 +110,7 @@ class SplineEnergy:
             return
         self._grows = share is not None
         self._precondition = self._preconditioner()
-        reach = _REACH if self._grows else np.inf
+        reach = _REACH if self._grows and self.nets.one_cube else np.inf
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
     def watch_facing(self, control: Array) -> None:
@@ -126,7 +131,7 @@ class SplineEnergy:
     def slide(self, control: Array) -> None:
         """Let the surface's parameters slide towards their closest points, and penalise wrong normals of F there."""
         places, points = self.surface.places, self.surface.points
-        if self._grows:
+        if self._grows and self.nets.one_cube:
             places.slide(control, points, keep_layout=True, reach=_REACH)
         else:
             for _ in range(_SLIDES):

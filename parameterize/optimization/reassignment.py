@@ -4,6 +4,8 @@ A start of several blocks is a thin skeleton of the solid, and no layout tells w
 Between rounds the places that slides do not reach are found in this way.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -14,8 +16,7 @@ from ..spline.spline_map import SplineMap
 from .surface_distance import SurfaceFit
 
 _A_SPAN = 4  # samples a direction and span
-_CANDIDATES = 24  # nearest samples among which one with the surface's normal is looked for
-_AGREES = 0.3  # cosine of the angle between two normals that agree
+_NORMALS = 0.5  # length, at volume 1, by which normals are multiplied: perpendicular ones count as 0.7 apart
 _CLOSER = 0.7  # of the present distance: a place that is not closer than this stays, as slides bring it closer
 
 
@@ -25,33 +26,54 @@ def reassign(surface: SurfaceFit, control: Array, *, first: bool = False) -> Non
     Places that are hardly farther away than that sample stay; with `first`, none does.
     """
     places = surface.places
-    parameters, faces, points, normals = _samples(SplineMap(places.nets, control))
-    distances, near = map(np.asarray, cKDTree(points).query(surface.points, k=_CANDIDATES))
-    agrees = np.einsum("nkc,nc->nk", normals[near], surface.normals) > _AGREES
-    distances = np.where(agrees, distances, np.inf)
-    rows, best = np.arange(len(near)), distances.argmin(axis=1)
+    samples = boundary_samples(SplineMap(places.nets, control), _A_SPAN)
+    chosen = nearest_facing(samples.points, samples.normals, surface.points, surface.normals)
     present = np.linalg.norm(surface.residuals(control), axis=1)
-    moved = np.ones(len(near), dtype=bool) if first else distances[rows, best] < _CLOSER * present
-    chosen = near[rows, best]  # the nearest one where no normal agrees
+    closer = np.linalg.norm(samples.points[chosen] - surface.points, axis=1) < _CLOSER * present
+    moved = np.ones_like(closer) if first else closer
     places.place(
-        np.where(moved[:, None], parameters[chosen], places.parameters),
-        np.where(moved, faces[chosen], places.cube_faces),
+        np.where(moved[:, None], samples.parameters[chosen], places.parameters),
+        np.where(moved, samples.faces[chosen], places.cube_faces),
     )
 
 
-def _samples(spline: SplineMap) -> tuple[Array, IntArray, Array, Array]:
-    """Return samples inside the boundary's spans: parameters (m, 3), faces (m,), points and unit normals (m, 3)."""
+def nearest_facing(points: Array, normals: Array, others: Array, other_normals: Array) -> IntArray:
+    """Return for each of `others` (n, 3) the number of the nearest of `points` (m, 3) that faces the same way, (n,).
+
+    The distance of two points with unit normals has three more coordinates, the normals times a length.
+    """
+    tree = cKDTree(np.hstack([points, _NORMALS * normals]))
+    return np.asarray(tree.query(np.hstack([others, _NORMALS * other_normals]))[1])
+
+
+@dataclass(frozen=True, eq=False)
+class BoundarySamples:
+    """Hold samples inside the spans of a body's boundary.
+
+    parameters, points, normals: (m, 3), the normals of length 1. faces: (m,). areas: (m,), of the parts of the boundary
+    that the samples stand for.
+    """
+
+    parameters: Array
+    faces: IntArray
+    points: Array
+    normals: Array
+    areas: Array
+
+
+def boundary_samples(spline: SplineMap, a_span: int) -> BoundarySamples:
+    """Sample all faces of the boundary, `a_span` times a direction in each span."""
     found = []
     for face in np.flatnonzero(spline.nets.exposed):
         block, inside = divmod(int(face), 6)
         axis, side = divmod(inside, 2)
         patch = spline.patch(block)
-        ends = [divided_spans(row, _A_SPAN) for row in patch.knots]
+        ends = [divided_spans(row, a_span) for row in patch.knots]
         rows = [(row[1:] + row[:-1]) / 2.0 for row in ends]
         points, normals = (vectors.reshape(3, -1).T for vectors in face_vectors(patch, rows, axis, side))
         rows[axis] = np.array([float(side)])
         parameters = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1).reshape(-1, 3)
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        found.append((parameters, np.full(len(points), face), points, normals / np.maximum(lengths, 1e-300)))
-    parameters, faces, points, normals = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return parameters, faces, points, normals
+        lengths = np.linalg.norm(normals, axis=1)
+        unit = normals / np.maximum(lengths, 1e-300)[:, None]
+        found.append((parameters, np.full(len(points), face), points, unit, lengths / len(points)))
+    return BoundarySamples(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
