@@ -32,11 +32,8 @@ class Draft:
 
     def __init__(self, skeleton: Skeleton, body: Body) -> None:
         self._skeleton, self._body = skeleton, body
-        self.junctions: dict[int, Junction] = {
-            node: junction(skeleton, node, body) for node, degree in enumerate(skeleton.degrees) if degree > 2
-        }
-        self._size = dict.fromkeys(self.junctions, 1.0)
-        self._regular = dict.fromkeys(self.junctions, 0.0)
+        self._size = {node: 1.0 for node, degree in enumerate(skeleton.degrees) if degree > 2}
+        self._regular = dict.fromkeys(self._size, 0.0)
         self.factors: dict[int, Array] = {}
         self._lay()
 
@@ -52,15 +49,21 @@ class Draft:
 
     def corners(self, node: int) -> Array:
         """Return the corners (2, 2, 2, 3) of a junction, [u][v][w]."""
-        return self.junctions[node].corners(self._size[node], self._regular[node])
+        return self.junctions[node].corners(self._regular[node])
 
     def repaired(self) -> list[str]:
         """Make thinner what is folded or leaves the body; return what was: nothing is left to do when it is empty."""
-        faults = [*self._junction_faults(), *(fault for i in self.rods for fault in self._rod_faults(i))]
-        self._lay()
+        thinner: set[int] = set()
+        faults = self._junction_faults(thinner)
+        for number in self.rods:
+            faults += self._rod_faults(number, thinner)
+        for node in thinner:
+            self._size[node] *= _THINNER
+        if faults:
+            self._lay()
         return faults
 
-    def _junction_faults(self) -> list[str]:
+    def _junction_faults(self, thinner: set[int]) -> list[str]:
         faults = []
         for node in self.junctions:
             corners = self.corners(node)
@@ -68,18 +71,18 @@ class Draft:
                 self._regular[node] = min(1.0, self._regular[node] + _SQUARER)
                 faults.append(f"junction {node} is folded")
             if not self._body.contains(corners).all():
-                self._size[node] *= _THINNER
+                thinner.add(node)
                 faults.append(f"junction {node} leaves the body")
         return faults
 
-    def _rod_faults(self, number: int) -> list[str]:
+    def _rod_faults(self, number: int, thinner: set[int]) -> list[str]:
         sections, factors = self.sections(number), self.factors[number]
         bad = folded(sections)
         outside = ~self._body.contains(sections).all(axis=(1, 2))
         touched = outside | np.append(bad, False) | np.append(False, bad)
         for place, node in zip((0, -1), self._skeleton.branches[number].ends, strict=True):
             if bad[place] and node in self._size:
-                self._size[node] *= np.sqrt(_THINNER)
+                thinner.add(node)
         factors[touched] *= _THINNER
         for k in range(1, len(factors)):
             factors[k] = min(factors[k], _SLOPE * factors[k - 1])
@@ -92,6 +95,9 @@ class Draft:
 
     def _lay(self) -> None:
         """Lay all rods between the faces of the junctions as these are now."""
+        self.junctions: dict[int, Junction] = {
+            node: junction(self._skeleton, node, self._body, size) for node, size in self._size.items()
+        }
         self.rods: dict[int, Rod] = {}
         self.quarters: dict[int, int] = {}
         self.faces: dict[int, tuple[Array | None, Array | None]] = {}
@@ -101,7 +107,8 @@ class Draft:
                 self.faces[number] = (None, None)
             else:
                 self._lay_rod(number, branch)
-            self.factors.setdefault(number, np.ones(len(self.rods[number].centers)))
+            if len(self.factors.get(number, [])) != len(self.rods[number].centers):
+                self.factors[number] = np.ones(len(self.rods[number].centers))
 
     def _lay_rod(self, number: int, branch: Branch) -> None:
         first, last = (self._face(number, end) for end in (0, 1))

@@ -13,6 +13,7 @@ from ..spline.volume import FACE_NAMES
 from .block import Block
 from .draft import Draft
 from .inside import Body
+from .merging import merge
 from .rings import PARTS
 from .rods import Rod
 from .splitting import split
@@ -21,6 +22,7 @@ __all__ = ["Block", "BlockLayout", "LayoutError", "block_layout"]
 
 SPANS = 6  # across each block
 _LONGEST = 4  # times the spans across: those along a rod at most
+_STRETCH = 2.0  # how long a span along a rod is, over one across the body: little changes along a rod
 _REPAIRS = 40  # rounds in which what is folded, or leaves the body, is made thinner
 
 
@@ -89,14 +91,14 @@ def block_layout(skeleton: Skeleton, vertices: Array, faces: IntArray, spans: in
     Limbs have closed ends in their tips. The faces that are not glued form one closed surface of the body's genus.
 
     skeleton: of the body, in the same units. vertices, faces: (n, 3), (m, 3) the surface, wound outward. spans: the
-    number of knot spans across each block; along a rod they are as long as across, up to four times as many.
+    number of knot spans across each block; along a rod there are more where it is long.
 
     Raises LayoutError for a skeleton without branches, and where blocks stay folded, or outside, however thin.
     """
     if not skeleton.branches:
         raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
     body = Body(vertices, faces)
-    draft = Draft(split(skeleton, body), body)
+    draft = Draft(split(merge(skeleton, body), body), body)
     for _ in range(_REPAIRS):
         faults = draft.repaired()
         if not faults:
@@ -120,8 +122,9 @@ def _blocks(draft: Draft, spans: int) -> Iterator[Block]:
 
 
 def _spans_along(rod: Rod, parts: int, spans: int) -> int:
-    """Return the spans along a part of a rod: as long as those across."""
-    return int(np.clip(round(spans * rod.length / (parts * rod.body_width)), spans, _LONGEST * spans))
+    """Return the spans along a part of a rod: by its length over the body's width."""
+    count = round(spans * rod.length / (parts * _STRETCH * rod.body_width))
+    return int(np.clip(count, spans, _LONGEST * spans))
 
 
 def _interfaces(blocks: Sequence[Block]) -> Iterator[Interface]:

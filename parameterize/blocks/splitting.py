@@ -99,7 +99,7 @@ def _divided(skeleton: Skeleton, node: int, ends: list[End], group: tuple[int, .
     places = center + _APART * np.array([-room[0], room[1]])[:, None] * axis
     branches = list(skeleton.branches)
     for (i, end), moved in zip(ends, chosen, strict=True):
-        branches[i] = _led_to(branches[i], end, new if moved else node, places[int(moved)], center)
+        branches[i] = led_to(branches[i], end, new if moved else node, places[int(moved)], center)
     across = np.linspace(places[0], places[1], 5)
     radii = np.full(len(across), radius)
     nodes = np.concatenate([skeleton.nodes, places[1:]])
@@ -112,7 +112,7 @@ def _divided(skeleton: Skeleton, node: int, ends: list[End], group: tuple[int, .
     )
 
 
-def _led_to(branch: Branch, end: int, node: int, place: Array, center: Array) -> Branch:
+def led_to(branch: Branch, end: int, node: int, place: Array, center: Array) -> Branch:
     """Return a branch that ends at another place, led there from beyond the ball around the old node."""
     points, radii = stub(branch, end), branch.radii[:: -1 if end else 1]
     inner = np.arange(len(points)) < max(1, len(points) // 2)
