@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 from ..skeleton.graph import Branch, Skeleton
 from ..spline.interface import axis_side, face_layer
 from .checks import folded
@@ -17,7 +17,7 @@ _BACK = 1.5  # radii of a limb: how far before its end its direction is taken
 _THINNER = 0.8  # a factor of sections and junctions that are folded or leave the body
 _SQUARER = 0.2  # share of a plain box by which a junction that is folded comes closer to one
 _SLOPE = 1.25  # the ratio of the factors of neighbouring sections, at most
-_LEAST = 0.05  # the factor below which a section is given up
+_NEAR = 1.5  # times the reach of a section or junction: how far away from a meeting others are made thinner, too
 
 
 class Draft:
@@ -62,6 +62,15 @@ class Draft:
         if faults:
             self._lay()
         return faults
+
+    def thin_near(self, point: Array) -> None:
+        """Make thinner what lies around a point (3,), where the boundary meets itself."""
+        for number, laid in self.rods.items():
+            self.factors[number][_is_near(point, laid.centers, self.sections(number))] *= _THINNER
+        for node, block in self.junctions.items():
+            if _is_near(point, block.center[None], self.corners(node)[None])[0]:
+                self._size[node] *= _THINNER
+        self._lay()
 
     def _junction_faults(self, thinner: set[int]) -> list[str]:
         faults = []
@@ -144,3 +153,9 @@ class Draft:
         place = at_lengths(points, np.array([base]))[0]
         reach = float(self._body.rays(place, unit(points[-1] - place)))
         return float(along[-1] - max(base + 0.2 * radius, base + reach - _TIP * radius))
+
+
+def _is_near(point: Array, centers: Array, corners: Array) -> Mask:
+    """Return which of several balls reach a point (3,): their centers (k, 3), and the corners (k, ..., 3) within."""
+    reach = np.linalg.norm(corners.reshape(len(centers), -1, 3) - centers[:, None], axis=-1).max(axis=1)
+    return np.asarray(np.linalg.norm(centers - point, axis=1) <= _NEAR * reach)

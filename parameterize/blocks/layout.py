@@ -6,9 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, IntArray, Mask
+from ..arrays import Array, IntArray, Mask, in_brackets
+from ..certificate.boundary import check_boundary
 from ..skeleton.graph import Skeleton
 from ..spline.interface import Face, Interface, face_label, orientations, varying
+from ..spline.multipatch import MultiPatch
 from ..spline.volume import FACE_NAMES
 from .block import Block
 from .draft import Draft
@@ -93,7 +95,8 @@ def block_layout(skeleton: Skeleton, vertices: Array, faces: IntArray, spans: in
     skeleton: of the body, in the same units. vertices, faces: (n, 3), (m, 3) the surface, wound outward. spans: the
     number of knot spans across each block; along a rod there are more where it is long.
 
-    Raises LayoutError for a skeleton without branches, and where blocks stay folded, or outside, however thin.
+    Raises LayoutError for a skeleton without branches, and where blocks stay folded, outside or in each other, however
+    thin.
     """
     if not skeleton.branches:
         raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
@@ -101,11 +104,15 @@ def block_layout(skeleton: Skeleton, vertices: Array, faces: IntArray, spans: in
     draft = Draft(split(merge(skeleton, body), body), body)
     for _ in range(_REPAIRS):
         faults = draft.repaired()
-        if not faults:
-            break
-    else:
-        raise LayoutError(f"no start of blocks fits into the body: {faults[0]}; make that part of the surface thicker")
-    return BlockLayout.from_blocks(list(_blocks(draft, spans)))
+        if faults:
+            continue
+        layout = BlockLayout.from_blocks(list(_blocks(draft, spans)))
+        met = check_boundary(MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)).meeting
+        if met is None:
+            return layout
+        draft.thin_near(np.array(met.point))
+        faults = [f"two of its parts meet at {in_brackets(met.point)}"]
+    raise LayoutError(f"no start of blocks fits into the body: {faults[0]}; make the surface thicker there")
 
 
 def _blocks(draft: Draft, spans: int) -> Iterator[Block]:
