@@ -17,7 +17,7 @@ _BACK = 1.5  # radii of a limb: how far before its end its direction is taken
 _THINNER = 0.8  # a factor of sections and junctions that are folded or leave the body
 _SQUARER = 0.2  # share of a plain box by which a junction that is folded comes closer to one
 _SLOPE = 1.25  # the ratio of the factors of neighbouring sections, at most
-_NEAR = 1.5  # times the reach of a section or junction: how far away from a meeting others are made thinner, too
+_NEAR = 1.5  # times the reach of a section: how far away from a meeting others are made thinner, too
 
 
 class Draft:
@@ -63,12 +63,15 @@ class Draft:
             self._lay()
         return faults
 
-    def thin_near(self, point: Array) -> None:
-        """Make thinner what lies around a point (3,), where the boundary meets itself."""
+    def thin_near(self, point: Array, blocks: tuple[int, ...]) -> None:
+        """Make rods thinner around a point (3,) where the boundary meets itself, and junctions that meet there.
+
+        blocks: the numbers of those that meet; the junctions come first.
+        """
         for number, laid in self.rods.items():
             self.factors[number][_is_near(point, laid.centers, self.sections(number))] *= _THINNER
-        for node, block in self.junctions.items():
-            if _is_near(point, block.center[None], self.corners(node)[None])[0]:
+        for number, node in enumerate(self.junctions):
+            if number in blocks:
                 self._size[node] *= _THINNER
         self._lay()
 

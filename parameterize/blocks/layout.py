@@ -110,7 +110,7 @@ def block_layout(skeleton: Skeleton, vertices: Array, faces: IntArray, spans: in
         met = check_boundary(MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)).meeting
         if met is None:
             return layout
-        draft.thin_near(np.array(met.point))
+        draft.thin_near(np.array(met.point), met.patches or ())
         faults = [f"two of its parts meet at {in_brackets(met.point)}"]
     raise LayoutError(f"no start of blocks fits into the body: {faults[0]}; make the surface thicker there")
 

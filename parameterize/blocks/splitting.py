@@ -5,14 +5,14 @@ from itertools import combinations
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 from ..skeleton.graph import Branch, Skeleton
 from .assignment import MOST, Assignment, assigned
 from .frames import arc_lengths, at_lengths, unit
 from .inside import Body
 
-_SKEW = np.radians(58.0)  # between a branch and its face's normal: above, a junction is split; a tetrahedron's have 55
-_GAIN = np.radians(12.0)  # that a split lowers the largest angle by, at least: else one block is as good as three
+_SKEW = np.radians(48.0)  # between a branch and the normal of its face: above, a junction is split where that helps
+_GAIN = np.radians(8.0)  # that a split lowers the largest angle by, at least: else one block is as good as three
 _REACH = 1.5  # radii of a node at which its branches' directions are taken: beyond the ball that they share
 _APART = 0.5  # of the room on either side: where the two nodes of a split lie
 _ROOM = 2.0  # radii of a node: no room is taken for larger, so that a plate's nodes stay near their branches
@@ -74,8 +74,25 @@ def _group(skeleton: Skeleton, node: int, ends: list[End], body: Body) -> tuple[
             if 2 * size == len(ends) and 0 not in group:
                 continue  # the other half of a pair that was tried
             skew = _skew_of(_divided(skeleton, node, ends, group, body), (node, len(skeleton.nodes)))
-            best = min(best, (skew, group))
+            best = min(best, (skew + _mixed(ways, group), group))
     return best[1]
+
+
+def _mixed(ways: Array, group: tuple[int, ...]) -> float:
+    """Return pi where no plane between the two nodes parts the directions of a group from the others, else 0.
+
+    Branches of the two nodes would then run into each other.
+    """
+    chosen, axis = _axis(ways, group)
+    heights = ways @ axis
+    return 0.0 if heights[chosen].min() > heights[~chosen].max() else np.pi
+
+
+def _axis(ways: Array, group: tuple[int, ...]) -> tuple[Mask, Array]:
+    """Return which directions (d, 3) belong to a group, and the unit vector (3,) from the others' mean to theirs."""
+    chosen = np.isin(np.arange(len(ways)), group)
+    axis = unit(ways[chosen].mean(axis=0) - ways[~chosen].mean(axis=0))
+    return chosen, axis if axis.any() else np.eye(3)[0]
 
 
 def _skew_of(skeleton: Skeleton, nodes: tuple[int, int]) -> float:
@@ -91,10 +108,7 @@ def _divided(skeleton: Skeleton, node: int, ends: list[End], group: tuple[int, .
     """Return the skeleton with a node divided: the branch ends of the group leave a new node, the last one."""
     center, radius, new = skeleton.nodes[node], float(skeleton.radii[node]), len(skeleton.nodes)
     ways = directions(skeleton, node, ends)
-    chosen = np.isin(np.arange(len(ends)), group)
-    axis = unit(ways[chosen].mean(axis=0) - ways[~chosen].mean(axis=0))
-    if not axis.any():
-        axis = np.eye(3)[0]
+    chosen, axis = _axis(ways, group)
     room = np.minimum(body.rays(center, np.array([-axis, axis])), _ROOM * radius)
     places = center + _APART * np.array([-room[0], room[1]])[:, None] * axis
     branches = list(skeleton.branches)
