@@ -12,7 +12,7 @@ from .splitting import branch_ends, junction_at, led_to
 
 _SHORT = 2.0  # radii of the thicker node: the length of a branch that may be taken out
 _LOOP = 4.0  # lengths of the branch that is taken out: what another one between its nodes has, to become a loop
-_FIT = np.radians(45.0)  # between a branch and its face's normal, at most, at the node that takes the place of two
+_FIT = np.radians(50.0)  # between a branch and its face's normal, at most, at the node that takes the place of two
 
 
 def merge(skeleton: Skeleton, body: Body) -> Skeleton:
