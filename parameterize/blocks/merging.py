@@ -11,12 +11,14 @@ from .inside import Body
 from .splitting import branch_ends, junction_at, led_to
 
 _SHORT = 2.0  # radii of the thicker node: the length of a branch that may be taken out
+_CLOSE = 1.2  # radii: a branch so short leaves no room for two blocks; where one does not serve, the node is split anew
+_CROWD = 8  # branches at a node, at most
 _LOOP = 4.0  # lengths of the branch that is taken out: what another one between its nodes has, to become a loop
 _FIT = np.radians(50.0)  # between a branch and its face's normal, at most, at the node that takes the place of two
 
 
 def merge(skeleton: Skeleton, body: Body) -> Skeleton:
-    """Return a skeleton of the same body with the fewer junctions; the number of loops stays."""
+    """Return a skeleton of the same body with fewer junctions; the number of loops stays."""
     while True:
         lengths = {
             k: branch.length / float(skeleton.radii[list(branch.ends)].max())
@@ -24,11 +26,24 @@ def merge(skeleton: Skeleton, body: Body) -> Skeleton:
             if _joins_two_junctions(skeleton, branch)
         }
         short = sorted((length, k) for k, length in lengths.items() if length <= _SHORT)
-        merged = (_contracted(skeleton, k) for _, k in short)
-        better = next((one for one in merged if _fits(one, len(one.nodes) - 1, body)), None)
+        better = next((one for length, k in short if (one := _merged(skeleton, k, length, body))), None)
         if better is None:
             return skeleton
         skeleton = better
+
+
+def _merged(skeleton: Skeleton, number: int, length: float, body: Body) -> Skeleton | None:
+    """Return the skeleton with both nodes of a branch made one; None where the other branches do not fit it.
+
+    length: of the branch, in radii of its nodes.
+    """
+    merged = _contracted(skeleton, number)
+    node = len(merged.nodes) - 1
+    ends = branch_ends(merged, node)
+    if len(ends) > _CROWD or not all(body.contains(merged.branches[i].points).all() for i, _ in ends):
+        return None
+    fits = len(ends) <= MOST and float(junction_at(merged, node)[1].angles.max()) <= _FIT
+    return merged if fits or length <= _CLOSE else None
 
 
 def _joins_two_junctions(skeleton: Skeleton, branch: Branch) -> bool:
@@ -54,11 +69,3 @@ def _contracted(skeleton: Skeleton, number: int) -> Skeleton:
     renumbered = (replace(one, ends=(numbers[one.ends[0]], numbers[one.ends[1]])) for one in branches)
     nodes, radii = np.concatenate([skeleton.nodes, place[None]]), np.append(skeleton.radii, radius)
     return replace(skeleton, nodes=nodes[kept], radii=radii[kept], branches=tuple(renumbered))
-
-
-def _fits(skeleton: Skeleton, node: int, body: Body) -> bool:
-    """Return whether the branches at a node lie inside the body and near the normals of a cube's faces."""
-    ends = branch_ends(skeleton, node)
-    if len(ends) > MOST or not all(body.contains(skeleton.branches[i].points).all() for i, _ in ends):
-        return False
-    return float(junction_at(skeleton, node)[1].angles.max()) <= _FIT

@@ -12,7 +12,8 @@ from .frames import arc_lengths, at_lengths, unit
 from .inside import Body
 
 _SKEW = np.radians(48.0)  # between a branch and the normal of its face: above, a junction is split where that helps
-_GAIN = np.radians(8.0)  # that a split lowers the largest angle by, at least: else one block is as good as three
+_GAIN = np.radians(8.0)  # that the split lowers the largest angle by, at least
+_MUCH = np.radians(20.0)  # as much helps five branches or more at any angle: six in a plane fit a cube on its corner
 _REACH = 1.5  # radii of a node at which its branches' directions are taken: beyond the ball that they share
 _APART = 0.5  # of the room on either side: where the two nodes of a split lie
 _ROOM = 2.0  # radii of a node: no room is taken for larger, so that a plate's nodes stay near their branches
@@ -66,9 +67,10 @@ def _group(skeleton: Skeleton, node: int, ends: list[End], body: Body) -> tuple[
     """Return which of the branch ends, by their places in the list, leave a second node: () where one serves all."""
     ways = directions(skeleton, node, ends)
     worst = float(assigned(ways).angles.max()) if len(ends) <= MOST else np.inf
-    if worst <= _SKEW:
+    gain = _GAIN if worst > _SKEW else _MUCH if len(ends) > 4 else np.inf
+    if gain >= worst:
         return ()
-    best: tuple[float, tuple[int, ...]] = (worst - _GAIN, ())
+    best: tuple[float, tuple[int, ...]] = (worst - gain, ())
     for size in range(2, len(ends) // 2 + 1):
         for group in combinations(range(len(ends)), size):
             if 2 * size == len(ends) and 0 not in group:
