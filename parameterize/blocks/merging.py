@@ -11,6 +11,8 @@ from .inside import Body
 from .splitting import branch_ends, junction_at, led_to
 
 _SHORT = 2.0  # radii of the thicker node: the length of a branch that may be taken out
+_TIGHT_FIT = np.radians(40.0)  # where there are more than four: the same for these
+_AROUND = 4  # branches around a cube: their angles may be large as long as their order is right
 _CLOSE = 1.2  # radii: a branch so short leaves no room for two blocks; where one does not serve, the node is split anew
 _CROWD = 8  # branches at a node, at most
 _LOOP = 4.0  # lengths of the branch that is taken out: what another one between its nodes has, to become a loop
@@ -42,7 +44,8 @@ def _merged(skeleton: Skeleton, number: int, length: float, body: Body) -> Skele
     ends = branch_ends(merged, node)
     if len(ends) > _CROWD or not all(body.contains(merged.branches[i].points).all() for i, _ in ends):
         return None
-    fits = len(ends) <= MOST and float(junction_at(merged, node)[1].angles.max()) <= _FIT
+    limit = _FIT if len(ends) <= _AROUND else _TIGHT_FIT
+    fits = len(ends) <= MOST and float(junction_at(merged, node)[1].angles.max()) <= limit
     return merged if fits or length <= _CLOSE else None
 
 
