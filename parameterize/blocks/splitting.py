@@ -12,7 +12,7 @@ from .frames import arc_lengths, at_lengths, unit
 from .inside import Body
 
 _SKEW = np.radians(48.0)  # between a branch and the normal of its face: above, a junction is split where that helps
-_GAIN = np.radians(8.0)  # that the split lowers the largest angle by, at least
+_GAIN = np.radians(5.0)  # that the split lowers the largest angle by, at least
 _MUCH = np.radians(20.0)  # as much helps five branches or more at any angle: six in a plane fit a cube on its corner
 _REACH = 1.5  # radii of a node at which its branches' directions are taken: beyond the ball that they share
 _APART = 0.5  # of the room on either side: where the two nodes of a split lie
