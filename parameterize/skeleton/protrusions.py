@@ -93,8 +93,8 @@ class _Pieces:
 
 def _effective_width(widths: list[float]) -> float:
     """Return the mean of the widths (k,) from a tip to its root, and more of a part that narrows to its tip."""
-    mean, root = np.mean(widths), np.mean(widths[-((len(widths) + 2) // 3) :])
-    return float(mean + WEDGE * max(root - mean, 0.0))
+    mean, root = (float(np.mean(part)) for part in (widths, widths[-((len(widths) + 2) // 3) :]))
+    return mean + WEDGE * max(root - mean, 0.0)
 
 
 def _links(inside: Mask) -> IntArray:
