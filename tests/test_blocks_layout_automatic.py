@@ -86,3 +86,9 @@ def test_spans_follow_the_lengths():
     assert spans["junction 0"] == (5, 5, 5)
     assert spans["rod 0"] == (5, 5, 20)  # more than eight times as long as wide: four times the spans across
     assert spans["rod 1"][:2] == (5, 5) and 5 <= spans["rod 1"][2] <= 8  # a sixth as long
+
+
+def test_a_skeleton_that_leaves_the_body_is_refused_with_the_place():
+    skeleton, vertices, faces = thick(*GRAPHS["rod"])
+    with pytest.raises(LayoutError, match=r"a rod is folded near here; make the surface wider there"):
+        block_layout(skeleton, vertices + 0.25 * Z, faces, where=lambda place: "here")

@@ -6,18 +6,20 @@ from ..arrays import Array, Mask
 from ..skeleton.graph import Branch, Skeleton
 from ..spline.interface import axis_side, face_layer
 from .checks import folded
-from .frames import arc_lengths, at_lengths, unit
+from .frames import at_lengths
 from .inside import Body
 from .junctions import Junction, junction
 from .rings import ring
 from .rods import Rod, ends_turned, rod
+from .tips import tip
 
-_TIP = 0.8  # radii of a limb: from its last section to the surface in front of it
-_BACK = 1.5  # radii of a limb: how far before its end its direction is taken
 _THINNER = 0.8  # a factor of sections and junctions that are folded or leave the body
 _SQUARER = 0.2  # share of a plain box by which a junction that is folded comes closer to one
 _SLOPE = 1.25  # the ratio of the factors of neighbouring sections, at most
 _NEAR = 1.5  # times the reach of a section: how far away from a meeting others are made thinner, too
+
+
+Fault = tuple[str, Array]  # what is wrong, and the place (3,)
 
 
 class Draft:
@@ -51,8 +53,8 @@ class Draft:
         """Return the corners (2, 2, 2, 3) of a junction, [u][v][w]."""
         return self.junctions[node].corners(self._regular[node])
 
-    def repaired(self) -> list[str]:
-        """Make thinner what is folded or leaves the body; return what was: nothing is left to do when it is empty."""
+    def repaired(self) -> list[Fault]:
+        """Make thinner what is folded or leaves the body, and return the faults: the draft had none if it is empty."""
         thinner: set[int] = set()
         faults = self._junction_faults(thinner)
         for number in self.rods:
@@ -75,19 +77,19 @@ class Draft:
                 self._size[node] *= _THINNER
         self._lay()
 
-    def _junction_faults(self, thinner: set[int]) -> list[str]:
+    def _junction_faults(self, thinner: set[int]) -> list[Fault]:
         faults = []
-        for node in self.junctions:
+        for node, block in self.junctions.items():
             corners = self.corners(node)
             if folded(np.moveaxis(corners, 2, 0)).any():
                 self._regular[node] = min(1.0, self._regular[node] + _SQUARER)
-                faults.append(f"junction {node} is folded")
+                faults.append(("a junction is folded", block.center))
             if not self._body.contains(corners).all():
                 thinner.add(node)
-                faults.append(f"junction {node} leaves the body")
+                faults.append(("a junction leaves the body", block.center))
         return faults
 
-    def _rod_faults(self, number: int, thinner: set[int]) -> list[str]:
+    def _rod_faults(self, number: int, thinner: set[int]) -> list[Fault]:
         sections, factors = self.sections(number), self.factors[number]
         bad = folded(sections)
         outside = ~self._body.contains(sections).all(axis=(1, 2))
@@ -102,8 +104,9 @@ class Draft:
             factors[k] = min(factors[k], _SLOPE * factors[k + 1])
         if number in self.quarters:
             factors[0] = factors[-1] = min(factors[0], factors[-1])
-        words = [("is folded", bad.any()), ("leaves the body", outside.any())]
-        return [f"branch {number} {what}" for what, so in words if so]
+        centers = self.rods[number].centers
+        places = [("a rod is folded", np.flatnonzero(bad)), ("a rod leaves the body", np.flatnonzero(outside))]
+        return [(what, centers[where[0]]) for what, where in places if len(where)]
 
     def _lay(self) -> None:
         """Lay all rods between the faces of the junctions as these are now."""
@@ -126,7 +129,7 @@ class Draft:
         first, last = (self._face(number, end) for end in (0, 1))
         total = branch.length
         start, stop = (
-            self.junctions[node].exits[number, end].length if node in self.junctions else self._tip(branch, end)
+            self.junctions[node].exits[number, end].length if node in self.junctions else tip(branch, end, self._body)
             for end, node in enumerate(branch.ends)
         )
         span = (start, total - stop)
@@ -146,16 +149,6 @@ class Draft:
         axis, side = axis_side(name)
         corners = face_layer(self.corners(node), name)
         return corners if bool(side) != (axis == 1) else corners.swapaxes(0, 1)
-
-    def _tip(self, branch: Branch, end: int) -> float:
-        """Return the length from the end of a limb back to its last section; negative where the limb goes on."""
-        points, radii = branch.points[:: 1 if end else -1], branch.radii[:: 1 if end else -1]
-        along = arc_lengths(points)
-        radius = float(np.median(radii[along >= 0.5 * along[-1]]))
-        base = max(0.5 * along[-1], along[-1] - _BACK * radius)
-        place = at_lengths(points, np.array([base]))[0]
-        reach = float(self._body.rays(place, unit(points[-1] - place)))
-        return float(along[-1] - max(base + 0.2 * radius, base + reach - _TIP * radius))
 
 
 def _is_near(point: Array, centers: Array, corners: Array) -> Mask:

@@ -1,6 +1,6 @@
 """Defines BlockLayout: blocks glued by whole faces, a thin start inside a body with handles or limbs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -25,7 +25,7 @@ __all__ = ["Block", "BlockLayout", "LayoutError", "block_layout"]
 SPANS = 6  # across each block
 _LONGEST = 4  # times the spans across: those along a rod at most
 _STRETCH = 2.0  # how long a span along a rod is, over one across the body: little changes along a rod
-_REPAIRS = 40  # rounds in which what is folded, or leaves the body, is made thinner
+_REPAIRS = 40  # rounds in which what is folded, leaves the body or meets another part is made thinner
 
 
 class LayoutError(ValueError):
@@ -87,16 +87,34 @@ class BlockLayout:
         return len(self.blocks)
 
 
-def block_layout(skeleton: Skeleton, vertices: Array, faces: IntArray, spans: int = SPANS) -> BlockLayout:
+def block_layout(
+    skeleton: Skeleton,
+    vertices: Array,
+    faces: IntArray,
+    spans: int = SPANS,
+    where: Callable[[Array], str] = in_brackets,
+) -> BlockLayout:
     """Return a thin start inside a body: rods along the branches of its skeleton, a block at each junction.
 
     Limbs have closed ends in their tips. The faces that are not glued form one closed surface of the body's genus.
 
-    skeleton: of the body, in the same units. vertices, faces: (n, 3), (m, 3) the surface, wound outward. spans: the
-    number of knot spans across each block; along a rod there are more where it is long.
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of the body, in the units of the surface.
+    vertices : (n, 3) array
+        Of the surface.
+    faces : (m, 3) array of int
+        Its triangles, wound outward.
+    spans : int
+        Of the knot vectors across each block; along a rod there are more where it is long.
+    where : function
+        Turns a place (3,) into words for messages, such as its coordinates in the user's units.
 
-    Raises LayoutError for a skeleton without branches, and where blocks stay folded, outside or in each other, however
-    thin.
+    Raises
+    ------
+    LayoutError
+        For a skeleton without branches, and where blocks stay folded, outside or in each other, however thin.
     """
     if not skeleton.branches:
         raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
@@ -111,8 +129,11 @@ def block_layout(skeleton: Skeleton, vertices: Array, faces: IntArray, spans: in
         if met is None:
             return layout
         draft.thin_near(np.array(met.point), met.patches or ())
-        faults = [f"two of its parts meet at {in_brackets(met.point)}"]
-    raise LayoutError(f"no start of blocks fits into the body: {faults[0]}; make the surface thicker there")
+        faults = [("two rods meet", np.array(met.point))]
+    what, place = faults[0]
+    raise LayoutError(
+        f"no start of blocks fits into the body: {what} near {where(place)}; make the surface wider there"
+    )
 
 
 def _blocks(draft: Draft, spans: int) -> Iterator[Block]:
