@@ -19,6 +19,9 @@ _SLOPE = 1.25  # the ratio of the factors of neighbouring sections, at most
 _NEAR = 1.5  # times the reach of a section: how far away from a meeting others are made thinner, too
 
 
+_ENOUGH = 0.6  # a rod's end with a factor below: the junction gives way, too
+_NEXT = {0: 1, -1: -2}  # the places of the sections beside the first and the last
+
 Fault = tuple[str, Array]  # what is wrong, and the place (3,)
 
 
@@ -36,8 +39,12 @@ class Draft:
         self._skeleton, self._body = skeleton, body
         self._size = {node: 1.0 for node, degree in enumerate(skeleton.degrees) if degree > 2}
         self._regular = dict.fromkeys(self._size, 0.0)
+        self.junctions: dict[int, Junction] = {}
+        self.rods: dict[int, Rod] = {}
+        self.quarters: dict[int, int] = {}
+        self.faces: dict[int, tuple[Array | None, Array | None]] = {}
         self.factors: dict[int, Array] = {}
-        self._lay()
+        self._lay(set(self._size))
 
     def sections(self, number: int) -> Array:
         """Return the sections (m, 2, 2, 3) of a branch."""
@@ -56,13 +63,15 @@ class Draft:
     def repaired(self) -> list[Fault]:
         """Make thinner what is folded or leaves the body, and return the faults: the draft had none if it is empty."""
         thinner: set[int] = set()
-        faults = self._junction_faults(thinner)
+        squarer: set[int] = set()
+        faults = self._junction_faults(thinner, squarer)
         for number in self.rods:
             faults += self._rod_faults(number, thinner)
         for node in thinner:
             self._size[node] *= _THINNER
-        if faults:
-            self._lay()
+        for node in squarer:
+            self._regular[node] = min(1.0, self._regular[node] + _SQUARER)
+        self._lay(thinner | squarer)
         return faults
 
     def thin_near(self, point: Array, blocks: tuple[int, ...]) -> None:
@@ -70,19 +79,23 @@ class Draft:
 
         blocks: the numbers of those that meet; the junctions come first.
         """
+        met = {node for number, node in enumerate(self.junctions) if number in blocks}
         for number, laid in self.rods.items():
-            self.factors[number][_is_near(point, laid.centers, self.sections(number))] *= _THINNER
-        for number, node in enumerate(self.junctions):
-            if number in blocks:
-                self._size[node] *= _THINNER
-        self._lay()
+            near = _is_near(point, laid.centers, self.sections(number))
+            self.factors[number][near] *= _THINNER
+            for place, node in zip((0, -1), self._skeleton.branches[number].ends, strict=True):
+                if near[place] and node in self._size and self.factors[number][place] < _ENOUGH:
+                    met.add(node)  # whose face is the rod's end, which has no factor of its own
+        for node in met:
+            self._size[node] *= _THINNER
+        self._lay(met)
 
-    def _junction_faults(self, thinner: set[int]) -> list[Fault]:
+    def _junction_faults(self, thinner: set[int], squarer: set[int]) -> list[Fault]:
         faults = []
         for node, block in self.junctions.items():
             corners = self.corners(node)
             if folded(np.moveaxis(corners, 2, 0)).any():
-                self._regular[node] = min(1.0, self._regular[node] + _SQUARER)
+                squarer.add(node)
                 faults.append(("a junction is folded", block.center))
             if not self._body.contains(corners).all():
                 thinner.add(node)
@@ -95,7 +108,7 @@ class Draft:
         outside = ~self._body.contains(sections).all(axis=(1, 2))
         touched = outside | np.append(bad, False) | np.append(False, bad)
         for place, node in zip((0, -1), self._skeleton.branches[number].ends, strict=True):
-            if bad[place] and node in self._size:
+            if bad[place] and node in self._size and _reach(sections)[place] > _reach(sections)[_NEXT[place]]:
                 thinner.add(node)
         factors[touched] *= _THINNER
         for k in range(1, len(factors)):
@@ -108,15 +121,13 @@ class Draft:
         places = [("a rod is folded", np.flatnonzero(bad)), ("a rod leaves the body", np.flatnonzero(outside))]
         return [(what, centers[where[0]]) for what, where in places if len(where)]
 
-    def _lay(self) -> None:
-        """Lay all rods between the faces of the junctions as these are now."""
-        self.junctions: dict[int, Junction] = {
-            node: junction(self._skeleton, node, self._body, size) for node, size in self._size.items()
-        }
-        self.rods: dict[int, Rod] = {}
-        self.quarters: dict[int, int] = {}
-        self.faces: dict[int, tuple[Array | None, Array | None]] = {}
+    def _lay(self, nodes: set[int]) -> None:
+        """Place the junctions at some nodes by their factors, and lay the rods between their faces."""
+        for node in sorted(nodes):
+            self.junctions[node] = junction(self._skeleton, node, self._body, self._size[node])
         for number, branch in enumerate(self._skeleton.branches):
+            if number in self.rods and not nodes.intersection(branch.ends):
+                continue
             if branch.ends[0] == branch.ends[1] and branch.ends[0] not in self.junctions:
                 self.rods[number], self.quarters[number] = ring(branch.points, branch.radii, self._body)
                 self.faces[number] = (None, None)
@@ -151,7 +162,12 @@ class Draft:
         return corners if bool(side) != (axis == 1) else corners.swapaxes(0, 1)
 
 
-def _is_near(point: Array, centers: Array, corners: Array) -> Mask:
-    """Return which of several balls reach a point (3,): their centers (k, 3), and the corners (k, ..., 3) within."""
-    reach = np.linalg.norm(corners.reshape(len(centers), -1, 3) - centers[:, None], axis=-1).max(axis=1)
-    return np.asarray(np.linalg.norm(centers - point, axis=1) <= _NEAR * reach)
+def _is_near(point: Array, centers: Array, sections: Array) -> Mask:
+    """Return which of the balls around sections (k, 2, 2, 3), a little larger than these, hold a point (3,)."""
+    return np.asarray(np.linalg.norm(centers - point, axis=1) <= _NEAR * _reach(sections))
+
+
+def _reach(sections: Array) -> Array:
+    """Return the largest distance of the corners of sections (k, 2, 2, 3) from their middles: (k,)."""
+    middles = sections.mean(axis=(1, 2), keepdims=True)
+    return np.asarray(np.linalg.norm(sections - middles, axis=-1).max(axis=(1, 2)))

@@ -17,6 +17,7 @@ _MUCH = np.radians(20.0)  # as much helps five branches or more at any angle: si
 _REACH = 1.5  # radii of a node at which its branches' directions are taken: beyond the ball that they share
 _APART = 0.5  # of the room on either side: where the two nodes of a split lie
 _ROOM = 2.0  # radii of a node: no room is taken for larger, so that a plate's nodes stay near their branches
+_ROUNDINGS = 10  # of a branch that is led to another node, where it has a kink
 
 End = tuple[int, int]  # the number of a branch, and 0 for its first end, 1 for its last
 
@@ -137,7 +138,17 @@ def led_to(branch: Branch, end: int, node: int, place: Array, center: Array) -> 
     along = arc_lengths(kept)
     even = np.linspace(0.0, along[-1], len(points))
     radii = np.interp(even, along, np.concatenate([radii[:1], radii[~near]]))
-    kept = at_lengths(kept, even)
+    rounded = _rounded(at_lengths(kept, even))
+    kept = at_lengths(rounded, np.linspace(0.0, arc_lengths(rounded)[-1], len(points)))
     ends = (branch.ends[0], node) if end else (node, branch.ends[1])
     step = -1 if end else 1
     return Branch(ends, kept[::step], radii[::step])
+
+
+def _rounded(points: Array) -> Array:
+    """Return a curve (k, 3) with its kinks rounded off in its first half; its ends stay."""
+    share = np.clip(2.0 - 4.0 * np.arange(1, len(points) - 1) / len(points), 0.0, 1.0)[:, None]
+    for _ in range(_ROUNDINGS):
+        middle = 0.25 * (points[:-2] + 2.0 * points[1:-1] + points[2:])
+        points = np.concatenate([points[:1], points[1:-1] + share * (middle - points[1:-1]), points[-1:]])
+    return points
