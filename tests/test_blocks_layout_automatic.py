@@ -1,4 +1,4 @@
-"""Starts of blocks from skeletons: right-handed, inside the body, closed, of its genus."""
+"""Starts of blocks from skeletons: right-handed, inside the body, closed, of its genus, in one piece."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,9 @@ from thick_graphs import curve, exposed_genus, genus, loop, thick
 from parameterize.blocks.inside import Body
 from parameterize.blocks.layout import LayoutError, block_layout
 from parameterize.certificate.body import certify
+from parameterize.certificate.boundary import check_boundary
 from parameterize.skeleton.graph import Skeleton
 from parameterize.spline.multipatch import MultiPatch
-from parameterize.spline.volume import BSplineVolume
 
 HUB, X, Y, Z = np.zeros(3), *np.eye(3)
 
@@ -47,24 +47,18 @@ GRAPHS = {
 }
 
 
-def trilinear(block):
-    """The block as a spline of degree 1."""
-    count = len(block.sections)
-    knots = np.concatenate([[0.0], np.linspace(0.0, 1.0, count), [1.0]])
-    ends = np.array([0.0, 0.0, 1.0, 1.0])
-    return BSplineVolume((1, 1, 1), (ends, ends, knots), np.ascontiguousarray(np.moveaxis(block.sections, 0, 2)))
-
-
 @pytest.fixture(scope="module", params=GRAPHS, ids=lambda name: name.replace(" ", "_"))
 def start(request):
-    skeleton, vertices, faces = thick(*GRAPHS[request.param])
+    skeleton, vertices, faces = thick(*GRAPHS[request.param], cells=60)  # fingers fuse on fewer
     return block_layout(skeleton, vertices, faces), vertices, faces, skeleton
 
 
 def test_a_start_is_right_handed_inside_the_body_and_of_its_genus(start):
     layout, vertices, faces, skeleton = start
-    certificate = certify(MultiPatch(tuple(map(trilinear, layout.blocks)), layout.interfaces))
+    body = MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    certificate = certify(body)
     assert certificate.verdict == "certified" and not any(patch.left_handed for patch in certificate.patches)
+    assert check_boundary(body).injective
     assert Body(vertices, faces).contains(layout.corners).all()
     assert exposed_genus(layout) == genus(vertices, faces) == skeleton.handles
 
@@ -83,3 +77,18 @@ def test_limbs_end_in_their_tips(start):
 def test_a_point_is_refused():
     with pytest.raises(LayoutError, match="one cube serves such a body"):
         block_layout(Skeleton(np.zeros((1, 3)), np.ones(1), (), 1.0, 0.04), np.zeros((0, 3)), np.zeros((0, 3), int))
+
+
+def test_spans_follow_the_lengths():
+    skeleton, vertices, faces = thick(*GRAPHS["limb on a circle"])
+    layout = block_layout(skeleton, vertices, faces, spans=5)
+    spans = {block.name: block.spans for block in layout.blocks}
+    assert spans["junction 0"] == (5, 5, 5)
+    assert spans["rod 0"] == (5, 5, 20)  # more than eight times as long as wide: four times the spans across
+    assert spans["rod 1"][:2] == (5, 5) and 5 <= spans["rod 1"][2] <= 8  # a sixth as long
+
+
+def test_a_skeleton_that_leaves_the_body_is_refused_with_the_place():
+    skeleton, vertices, faces = thick(*GRAPHS["rod"])
+    with pytest.raises(LayoutError, match=r"a rod is folded near here; make the surface wider there"):
+        block_layout(skeleton, vertices + 0.25 * Z, faces, where=lambda place: "here")

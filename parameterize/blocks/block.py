@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..spline.interface import face_layer
+from ..spline.volume import BSplineVolume
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +43,12 @@ class Block:
 
     def points(self, places: Array) -> Array:
         """Return the points (..., 3) at parameters (..., 3) in the unit cube."""
-        u, v, w = np.moveaxis(places, -1, 0)[..., None]
-        last = len(self.sections) - 2
-        below = np.clip((w[..., 0] * (last + 1)).astype(np.int64), 0, last)
-        along = w * (last + 1) - below[..., None]
-        corners = self.sections[below], self.sections[below + 1]
-        low, high = (
-            (1 - u) * ((1 - v) * c[..., 0, 0, :] + v * c[..., 0, 1, :])
-            + u * ((1 - v) * c[..., 1, 0, :] + v * c[..., 1, 1, :])
-            for c in corners
-        )
-        return np.asarray((1 - along) * low + along * high)
+        return np.asarray(self.spline(places.reshape(-1, 3)).reshape(places.shape))
+
+    @property
+    def spline(self) -> BSplineVolume:
+        """Return the block as a spline of degree 1."""
+        even = np.linspace(0.0, 1.0, len(self.sections))
+        knots = np.array([0.0, 0.0, 1.0, 1.0])
+        points = np.ascontiguousarray(np.moveaxis(self.sections, 0, 2))
+        return BSplineVolume((1, 1, 1), (knots, knots, np.concatenate([[0.0], even, [1.0]])), points)

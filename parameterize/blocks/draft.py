@@ -2,22 +2,27 @@
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 from ..skeleton.graph import Branch, Skeleton
 from ..spline.interface import axis_side, face_layer
 from .checks import folded
-from .frames import arc_lengths, at_lengths, unit
+from .frames import at_lengths
 from .inside import Body
 from .junctions import Junction, junction
 from .rings import ring
 from .rods import Rod, ends_turned, rod
+from .tips import tip
 
-_TIP = 0.8  # radii of a limb: from its last section to the surface in front of it
-_BACK = 1.5  # radii of a limb: how far before its end its direction is taken
 _THINNER = 0.8  # a factor of sections and junctions that are folded or leave the body
 _SQUARER = 0.2  # share of a plain box by which a junction that is folded comes closer to one
 _SLOPE = 1.25  # the ratio of the factors of neighbouring sections, at most
-_LEAST = 0.05  # the factor below which a section is given up
+_NEAR = 1.5  # times the reach of a section: how far away from a meeting others are made thinner, too
+
+
+_ENOUGH = 0.6  # a rod's end with a factor below: the junction gives way, too
+_NEXT = {0: 1, -1: -2}  # the places of the sections beside the first and the last
+
+Fault = tuple[str, Array]  # what is wrong, and the place (3,)
 
 
 class Draft:
@@ -32,13 +37,14 @@ class Draft:
 
     def __init__(self, skeleton: Skeleton, body: Body) -> None:
         self._skeleton, self._body = skeleton, body
-        self.junctions: dict[int, Junction] = {
-            node: junction(skeleton, node, body) for node, degree in enumerate(skeleton.degrees) if degree > 2
-        }
-        self._size = dict.fromkeys(self.junctions, 1.0)
-        self._regular = dict.fromkeys(self.junctions, 0.0)
+        self._size = {node: 1.0 for node, degree in enumerate(skeleton.degrees) if degree > 2}
+        self._regular = dict.fromkeys(self._size, 0.0)
+        self.junctions: dict[int, Junction] = {}
+        self.rods: dict[int, Rod] = {}
+        self.quarters: dict[int, int] = {}
+        self.faces: dict[int, tuple[Array | None, Array | None]] = {}
         self.factors: dict[int, Array] = {}
-        self._lay()
+        self._lay(set(self._size))
 
     def sections(self, number: int) -> Array:
         """Return the sections (m, 2, 2, 3) of a branch."""
@@ -52,34 +58,58 @@ class Draft:
 
     def corners(self, node: int) -> Array:
         """Return the corners (2, 2, 2, 3) of a junction, [u][v][w]."""
-        return self.junctions[node].corners(self._size[node], self._regular[node])
+        return self.junctions[node].corners(self._regular[node])
 
-    def repaired(self) -> list[str]:
-        """Make thinner what is folded or leaves the body; return what was: nothing is left to do when it is empty."""
-        faults = [*self._junction_faults(), *(fault for i in self.rods for fault in self._rod_faults(i))]
-        self._lay()
+    def repaired(self) -> list[Fault]:
+        """Make thinner what is folded or leaves the body, and return the faults: the draft had none if it is empty."""
+        thinner: set[int] = set()
+        squarer: set[int] = set()
+        faults = self._junction_faults(thinner, squarer)
+        for number in self.rods:
+            faults += self._rod_faults(number, thinner)
+        for node in thinner:
+            self._size[node] *= _THINNER
+        for node in squarer:
+            self._regular[node] = min(1.0, self._regular[node] + _SQUARER)
+        self._lay(thinner | squarer)
         return faults
 
-    def _junction_faults(self) -> list[str]:
+    def thin_near(self, point: Array, blocks: tuple[int, ...]) -> None:
+        """Make rods thinner around a point (3,) where the boundary meets itself, and junctions that meet there.
+
+        blocks: the numbers of those that meet; the junctions come first.
+        """
+        met = {node for number, node in enumerate(self.junctions) if number in blocks}
+        for number, laid in self.rods.items():
+            near = _is_near(point, laid.centers, self.sections(number))
+            self.factors[number][near] *= _THINNER
+            for place, node in zip((0, -1), self._skeleton.branches[number].ends, strict=True):
+                if near[place] and node in self._size and self.factors[number][place] < _ENOUGH:
+                    met.add(node)  # whose face is the rod's end, which has no factor of its own
+        for node in met:
+            self._size[node] *= _THINNER
+        self._lay(met)
+
+    def _junction_faults(self, thinner: set[int], squarer: set[int]) -> list[Fault]:
         faults = []
-        for node in self.junctions:
+        for node, block in self.junctions.items():
             corners = self.corners(node)
             if folded(np.moveaxis(corners, 2, 0)).any():
-                self._regular[node] = min(1.0, self._regular[node] + _SQUARER)
-                faults.append(f"junction {node} is folded")
+                squarer.add(node)
+                faults.append(("a junction is folded", block.center))
             if not self._body.contains(corners).all():
-                self._size[node] *= _THINNER
-                faults.append(f"junction {node} leaves the body")
+                thinner.add(node)
+                faults.append(("a junction leaves the body", block.center))
         return faults
 
-    def _rod_faults(self, number: int) -> list[str]:
+    def _rod_faults(self, number: int, thinner: set[int]) -> list[Fault]:
         sections, factors = self.sections(number), self.factors[number]
         bad = folded(sections)
         outside = ~self._body.contains(sections).all(axis=(1, 2))
         touched = outside | np.append(bad, False) | np.append(False, bad)
         for place, node in zip((0, -1), self._skeleton.branches[number].ends, strict=True):
-            if bad[place] and node in self._size:
-                self._size[node] *= np.sqrt(_THINNER)
+            if bad[place] and node in self._size and _reach(sections)[place] > _reach(sections)[_NEXT[place]]:
+                thinner.add(node)
         factors[touched] *= _THINNER
         for k in range(1, len(factors)):
             factors[k] = min(factors[k], _SLOPE * factors[k - 1])
@@ -87,27 +117,30 @@ class Draft:
             factors[k] = min(factors[k], _SLOPE * factors[k + 1])
         if number in self.quarters:
             factors[0] = factors[-1] = min(factors[0], factors[-1])
-        words = [("is folded", bad.any()), ("leaves the body", outside.any())]
-        return [f"branch {number} {what}" for what, so in words if so]
+        centers = self.rods[number].centers
+        places = [("a rod is folded", np.flatnonzero(bad)), ("a rod leaves the body", np.flatnonzero(outside))]
+        return [(what, centers[where[0]]) for what, where in places if len(where)]
 
-    def _lay(self) -> None:
-        """Lay all rods between the faces of the junctions as these are now."""
-        self.rods: dict[int, Rod] = {}
-        self.quarters: dict[int, int] = {}
-        self.faces: dict[int, tuple[Array | None, Array | None]] = {}
+    def _lay(self, nodes: set[int]) -> None:
+        """Place the junctions at some nodes by their factors, and lay the rods between their faces."""
+        for node in sorted(nodes):
+            self.junctions[node] = junction(self._skeleton, node, self._body, self._size[node])
         for number, branch in enumerate(self._skeleton.branches):
+            if number in self.rods and not nodes.intersection(branch.ends):
+                continue
             if branch.ends[0] == branch.ends[1] and branch.ends[0] not in self.junctions:
                 self.rods[number], self.quarters[number] = ring(branch.points, branch.radii, self._body)
                 self.faces[number] = (None, None)
             else:
                 self._lay_rod(number, branch)
-            self.factors.setdefault(number, np.ones(len(self.rods[number].centers)))
+            if len(self.factors.get(number, [])) != len(self.rods[number].centers):
+                self.factors[number] = np.ones(len(self.rods[number].centers))
 
     def _lay_rod(self, number: int, branch: Branch) -> None:
         first, last = (self._face(number, end) for end in (0, 1))
         total = branch.length
         start, stop = (
-            self.junctions[node].exits[number, end].length if node in self.junctions else self._tip(branch, end)
+            self.junctions[node].exits[number, end].length if node in self.junctions else tip(branch, end, self._body)
             for end, node in enumerate(branch.ends)
         )
         span = (start, total - stop)
@@ -128,12 +161,13 @@ class Draft:
         corners = face_layer(self.corners(node), name)
         return corners if bool(side) != (axis == 1) else corners.swapaxes(0, 1)
 
-    def _tip(self, branch: Branch, end: int) -> float:
-        """Return the length from the end of a limb back to its last section; negative where the limb goes on."""
-        points, radii = branch.points[:: 1 if end else -1], branch.radii[:: 1 if end else -1]
-        along = arc_lengths(points)
-        radius = float(np.median(radii[along >= 0.5 * along[-1]]))
-        base = max(0.5 * along[-1], along[-1] - _BACK * radius)
-        place = at_lengths(points, np.array([base]))[0]
-        reach = float(self._body.rays(place, unit(points[-1] - place)))
-        return float(along[-1] - max(base + 0.2 * radius, base + reach - _TIP * radius))
+
+def _is_near(point: Array, centers: Array, sections: Array) -> Mask:
+    """Return which of the balls around sections (k, 2, 2, 3), a little larger than these, hold a point (3,)."""
+    return np.asarray(np.linalg.norm(centers - point, axis=1) <= _NEAR * _reach(sections))
+
+
+def _reach(sections: Array) -> Array:
+    """Return the largest distance of the corners of sections (k, 2, 2, 3) from their middles: (k,)."""
+    middles = sections.mean(axis=(1, 2), keepdims=True)
+    return np.asarray(np.linalg.norm(sections - middles, axis=-1).max(axis=(1, 2)))

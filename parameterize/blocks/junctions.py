@@ -40,14 +40,13 @@ class Junction:
     half: Array
     exits: Mapping[End, "Exit"]
 
-    def corners(self, shrink: float, regular: float) -> Array:
+    def corners(self, regular: float) -> Array:
         """Return the corners (2, 2, 2, 3), [u][v][w].
 
-        Each is the mean of the places where the branches of its faces would have it.
-
-        shrink: a factor of the size. regular: the share, 0 to 1, of a plain box in the result.
+        Each is the mean of the places where the branches of its faces would have it. regular: the share, 0 to 1, of a
+        plain box in the result.
         """
-        box = self.center + shrink * (_CORNERS * self.half) @ self.axes  # (8, 3)
+        box = self.center + (_CORNERS * self.half) @ self.axes  # (8, 3)
         sums, counts = np.zeros((8, 3)), np.zeros(8)
         for leave in self.exits.values():
             axis, side = axis_side(leave.face)
@@ -55,7 +54,7 @@ class Junction:
             frame = rotated(self.axes, NORMALS[FACE_NAMES.index(leave.face)] @ self.axes, leave.tangent)
             spread = _CORNERS * self.half
             spread[:, axis] = 0.0
-            sums[there] += (self.center + shrink * (leave.point - self.center + spread @ frame))[there]
+            sums[there] += (leave.point + spread @ frame)[there]
             counts[there] += 1.0
         placed = np.where(counts[:, None] > 0.0, sums / np.maximum(counts, 1.0)[:, None], box)
         return np.asarray(((1.0 - regular) * placed + regular * box).reshape(2, 2, 2, 3))
@@ -71,8 +70,8 @@ class Exit:
     tangent: Array
 
 
-def junction(skeleton: Skeleton, node: int, body: Body) -> Junction:
-    """Return the block at a node of three to six branches."""
+def junction(skeleton: Skeleton, node: int, body: Body, size: float) -> Junction:
+    """Return the block at a node of three to six branches. size: a factor of its widths."""
     ends, found = junction_at(skeleton, node)
     center, radius = skeleton.nodes[node], float(skeleton.radii[node])
     free = np.setdiff1d(np.arange(len(NORMALS)), found.faces)
@@ -80,7 +79,7 @@ def junction(skeleton: Skeleton, node: int, body: Body) -> Junction:
     room[free] = np.minimum(room[free], body.rays(center, NORMALS[free] @ found.axes))
     for (i, _), face in zip(ends, found.faces, strict=True):
         room[face] = min(room[face], _SHARE / _THIN * skeleton.branches[i].length)
-    half = _THIN * room.reshape(3, 2).min(axis=1)
+    half = size * _THIN * room.reshape(3, 2).min(axis=1)
     exits = {
         end: _exit(stub(skeleton.branches[end[0]], end[1]), FACE_NAMES[face], center, float(half[face // 2]))
         for end, face in zip(ends, found.faces.tolist(), strict=True)

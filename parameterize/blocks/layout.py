@@ -1,18 +1,21 @@
 """Defines BlockLayout: blocks glued by whole faces, a thin start inside a body with handles or limbs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, IntArray, Mask
+from ..arrays import Array, IntArray, Mask, in_brackets
+from ..certificate.boundary import check_boundary
 from ..skeleton.graph import Skeleton
 from ..spline.interface import Face, Interface, face_label, orientations, varying
+from ..spline.multipatch import MultiPatch
 from ..spline.volume import FACE_NAMES
 from .block import Block
 from .draft import Draft
 from .inside import Body
+from .merging import merge
 from .rings import PARTS
 from .rods import Rod
 from .splitting import split
@@ -21,7 +24,8 @@ __all__ = ["Block", "BlockLayout", "LayoutError", "block_layout"]
 
 SPANS = 6  # across each block
 _LONGEST = 4  # times the spans across: those along a rod at most
-_REPAIRS = 40  # rounds in which what is folded, or leaves the body, is made thinner
+_STRETCH = 2.0  # how long a span along a rod is, over one across the body: little changes along a rod
+_REPAIRS = 120  # rounds in which what is folded, leaves the body or meets another part is made thinner
 
 
 class LayoutError(ValueError):
@@ -83,27 +87,53 @@ class BlockLayout:
         return len(self.blocks)
 
 
-def block_layout(skeleton: Skeleton, vertices: Array, faces: IntArray, spans: int = SPANS) -> BlockLayout:
+def block_layout(
+    skeleton: Skeleton,
+    vertices: Array,
+    faces: IntArray,
+    spans: int = SPANS,
+    where: Callable[[Array], str] = in_brackets,
+) -> BlockLayout:
     """Return a thin start inside a body: rods along the branches of its skeleton, a block at each junction.
 
     Limbs have closed ends in their tips. The faces that are not glued form one closed surface of the body's genus.
 
-    skeleton: of the body, in the same units. vertices, faces: (n, 3), (m, 3) the surface, wound outward. spans: the
-    number of knot spans across each block; along a rod they are as long as across, up to four times as many.
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of the body, in the units of the surface.
+    vertices : (n, 3) array
+        Of the surface.
+    faces : (m, 3) array of int
+        Its triangles, wound outward.
+    spans : int
+        Of the knot vectors across each block; along a rod there are more where it is long.
+    where : function
+        Turns a place (3,) into words for messages, such as its coordinates in the user's units.
 
-    Raises LayoutError for a skeleton without branches, and where blocks stay folded, or outside, however thin.
+    Raises
+    ------
+    LayoutError
+        For a skeleton without branches, and where blocks stay folded, outside or in each other, however thin.
     """
     if not skeleton.branches:
         raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
     body = Body(vertices, faces)
-    draft = Draft(split(skeleton, body), body)
+    draft = Draft(split(merge(skeleton, body), body), body)
     for _ in range(_REPAIRS):
         faults = draft.repaired()
-        if not faults:
-            break
-    else:
-        raise LayoutError(f"no start of blocks fits into the body: {faults[0]}; make that part of the surface thicker")
-    return BlockLayout.from_blocks(list(_blocks(draft, spans)))
+        if faults:
+            continue
+        layout = BlockLayout.from_blocks(list(_blocks(draft, spans)))
+        met = check_boundary(MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)).meeting
+        if met is None:
+            return layout
+        draft.thin_near(np.array(met.point), met.patches or ())
+        faults = [("two rods meet", np.array(met.point))]
+    what, place = faults[0]
+    raise LayoutError(
+        f"no start of blocks fits into the body: {what} near {where(place)}; make the surface wider there"
+    )
 
 
 def _blocks(draft: Draft, spans: int) -> Iterator[Block]:
@@ -120,8 +150,9 @@ def _blocks(draft: Draft, spans: int) -> Iterator[Block]:
 
 
 def _spans_along(rod: Rod, parts: int, spans: int) -> int:
-    """Return the spans along a part of a rod: as long as those across."""
-    return int(np.clip(round(spans * rod.length / (parts * rod.body_width)), spans, _LONGEST * spans))
+    """Return the spans along a part of a rod: by its length over the body's width."""
+    count = round(spans * rod.length / (parts * _STRETCH * rod.body_width))
+    return int(np.clip(count, spans, _LONGEST * spans))
 
 
 def _interfaces(blocks: Sequence[Block]) -> Iterator[Interface]:

@@ -33,7 +33,7 @@ class Rod:
     radius: float
 
     def sections(self, shrink: Array) -> Array:
-        """Return the corners (m, 2, 2, 3) of sections whose size is multiplied by factors (m,)."""
+        """Return the corners (m, 2, 2, 3) of sections whose widths are multiplied by factors (m,)."""
         return np.asarray(self.centers[:, None, None] + shrink[:, None, None, None] * self.offsets)
 
     @property
@@ -68,6 +68,8 @@ def rod(
     right-handed with the curve; None at the tip of a limb.
     """
     radius = float(np.median(radii))
+    if first is not None and last is not None and span[1] - span[0] < _reach(first) + _reach(last):
+        return ruled(first, last, radius)
     count = int(np.clip(np.ceil((span[1] - span[0]) / (_STEP * radius)) + 1, _FEWEST, _MOST))
     lengths = np.linspace(*span, count)
     centers = at_lengths(points, lengths)
@@ -82,8 +84,25 @@ def rod(
     offsets = plain_offsets(centers, along, across, body)
     for face, place in ((first, 0), (last, -1)):
         if face is not None:
-            centers, offsets = _led_to(face, centers, offsets, lengths if place == 0 else lengths[::-1], place)
+            away = np.abs(lengths - lengths[place])
+            share = np.clip(away / min(max(_reach(face), radius), 0.5 * float(away.max())), 0.0, 1.0)
+            own = share**2 * (3.0 - 2.0 * share)
+            middle = face.mean(axis=(0, 1))
+            centers = centers + (1.0 - own)[:, None] * (middle - centers[place])
+            offsets = own[:, None, None, None] * offsets + (1.0 - own)[:, None, None, None] * (face - middle)
     return Rod(centers, offsets, radius)
+
+
+def ruled(first: Array, last: Array, radius: float) -> Rod:
+    """Return the straight piece between two faces (2, 2, 3)."""
+    faces = np.stack([first, last])
+    centers = faces.mean(axis=(1, 2))
+    return Rod(centers, faces - centers[:, None, None], radius)
+
+
+def _reach(face: Array) -> float:
+    """Return the length over which sections part from the shape of a junction's face (2, 2, 3)."""
+    return _BLEND * float(np.linalg.norm(face - face.mean(axis=(0, 1)), axis=-1).max())
 
 
 def plain_offsets(centers: Array, along: Array, across: Array, body: Body) -> Array:
@@ -112,20 +131,3 @@ def flattest(centers: Array, along: Array, body: Body) -> Array:
 def _side(corners: Array) -> Array:
     """Return the mean direction (3,) of u on a face."""
     return unit((corners[1] - corners[0]).mean(axis=0))
-
-
-def _led_to(face: Array, centers: Array, offsets: Array, lengths: Array, place: int) -> tuple[Array, Array]:
-    """Return centers and offsets that begin, or end, in a given face, from which they part little by little.
-
-    lengths: (m,) in the order in which the face comes first.
-    """
-    middle = face.mean(axis=(0, 1))
-    reach = _BLEND * np.linalg.norm(face - middle, axis=-1).max()
-    away = np.abs(lengths - lengths[0])
-    away = away if place == 0 else away[::-1]
-    reach = min(float(reach), 0.5 * float(away.max()))
-    share = np.clip(away / reach, 0.0, 1.0)
-    share = share**2 * (3.0 - 2.0 * share)
-    moved = centers + (1.0 - share)[:, None] * (middle - centers[place])
-    mixed = share[:, None, None, None] * offsets + (1.0 - share)[:, None, None, None] * (face - middle)
-    return moved, mixed

@@ -1,4 +1,4 @@
-"""Finds the limbs of a body: the parts that stick out from its core by more than they are wide at their root.
+"""Finds the limbs of a body: the parts that stick out from its core by about as much as they are wide.
 
 The distance inside the body from its core divides it into slabs, whose connected pieces form a graph (G. Reeb). The
 points beyond a distance form pieces, too: seen from far to near, one begins at each farthest point and ends where it
@@ -14,9 +14,9 @@ from ..surface.geometry import connected
 from .crossings import DIRECTIONS
 
 SLAB = 2.0  # cells: more than the longest step between neighbours, so no step leaps over a slab
-SLENDER = 0.8  # length over width: a rod that sticks out by less is pulled out of a block's face as well
-WEDGE = 2.0  # a part that narrows to its tip counts as so many times wider as its width falls, on average, below the
-# greatest: a corner of a plate, whose mean is half, needs an angle below 45 degrees
+SLENDER = 0.75  # length over width: a rod that sticks out by less is pulled out of a block's face as well
+WEDGE = 2.0  # how often the excess of the width near the root counts as width: a corner of a plate is a limb where its
+# angle is below 60 degrees
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def protrusions(inside: Mask, distance: Array, least: float) -> list[Protrusion]
     inside : (n_x, n_y, n_z) array of bool
         The lattice points of the body.
     distance : (n_x, n_y, n_z) array
-        Of the points inside from the core, along paths in the body, in cells.
+        How far the points inside are from the core, along paths in the body, in cells.
     least : float
         The length of the shortest limb, in cells.
     """
@@ -77,8 +77,7 @@ class _Pieces:
         widths = self.widths.setdefault(elder, [])
         widths.append(float(self.width[own]))
         length = float(self.peak[elder] - self.base[own])
-        widest = max(widths)  # near the core a slab is small again, and the part beyond it is not
-        if length >= max(self.least, SLENDER * (widest + (WEDGE - 1.0) * (widest - sum(widths) / len(widths)))):
+        if length >= max(self.least, SLENDER * _effective_width(widths)):
             self.longest[elder] = length
 
     def limbs(self) -> list[tuple[int, float]]:
@@ -90,6 +89,12 @@ class _Pieces:
             self.root[own] = self.root[self.root[own]]
             own = int(self.root[own])
         return own
+
+
+def _effective_width(widths: list[float]) -> float:
+    """Return the mean of the widths (k,) from a tip to its root, and more of a part that narrows to its tip."""
+    mean, root = (float(np.mean(part)) for part in (widths, widths[-((len(widths) + 2) // 3) :]))
+    return mean + WEDGE * max(root - mean, 0.0)
 
 
 def _links(inside: Mask) -> IntArray:

@@ -24,6 +24,7 @@ KNOTTED = (
     "a knotted tunnel: the body is no graph of thick branches, so it cannot be cut into blocks along its skeleton; "
     "fill the tunnel or cut the model into pieces"
 )
+REACHED = 0.95  # share of the volume within the reach: the last points in corners say little of a body's width
 _MOST_PAIRS = 2_000_000  # of points and balls compared at once: 50 MB
 
 
@@ -119,18 +120,20 @@ def _measured(web: Web, lattice: Lattice, vertices: Array, faces: IntArray) -> S
         for arc, points in zip(web.arcs, curves, strict=True)
     )
     at_nodes = radii(nodes)
-    balls = np.concatenate([nodes, *curves]), np.concatenate([at_nodes, *(branch.radii for branch in branches)])
-    return Skeleton(nodes, at_nodes, branches, _share_in_balls(*balls, lattice), lattice.cell)
-
-
-def _share_in_balls(centers: Array, radii: Array, lattice: Lattice) -> float:
-    """Return the share of the points inside that lie in one of the balls, centers (k, 3), radii (k,)."""
     index = np.argwhere(lattice.inside)
-    points = lattice.places(index[:: len(index) // SAMPLES + 1])
-    covered = np.zeros(len(points), dtype=bool)
-    step = _MOST_PAIRS // len(points)
+    samples = lattice.places(index[:: len(index) // SAMPLES + 1])
+    centers = np.concatenate([nodes, *curves])
+    tube = _share_in_balls(samples, centers, np.concatenate([at_nodes, *(branch.radii for branch in branches)]))
+    reach = float(np.quantile(np.asarray(cKDTree(centers).query(samples)[0]), REACHED))
+    return Skeleton(nodes, at_nodes, branches, tube, lattice.cell, reach)
+
+
+def _share_in_balls(samples: Array, centers: Array, radii: Array) -> float:
+    """Return the share of samples (m, 3) that lie in one of the balls, centers (k, 3), radii (k,)."""
+    covered = np.zeros(len(samples), dtype=bool)
+    step = _MOST_PAIRS // len(samples)
     for begin in range(0, len(centers), step):
         part = slice(begin, begin + step)
-        gaps = np.linalg.norm(points[:, None] - centers[None, part], axis=2)
+        gaps = np.linalg.norm(samples[:, None] - centers[None, part], axis=2)
         covered |= (gaps < radii[None, part]).any(axis=1)
     return float(covered.mean())

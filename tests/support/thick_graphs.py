@@ -30,22 +30,18 @@ def loop(node, outward, across, size, steps=60):
     return np.array(node, float) + size * ((1 + np.cos(angle)) * outward + np.sin(angle) * across)
 
 
-def thick(nodes, edges, radius=RADIUS, flat=1.0, cells=60):
-    """The skeleton of curves (first node, last node, points), and the surface around them: vertices and faces.
-
-    flat: how many times farther away the surface is along x and y than along z.
-    """
-    stretch = np.array([flat, flat, 1.0])
+def thick(nodes, edges, radius=RADIUS, cells=44):
+    """The skeleton of curves (first node, last node, points), and the surface around them: vertices and faces."""
     branches = tuple(Branch((i, j), points, np.full(len(points), radius)) for i, j, points in edges)
     skeleton = Skeleton(np.array(nodes, float), np.full(len(nodes), radius), branches, 1.0, 0.04)
-    dense = np.concatenate([_filled(branch.points) for branch in branches]) / stretch
+    dense = np.concatenate([_filled(branch.points) for branch in branches])
     low, high = dense.min(axis=0) - 1.3 * radius, dense.max(axis=0) + 1.3 * radius
     spacing = (high - low).max() / cells
     dimensions = np.ceil((high - low) / spacing).astype(int) + 1
     grid = pyvista.ImageData(dimensions=dimensions, spacing=[spacing] * 3, origin=low)
     away = cKDTree(dense).query(grid.points)[0] - radius
     mesh = grid.contour([0.0], scalars=away).triangulate().clean()
-    vertices, faces = stretch * np.asarray(mesh.points, float), mesh.faces.reshape(-1, 4)[:, 1:].astype(np.int64)
+    vertices, faces = np.asarray(mesh.points, float), mesh.faces.reshape(-1, 4)[:, 1:].astype(np.int64)
     return skeleton, vertices, faces if signed_volume(vertices, faces) > 0 else faces[:, ::-1]
 
 

@@ -1,0 +1,78 @@
+"""Chooses, from its skeleton, how a body is divided: blocks along the skeleton, one block with stubs, or one cube."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .graph import Branch, Skeleton
+
+Division = Literal["blocks", "body", "cube"]
+
+# Share of the volume in the balls around the curves. A square rod has .79, and a rod twice as wide as thick .39:
+TUBE_OF_LIMBS = 0.7  # without handles one cube is possible, and is left for a body that is nearly all limbs: bodies
+# of round limbs have .75 to .97, and one with a fat trunk that the curves do not fill (a bunny) .65 and less
+TUBE_OF_HANDLES = 0.4  # sections up to twice as wide as thick are pulled out of square rods
+SHELL = 0.1  # a wall that is bent around a void has less, and has no curve in its middle
+LONG = 7.5  # median radii of the longest limb, to the middle of its junction: nearly four diameters
+RING = 1.0 / (2.0 * np.pi)  # reach over the length of all curves: of a ring of blocks that is as wide as its radius,
+# so that its blocks meet in its middle; a plate with one hole has .15, a body with a thin handle .2 and more
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How a body is divided, and why.
+
+    Attributes
+    ----------
+    division : str
+        "blocks" for blocks along all branches, "body" for one block with stubs on its faces where loops begin and end,
+        "cube" for one block, that is a body without handles as it is mapped without a skeleton.
+    reason : str
+        In words, with the figures that decide.
+    """
+
+    division: Division
+    reason: str
+
+
+def choose(skeleton: Skeleton) -> Choice:
+    """Return how the body of a skeleton is divided."""
+    return _with_handles(skeleton) if skeleton.handles else _without_handles(skeleton)
+
+
+def _without_handles(skeleton: Skeleton) -> Choice:
+    """Return blocks for bodies of long limbs, else one cube."""
+    if max(skeleton.degrees) < 3:
+        return Choice("cube", "no handles, and no place where limbs meet: one cube")
+    slender = max(_slenderness(branch) for branch in skeleton.branches if _is_limb(branch, skeleton))
+    figures = f"{skeleton.tube:.2f} of the volume around its curves, longest limb {slender:.1f} radii"
+    if skeleton.tube < TUBE_OF_LIMBS:
+        return Choice("cube", f"no handles, and a fat trunk: {figures}: one cube")
+    if slender < LONG:
+        return Choice("cube", f"no handles, and short limbs: {figures}: one cube")
+    return Choice("blocks", f"{np.sum(np.equal(skeleton.degrees, 1))} limbs: {figures}: blocks along them")
+
+
+def _with_handles(skeleton: Skeleton) -> Choice:
+    """Return blocks for bodies that are branches all through, else one block with the loops on its faces."""
+    length = sum(branch.length for branch in skeleton.branches)
+    share = skeleton.reach / length
+    handles = "1 handle" if skeleton.handles == 1 else f"{skeleton.handles} handles"
+    figures = f"{skeleton.tube:.2f} of the volume around its curves, reach {share:.2f} of their length"
+    if skeleton.tube >= TUBE_OF_HANDLES:
+        return Choice("blocks", f"{handles}, thick branches: {figures}: blocks along them")
+    if share <= RING:
+        return Choice("blocks", f"{handles}, flat branches: {figures}: blocks as wide as the body along them")
+    kind = "a shell" if skeleton.tube < SHELL else "a fat body"
+    return Choice("body", f"{handles} on {kind}: {figures}: one block, with the loops on its faces")
+
+
+def _is_limb(branch: Branch, skeleton: Skeleton) -> bool:
+    """Return whether a branch ends in a tip."""
+    return min(skeleton.degrees[end] for end in branch.ends) == 1
+
+
+def _slenderness(branch: Branch) -> float:
+    """Return the length of a branch over its median radius."""
+    return branch.length / float(np.median(branch.radii))
