@@ -14,6 +14,7 @@ from .sliding import SlidingParameters
 from .surface_distance import TANGENTIAL, SurfaceFit
 
 _A_SPAN = 2  # samples a direction and span
+_FAR = 0.7  # times the width of a block: goals farther away than this hardly draw
 _AGREES = 0.5  # cosine of the angle between two normals that agree
 
 
@@ -28,6 +29,8 @@ def faces_towards(surface: SurfaceFit, control: Array) -> SurfaceFit:
     normals = surface.normals[chosen]
     agrees = (normals * samples.normals).sum(axis=1) > _AGREES
     quadrics = normals[:, :, None] * normals[:, None, :] + TANGENTIAL * np.eye(3)
-    weights = samples.areas * agrees
+    widths = surface.places.boxes.min(axis=1)[samples.faces // 6]
+    distances = np.linalg.norm(surface.points[chosen] - samples.points, axis=1)
+    weights = samples.areas * agrees / (1.0 + (distances / (_FAR * widths)) ** 4)
     places = SlidingParameters(nets, samples.parameters, samples.faces)
     return SurfaceFit(places, surface.points[chosen], quadrics, weights / weights.sum())
