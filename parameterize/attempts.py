@@ -22,7 +22,7 @@ def starts_of(task: Task) -> tuple[Start, ...]:
     """Return the starts that suit the body and the options, in their order."""
     if task.surface.genus or (task.config.blocks or 1) > 1:
         return (BLOCKS,)
-    on_one_cube = task.config.blocks == 1 or task.given_corners is not None or not task.choice.blocks
+    on_one_cube = task.config.blocks == 1 or task.given_corners is not None or task.choice.division == "cube"
     return STARTS if on_one_cube else (BLOCKS, *STARTS)
 
 

@@ -259,8 +259,9 @@ def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSpl
         replace(patch, control_points=surface.from_unit(patch.control_points)) for patch in as_multipatch(spline.body)
     )
     if not spline.nets.one_cube:
-        parts = {"part_faces": surface.faces, "groups": surface.groups, "patches": places.blocks[: task.own]}
-        boundary = BoundaryMap(surface.vertices, places.parameters[: task.own], surface.faces, **parts)
+        where, blocks = places.parameters[: task.own], places.blocks[: task.own]
+        faces = surface.faces
+        boundary = BoundaryMap(surface.vertices, where, faces, part_faces=faces, groups=surface.groups, patches=blocks)
         return MultiPatch(patches, spline.nets.interfaces), boundary
     (volume,) = patches
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])

@@ -101,7 +101,7 @@ class SplineEnergy:
         self._round = RoundWeights(penalty, self._weights.surface * (1.0 if share is None else share))
         if not self.nets.one_cube:
             self._measure_in(box_lengths(SplineMap(self.nets, control).body))
-            reassign(self.surface, control)
+            reassign(self.surface, control, first=share is not None)
             self._approach = None if share is None else faces_towards(self.surface, control)
         self.distortion.start_round(control, penalty)
         if self._weights.least_floor < 1.0:
@@ -110,7 +110,7 @@ class SplineEnergy:
             return
         self._grows = share is not None
         self._precondition = self._preconditioner()
-        reach = _REACH if self._grows and self.nets.one_cube else np.inf
+        reach = _REACH if self._grows and self._approach is None else np.inf
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
     def watch_facing(self, control: Array) -> None:
@@ -130,8 +130,10 @@ class SplineEnergy:
 
     def slide(self, control: Array) -> None:
         """Let the surface's parameters slide towards their closest points, and penalise wrong normals of F there."""
+        if self._approach is not None:
+            return
         places, points = self.surface.places, self.surface.points
-        if self._grows and self.nets.one_cube:
+        if self._grows:
             places.slide(control, points, keep_layout=True, reach=_REACH)
         else:
             for _ in range(_SLIDES):

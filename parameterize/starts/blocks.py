@@ -12,7 +12,8 @@ import numpy as np
 from ..arrays import Array
 from ..blocks.layout import Block, BlockLayout
 from ..checkpoint import Checkpoints
-from ..optimization.phases import Polish, Schedule, Separate, Shape, Unfold
+from ..config import Config, scaled_steps
+from ..optimization.phases import Polish, Schedule, Separate, Unfold
 from ..optimization.reassignment import reassign
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
@@ -22,10 +23,13 @@ from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
+from .growth import STEPS, Grow
 from .on_cube import MORE_ROUNDS
 from .start import Attempt, Start, Task, optimized
 
-_USUAL_STEPS = (30, 12, 8)  # of Newton's method in the rounds of most runs: tells the time left
+_USUAL_STEPS = (20, 8, 8, 8)  # of Newton's method in the later rounds of most runs: tells the time left
+_SHARES = (1e-3, 1e-2, 0.1)  # of the weight of the surface's data while the faces are drawn to it, round by round
+_FAR = 0.2  # root mean square distance from the surface beyond which a folded map is given up
 
 
 @dataclass(frozen=True)
@@ -38,11 +42,20 @@ class AlongSkeleton(Start):
         with timed(task.seconds, "fit"), one_blas_thread():
             first = thin_blocks(task.layout, spline.degree)
             fit = _surface_fit(task, first)
-        phases = Shape(), Unfold(), Separate(), Polish()
-        return optimized(first, fit, Schedule(phases, spline.rounds + MORE_ROUNDS, _USUAL_STEPS), task, checkpoints)
+        return optimized(first, fit, schedule(task.config), task, checkpoints)
 
 
 BLOCKS = AlongSkeleton("blocks", "blocks", "laying blocks along the skeleton")
+
+
+def schedule(config: Config) -> Schedule:
+    """Return the phases of the rounds: all faces are drawn to the surface at first, then the surface's points draw F.
+
+    Folded maps are not given up for their distance: places are assigned anew in each round.
+    """
+    grown, steps = len(_SHARES), scaled_steps(STEPS, config.steps_factor)
+    phases = Grow(shares=_SHARES, steps=steps), Unfold(far=_FAR, far_first=_FAR), Separate(far=_FAR), Polish()
+    return Schedule(phases, grown + config.spline.rounds + MORE_ROUNDS, (steps,) * grown + _USUAL_STEPS)
 
 
 def thin_blocks(layout: BlockLayout, degree: int) -> SplineMap:

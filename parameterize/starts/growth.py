@@ -36,7 +36,7 @@ _COARSE = 1 / 3  # of the spans a direction in these rounds: F is smooth while i
 
 @dataclass(frozen=True)
 class Grow(Phase):
-    """Let F grow from a cube: in each round the surface's data have a larger share of their weight."""
+    """Let F grow from its start: in each round the surface's data have a larger share of their weight."""
 
     name = "grow"
 

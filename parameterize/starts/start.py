@@ -22,15 +22,18 @@ from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
 from ..progress import timed
-from ..skeleton.graph import Skeleton
+from ..skeleton.choice import Choice, choose
+from ..skeleton.graph import Skeleton, SkeletonError
 from ..skeleton.solid import skeleton_of
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
-from ..surface.geometry import vertex_quadrics, vertex_weights
+from ..surface.geometry import normals_and_areas, vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
 
 _log = logging.getLogger(__name__)
 
+COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
+# less, so that these need not wait for a skeleton
 Origin = Literal["network", "growth", "extension", "blocks"]
 MOST_POINTS = (
     30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
@@ -70,6 +73,23 @@ class Task:
     def skeleton(self) -> Skeleton:
         """Return the skeleton of the solid at volume 1. Raises SkeletonError where it has none."""
         return skeleton_of(self.surface.unit_vertices, self.surface.faces, self.surface.genus)
+
+    @cached_property
+    def choice(self) -> Choice:
+        """Return whether one cube or several blocks suit the body, and why.
+
+        The skeleton of a body without handles is looked for only where its surface is much larger than a ball's.
+        """
+        if self.surface.genus == 0:
+            area = float(normals_and_areas(self.surface.unit_vertices, self.surface.faces)[1].sum())
+            if (compactness := area**3 / (36.0 * math.pi)) < COMPACT:
+                return Choice("cube", f"no handles, and a compact body: {compactness:.1f} for a ball's 1: one cube")
+        try:
+            return choose(self.skeleton)
+        except SkeletonError as error:
+            if self.surface.genus:
+                raise
+            return Choice("cube", f"no handles, and no skeleton ({error}): one cube")
 
     @cached_property
     def layout(self) -> BlockLayout:
