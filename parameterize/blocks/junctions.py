@@ -15,7 +15,7 @@ from .inside import Body
 from .splitting import End, junction_at, stub
 
 _THIN = 0.55  # of the way to the surface: half the width of a junction's block
-_FLAT = 1.6  # radii of the node: no side of a block is taken for farther away, as along a plate it would be
+_FLAT = 4.0  # radii of the node: no side of a block is taken for farther away, as along a plate it would be
 _SHARE = 0.35  # of a branch, at most: what a junction takes at each of its ends
 _CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0  # (8, 3), -1 or 1
 

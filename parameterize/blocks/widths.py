@@ -8,7 +8,7 @@ from .inside import Body
 
 THIN = 0.55  # of the way to the surface: half the width of a section
 _CORNER = 0.8  # of the way to the surface: where a section's corners lie at most
-_FLAT = 2.0  # times the shorter way: half the width of a section at most, however wide the body is
+_FLAT = 4.0  # times the shorter way: half the width of a section at most, however wide the body is
 _BEND = 0.6  # of the radius of curvature: half the width at most, or sections would meet at the centre of a bend
 _SIGNS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 
