@@ -17,6 +17,7 @@ SLAB = 2.0  # cells: more than the longest step between neighbours, so no step l
 SLENDER = 0.75  # length over width: a rod that sticks out by less is pulled out of a block's face as well
 WEDGE = 2.0  # how often the excess of the width near the root counts as width: a corner of a plate is a limb where its
 # angle is below 60 degrees
+HOLLOW = 0.5  # share of a limb's slabs whose middles may lie outside the body: walls of cups and pipes have all there
 
 
 @dataclass(frozen=True)
@@ -45,27 +46,32 @@ def protrusions(inside: Mask, distance: Array, least: float) -> list[Protrusion]
     links = _links(inside)
     level = slab[links]
     piece = connected(links[level[:, 0] == level[:, 1]], len(points))
-    width = _widths(points, piece)
+    middle, width = _middles_and_widths(points, piece)
+    hollow = ~inside[tuple(np.rint(middle).astype(np.int64).T)]
     pieces = piece[links[level[:, 0] != level[:, 1]]]
     peak = _farthest(far, piece)  # the point of each piece
-    found = _Pieces(width, far[peak], slab[peak] * SLAB, least)
+    found = _Pieces(width, hollow, far[peak], slab[peak] * SLAB, least)
     neighbours = _neighbours(pieces, len(width))
     for own in np.lexsort([np.arange(len(width)), -slab[peak]]).tolist():
         found.add(own, [other for other in neighbours[own] if slab[peak[other]] > slab[peak[own]]])
-    limbs = [Protrusion(_triple(points[peak[own]]), length) for own, length in found.limbs()]
+    limbs = [Protrusion(_triple(points[peak[own]]), length) for own, length in found.limbs.items()]
     return sorted(limbs, key=lambda limb: (-limb.length, limb.tip))
 
 
 class _Pieces:
     """The pieces beyond a distance that falls: each is known by the slab's piece in which it begins."""
 
-    def __init__(self, width: Floats, peak: Floats, base: Floats, least: float) -> None:
-        """Store widths, greatest and least distances (pieces,) of the slabs' pieces, and the least length of a limb."""
-        self.width, self.peak, self.base, self.least = width, peak, base, least
+    def __init__(self, width: Floats, hollow: Mask, peak: Floats, base: Floats, least: float) -> None:
+        """Store the slabs' pieces, and the least length of a limb.
+
+        These are their widths, whether their middles lie outside the body, their greatest and least distances, each
+        (pieces,). The dictionary `limbs` has the lengths of the limbs, by the slab's piece with the tip.
+        """
+        self.width, self.hollow, self.peak, self.base, self.least = width, hollow, peak, base, least
         self.root = np.arange(len(width))
         self.begin: dict[int, int] = {}
-        self.widths: dict[int, list[float]] = {}
-        self.longest: dict[int, float] = {}
+        self.slabs: dict[int, list[int]] = {}
+        self.limbs: dict[int, float] = {}
 
     def add(self, own: int, beyond: list[int]) -> None:
         """Add a slab's piece, which joins the pieces beyond it that it touches."""
@@ -74,15 +80,12 @@ class _Pieces:
         elder = max(begins, key=lambda begin: (self.peak[begin], -begin))
         self.root[roots] = own
         self.begin[own] = elder
-        widths = self.widths.setdefault(elder, [])
-        widths.append(float(self.width[own]))
+        slabs = self.slabs.setdefault(elder, [])
+        slabs.append(own)
         length = float(self.peak[elder] - self.base[own])
-        if length >= max(self.least, SLENDER * _effective_width(widths)):
-            self.longest[elder] = length
-
-    def limbs(self) -> list[tuple[int, float]]:
-        """Return the limbs by the slab's piece with the tip, and their lengths where they are still slender."""
-        return list(self.longest.items())
+        is_slender = length >= max(self.least, SLENDER * _effective_width(self.width[slabs]))
+        if is_slender and self.hollow[slabs].mean() <= HOLLOW:
+            self.limbs[elder] = length
 
     def _root(self, own: int) -> int:
         while self.root[own] != own:
@@ -91,7 +94,7 @@ class _Pieces:
         return own
 
 
-def _effective_width(widths: list[float]) -> float:
+def _effective_width(widths: Floats) -> float:
     """Return the mean of the widths (k,) from a tip to its root, and more of a part that narrows to its tip."""
     mean, root = (float(np.mean(part)) for part in (widths, widths[-((len(widths) + 2) // 3) :]))
     return mean + WEDGE * max(root - mean, 0.0)
@@ -110,8 +113,11 @@ def _links(inside: Mask) -> IntArray:
     return np.concatenate(links)
 
 
-def _widths(points: IntArray, piece: IntArray) -> Array:
-    """Return the widths of pieces, in cells: that of a rod whose points vary as much in their widest direction."""
+def _middles_and_widths(points: IntArray, piece: IntArray) -> tuple[Array, Array]:
+    """Return the middles (pieces, 3) and the widths (pieces,) of pieces, in cells.
+
+    The width is that of a rod whose points vary as much in their widest direction.
+    """
     count = np.bincount(piece).astype(np.float64)
     mean = np.stack([np.bincount(piece, weights=column) for column in points.T], axis=1) / count[:, None]
     offset = points - mean[piece]
@@ -119,7 +125,7 @@ def _widths(points: IntArray, piece: IntArray) -> Array:
     for i in range(3):
         for j in range(3):
             covariance[:, i, j] = np.bincount(piece, weights=offset[:, i] * offset[:, j]) / count
-    return np.asarray(np.sqrt(12.0 * np.maximum(np.linalg.eigvalsh(covariance)[:, -1], 0.0)) + 1.0)
+    return mean, np.asarray(np.sqrt(12.0 * np.maximum(np.linalg.eigvalsh(covariance)[:, -1], 0.0)) + 1.0)
 
 
 def _farthest(far: Array, piece: IntArray) -> IntArray:
