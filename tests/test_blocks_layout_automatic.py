@@ -90,5 +90,5 @@ def test_spans_follow_the_lengths():
 
 def test_a_skeleton_that_leaves_the_body_is_refused_with_the_place():
     skeleton, vertices, faces = thick(*GRAPHS["rod"])
-    with pytest.raises(LayoutError, match=r"a rod is folded near here; make the surface wider there"):
+    with pytest.raises(LayoutError, match=r"fits into the body: a .* near here; make the surface wider there"):
         block_layout(skeleton, vertices + 0.25 * Z, faces, where=lambda place: "here")

@@ -25,7 +25,7 @@ __all__ = ["Block", "BlockLayout", "LayoutError", "block_layout"]
 SPANS = 6  # across each block
 _LONGEST = 4  # times the spans across: those along a rod at most
 _STRETCH = 2.0  # how long a span along a rod is, over one across the body: little changes along a rod
-_REPAIRS = 120  # rounds in which what is folded, leaves the body or meets another part is made thinner
+_REPAIRS = 60  # rounds in which what is folded, leaves the body or meets another part is made thinner
 
 
 class LayoutError(ValueError):

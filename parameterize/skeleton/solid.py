@@ -17,8 +17,9 @@ from .thinning import web_of
 from .web import Web
 
 SAMPLES = 20_000  # points inside, at most, of which the share in balls is counted: it is true to a percent
-RESOLVED = 3.0  # cells: the median radius of each branch, so that its curve runs in its middle
-ENOUGH = 1_000_000  # points of the box: a finer lattice for thin branches alone is not worth its seconds
+RESOLVED = 2.5  # cells: the median radius of each branch, so that its curve runs in its middle
+CLEAR = 0.3  # cells: the least radius of a curve, where blocks of this width are laid
+ENOUGH = 500_000  # points of the box: a finer lattice for thin branches alone is not worth its seconds
 UNREACHED = 2.0  # cells: a vertex of a part that the lattice holds has a point inside within one and a half
 KNOTTED = (
     "a knotted tunnel: the body is no graph of thick branches, so it cannot be cut into blocks along its skeleton; "
@@ -55,7 +56,7 @@ def skeleton_of(vertices: Array, faces: IntArray, genus: int, where: Callable[[A
         skeleton = _measured(_curves(coarse, depth, genus), coarse, vertices, faces)
         if _is_inside(skeleton, vertices, faces):
             found = skeleton
-            if _thinnest_branch(skeleton) > RESOLVED * coarse.cell or coarse.inside.size > ENOUGH:
+            if _is_resolved(skeleton) or coarse.inside.size > ENOUGH:
                 break
     if found is not None:
         return found
@@ -88,9 +89,11 @@ def _is_inside(skeleton: Skeleton, vertices: Array, faces: IntArray) -> bool:
     return bool(np.all(igl.fast_winding_number(vertices, faces, points) > 0.5))
 
 
-def _thinnest_branch(skeleton: Skeleton) -> float:
-    """Return the least of the branches' median radii."""
-    return min((float(np.median(branch.radii)) for branch in skeleton.branches), default=np.inf)
+def _is_resolved(skeleton: Skeleton) -> bool:
+    """Return whether each branch is some cells thick, and no point of it nearly on the surface."""
+    thin = min((float(np.median(branch.radii)) for branch in skeleton.branches), default=np.inf)
+    shallow = min((float(branch.radii.min()) for branch in skeleton.branches), default=np.inf)
+    return thin > RESOLVED * skeleton.cell and shallow > CLEAR * skeleton.cell
 
 
 def _thinnest(lattice: Lattice, vertices: Array) -> Array:
