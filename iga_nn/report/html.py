@@ -40,6 +40,7 @@ ORIGINS = {
     "network": ("the network", "trained on the surface"),
     "growth": ("a growing cube", "the surface laid on its faces without the network"),
     "extension": ("the surface's layout on a cube", "extended into the solid without the network"),
+    "blocks": ("blocks along the skeleton", "glued by whole faces, and drawn to the surface"),
 }
 
 
