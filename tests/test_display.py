@@ -75,6 +75,17 @@ def test_a_certificate_of_several_patches_lists_its_defects():
     assert "2 patches: folded" in folded._repr_html_() and "<li>p1: folded at (" in folded._repr_html_()
 
 
+def test_a_body_and_a_solution_on_it_have_tables():
+    body = iga_nn.MultiPatch.from_patches(boxes([(0, 0, 0), (1, 0, 0)], 3, 2))
+    found = cells(body._repr_html_())
+    assert found == [
+        "patches", "2", "interfaces", "1", "outer faces", "10", "control points", "45", "lies within",
+        "(0, 0, 0) to (2, 1, 1)",
+    ]  # fmt: skip
+    solution = iga_nn.solve(body, Poisson(exact="x"))
+    assert f"{solution.report.dofs}" in cells(solution._repr_html_())
+
+
 def test_the_quality_of_several_patches_has_a_row_for_each():
     body = iga_nn.MultiPatch.from_patches(boxes([(0, 0, 0), (1, 0, 0)], 4, 3))
     outer = outer_surface(body)

@@ -10,11 +10,12 @@ from matplotlib.image import imread
 
 import iga_nn
 import solve
-from iga_nn.figures import cutaway, fields, palette
+from iga_nn.figures import blocks, cutaway, fields, palette
 from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
 from iga_nn.figures import solution as solution_figures
 from iga_nn.figures.evaluate import all_grids, outer_faces, points_on
+from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import FACE_NAMES
 
 TURNED = row_of(
@@ -85,11 +86,11 @@ def test_each_patch_has_a_colour_and_many_share_them():
     assert len(labels) == 20 and labels[0] == "p0, p20, p40" and labels[-1] == "p19, p39"
 
 
-def test_distortion_measures_each_patch_at_its_own_size():
-    """Cubes of sides 1 and 3 are not distorted, and no size of the body makes them so."""
-    parts = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (a * u, a * v, a * w), 4) for a in (1.0, -3.0)]
+def test_distortion_measures_each_patch_in_its_own_box():
+    """A cube and a rod are not distorted, and no size of the body makes them so."""
+    parts = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (a * u, v, a * w), 4) for a in (1.0, -3.0)]
     field = fields.distortion_of(iga_nn.MultiPatch(tuple(parts)))
-    assert max(values.max() for values in field.everywhere) < 1e-6 and "each patch" in field.title
+    assert max(values.max() for values in field.everywhere) < 1e-6 and "each in its own box" in field.title
 
 
 def test_a_field_of_a_body_is_that_of_each_patch():
@@ -117,3 +118,41 @@ def test_figures_show_all_patches(tmp_path, drawing, small_views):
     for name in ("lines", "cut", "distortion", "solution", "error"):
         image = imread(tmp_path / f"{name}.png")[..., :3]
         assert np.mean(np.ptp(image, axis=-1) > 0.1) > 0.05
+
+
+def shown_by(monkeypatch, module):
+    """The patches that a module would draw, panel after panel."""
+    found = []
+    monkeypatch.setattr(module, "draw", lambda patches, *_: found.append(patches) or np.zeros((2, 2, 3)))
+    return found
+
+
+def test_blocks_are_drawn_apart_and_their_interfaces_in_glass(monkeypatch, small_views):
+    body = ring(3)
+    found = shown_by(monkeypatch, blocks)
+    figure = blocks.draw_blocks(None, body)
+    apart, glued = found
+    assert (
+        len(apart) == 18
+        and len(glued) == 6 + 12
+        and [patch.opacity < 1.0 for patch in glued] == [False] * 6 + [True] * 12
+    )
+    light = [k for k, patch in enumerate(apart) if np.allclose(patch.colors[0, 0], to_rgb(cutaway.INSIDE))]
+    assert light == [6 * i + FACE_NAMES.index(face) for i in range(3) for face in ("u0", "u1")]
+    ends = [apart[1].points, apart[6].points]  # p0_u1 = p1_u0: the gap opens
+    assert np.linalg.norm(ends[0] - ends[1], axis=-1).min() > 0.5
+    assert figure.get_suptitle() == "3 blocks, 3 interfaces; glued faces are light"
+
+
+def test_places_without_a_proof_and_meetings_are_shown_on_blocks(monkeypatch, small_views):
+    body = ring(3)
+    around, drawn = [], shown_by(monkeypatch, map_figures)
+    monkeypatch.setattr(map_figures, "show_around", lambda panels, patches, marks: around.append((patches, marks)))
+    map_figures.draw_folds(None, body, np.zeros((1, 3)))
+    meeting = Meeting(((0.5, 1.0, 0.5), (0.5, 0.0, 0.5)), (2.0, 0.0, 0.0), (0, 2))
+    map_figures.draw_meeting(None, body, meeting)
+    (glass, _), (parts, marks) = around
+    assert len(glass) == len(drawn[0]) == 12 and marks.tolist() == [[2.0, 0.0, 0.0]]
+    for part, owner, parameter in zip(parts, meeting.patches, meeting.parameters, strict=True):
+        middle = part.points[len(part.points) // 2, part.points.shape[1] // 2]
+        assert middle == pytest.approx(body.patches[owner]([parameter])[0])

@@ -140,3 +140,13 @@ def test_the_largest_file_stays_below_20_megabytes(tmp_path):
     view.write_solution(tmp_path / "solution.vtu", solution)
     points = pyvista.read(tmp_path / "solution.vtu").n_points
     assert points > 60_000 and (tmp_path / "solution.vtu").stat().st_size / points * view.MOST_KEPT < 20e6
+
+
+def test_distortion_is_that_of_a_cube_of_volume_1_or_of_the_boxes_of_several_patches():
+    """A rod of 4 x 1 x 1 has the sides 4 s, s, s at volume 1, s = 4^(-1/3); in its own box it is not distorted."""
+    rod = BSplineVolume.from_function(lambda u, v, w: (4.0 * u, v, w), 4)
+    scale = 4.0 ** (-1.0 / 3.0)
+    expected = (4.0 * scale - 1.0) ** 2 + 2.0 * (scale - 1.0) ** 2
+    assert view.grid(rod, samples=1).point_data["arap"] == pytest.approx(expected)
+    both = iga_nn.MultiPatch.from_patches([rod, BSplineVolume.from_function(lambda u, v, w: (4.0 + u, v, w), 4)])
+    assert np.abs(view.grid(both, samples=1).point_data["arap"]).max() < 1e-20

@@ -101,7 +101,10 @@ def test_verdicts_of_what_went_wrong(result):
     assert "The map folds" in text and "0.25, 0.5, 1" in text and "did not converge" in text
 
 
-@pytest.mark.parametrize(("origin", "words"), [("network", "the network"), ("growth", "a growing cube")])
+@pytest.mark.parametrize(
+    ("origin", "words"),
+    [("network", "the network"), ("growth", "a growing cube"), ("blocks", "blocks along the skeleton")],
+)
 def test_page_says_where_the_map_comes_from(result, origin, words):
     report = json.loads((result / "report.json").read_text())
     report["parameterization"]["origin"] = origin

@@ -34,7 +34,10 @@ def verdict_in_words(outcome: Outcome) -> str:
     """
     verdict = reports.verdict(outcome.report, outcome.folder)
     lines = []
-    for scale, arap in verdict.get("arap", {}).items():
+    measured = verdict.get("arap", {})
+    if "patches" in outcome.report["parameterization"]:  # each against its own box: the unit changes nothing
+        measured = {"own boxes": measured["as_given"]} if measured else {}
+    for scale, arap in measured.items():
         lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max")
     if distance := verdict.get("surface_distance"):
         said = f"rms {distance['rms']:.3g}, largest {distance['max']:.3g} of the box's diagonal"

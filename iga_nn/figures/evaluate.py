@@ -4,14 +4,18 @@ A body is a volume or several patches; a volume is treated as a body of one patc
 faces and sections of all patches, each patch has nine entries: six faces, in the order of FACE_NAMES, three sections.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
+from parameterize.quality.distortion import arap_in_box, arap_on, own_box
 from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 from solve.field import MultiPatchField, Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
+from solve.forms.frame import UnitFrame
 
 Body = BSplineVolume | MultiPatch
 Solved = SplineField | MultiPatchField  # a solution on a body
@@ -56,6 +60,22 @@ def outer_faces(body: Body) -> list[int]:
 def fields_on(solution: Solved) -> tuple[SplineField, ...]:
     """Return the spline of each patch; of a volume the solution itself."""
     return solution.patches if isinstance(solution, MultiPatchField) else (solution,)
+
+
+def arap_of(body: Body) -> list[Callable[[Grid], Array]]:
+    """Return for each patch the function that gives the ARAP distortion (n_u, n_v, n_w) on a tensor grid.
+
+    A volume is measured at volume 1, each of several patches against its own box.
+    """
+    if isinstance(body, MultiPatch):
+        return [_in_box(patch) for patch in body]
+    volume, scale = body, 1.0 / UnitFrame.of(body).length
+    return [lambda grid: arap_on(volume, *grid, scale)]
+
+
+def _in_box(patch: BSplineVolume) -> Callable[[Grid], Array]:
+    box = own_box(patch)
+    return lambda grid: arap_in_box(patch, *grid, box)
 
 
 def problems_on(problem: BoundaryValueProblem, body: Body) -> list[BoundaryValueProblem]:

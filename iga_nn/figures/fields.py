@@ -12,15 +12,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.quality.distortion import arap_on
-from parameterize.spline.multipatch import as_multipatch
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from solve.field import Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
-from solve.forms.frame import UnitFrame
 from solve.quantities import grid_values
 
-from .evaluate import Body, Grid, Solved, all_grids, error_at, fields_on, flat, problems_on
+from .evaluate import Body, Grid, Solved, all_grids, arap_of, error_at, fields_on, flat, problems_on
 from .style import ColorRange, error_range, even_range
 
 SAMPLES = 121  # per direction of a face or mid-section
@@ -107,15 +105,13 @@ def diagonal_of(points: Samples) -> float:
 
 @remembered
 def distortion_of(body: Body) -> Field:
-    """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1; of several patches, each at its own."""
-    several = as_multipatch(body)
-    scales = [1.0 / UnitFrame.of(patch).length for patch in several]
+    """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1; of several patches, each in its own box."""
 
-    def found_on(number: int) -> Callable[[Grid], Array]:
-        return lambda grid: np.tanh(np.sqrt(arap_on(several.patches[number], *grid, scales[number])) / 2.0)
+    def colored(arap_at: Callable[[Grid], Array]) -> Callable[[Grid], Array]:
+        return lambda grid: np.tanh(np.sqrt(arap_at(grid)) / 2.0)
 
-    found = sampled([found_on(number) for number in range(len(several))])
-    title = "tanh(√ARAP / 2), at volume 1" if len(several) == 1 else "tanh(√ARAP / 2), each patch at volume 1"
+    found = sampled([colored(arap_at) for arap_at in arap_of(body)])
+    title = f"tanh(√ARAP / 2), {'each in its own box' if isinstance(body, MultiPatch) else 'at volume 1'}"
     return Field(found.patches, found.lattices, "distortion", title, ColorRange(0.0, 1.0))
 
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
 from parameterize.spline.interface import face_label
-from parameterize.spline.multipatch import MultiPatch
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.volume import FACE_NAMES
 
 from .cutaway import cut_of, octant_label, patches_of, visible
 from .evaluate import PER_PATCH, Body, face_window, outer_faces, points_on
@@ -95,7 +95,7 @@ def draw_cut(path: str | Path | None, body: Body) -> Figure:
 def draw_distortion(path: str | Path | None, body: Body) -> Figure:
     """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2.
 
-    Of several patches each is measured at its own volume 1, and drawn where the body is cut open in three ways.
+    Of several patches each is measured against its own box, and drawn where the body is cut open in three ways.
     """
     figure, (panels,) = panels_of(1, 3)
     field, points = distortion_of(body), points_of(body)
@@ -109,29 +109,34 @@ def draw_distortion(path: str | Path | None, body: Body) -> Figure:
     return save(figure, path, "Distortion of the patches inside" if several else "Distortion on the mid-sections")
 
 
-def draw_folds(path: str | Path | None, volume: BSplineVolume, places: Array) -> Figure:
+def draw_folds(path: str | Path | None, body: Body, places: Array) -> Figure:
     """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J's sign is not proved."""
     figure, (panels,) = panels_of(1, 2)
-    show_around(panels, _glass(volume), places)
+    show_around(panels, glass(body), places)
     return save(figure, path, f"The sign of det J is not proved on {len(places)} spans: black balls")
 
 
-def draw_meeting(path: str | Path | None, volume: BSplineVolume, meeting: Meeting) -> Figure:
+def draw_meeting(path: str | Path | None, body: Body, meeting: Meeting) -> Figure:
     """Draw the place where the boundary meets itself: on the whole boundary, and the two parts there from two sides."""
     mark = np.array([meeting.point])
-    windows = [points_on(volume, face_window(parameter, WINDOW, SAMPLES)) for parameter in meeting.parameters]
+    several, owners = as_multipatch(body).patches, meeting.patches or (0, 0)
+    windows = [
+        points_on(several[owner], face_window(parameter, WINDOW, SAMPLES))
+        for owner, parameter in zip(owners, meeting.parameters, strict=True)
+    ]
     parts = [plain_patch(points, color, opacity=0.7) for points, color in zip(windows, MEETING_COLORS, strict=True)]
     figure, (panels,) = panels_of(1, 3)
-    glass = _glass(volume)
-    panels[0].imshow(draw(glass, view_of(glass), PANEL, mark))
+    whole = glass(body)
+    panels[0].imshow(draw(whole, view_of(whole), PANEL, mark))
     panels[0].set_title("whole boundary", fontsize=13)
     show_around(panels[1:], parts, mark)
     return save(figure, path, "The boundary meets itself at the black ball; the two parts near it")
 
 
-def _glass(volume: BSplineVolume) -> list[Patch]:
-    """Return the six faces as transparent patches."""
-    return [plain_patch(points, "0.6", opacity=0.25) for points in points_of(volume).patches[:6]]
+def glass(body: Body) -> list[Patch]:
+    """Return the outer faces as transparent patches."""
+    points = points_of(body).patches
+    return [plain_patch(points[k], "0.6", opacity=0.25) for k in outer_faces(body)]
 
 
 PLOTS = {"faces": draw_faces, "lines": draw_lines, "cut": draw_cut, "distortion": draw_distortion}

@@ -1,16 +1,17 @@
 """Samples a body, and a solution on it, on linear cells, which ParaView slices, clips and contours rightly.
 
 The nodes of the hexahedra lie on the spline, some a span of the solution and direction, with the values there of `arap`
-(distortion at volume 1), `det J`, and, with a solution, `u`, (the exact solution being known) `error` = |u - u_h|, and
-quantities of its law. Displacements are vectors `u`, and their `error` is a length. Symmetric tensors have six
-components, in VTK's order. Of a left-handed volume bottom and top of each cell change places. The cells of several
-patches are in one grid, a block of cells after the other, with the cell data `patch`: the number of each cell's patch.
+(distortion at volume 1, of several patches each in its own box), `det J`, and, with a solution, `u`, (the exact
+solution being known) `error` = |u - u_h|, and quantities of its law. Displacements are vectors `u`, and their `error`
+is a length. Symmetric tensors have six components, in VTK's order. Of a left-handed volume bottom and top of each cell
+change places. The cells of several patches are in one grid, a block of cells after the other, with the cell data
+`patch`: the number of each cell's patch.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.quality.distortion import arap_on
 from parameterize.spline.bspline import divided_spans
 from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import orientation
@@ -26,12 +26,11 @@ from parameterize.spline.volume import BSplineVolume
 from solve.field import Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
-from solve.forms.frame import UnitFrame
 from solve.quantities import on_grid
 from solve.solution import MultiPatchSolution, Solution
 
 from ..errors import InputError, one_line
-from ..figures.evaluate import Body, Solved, error_at, fields_on, problems_on
+from ..figures.evaluate import Body, Grid, Solved, arap_of, error_at, fields_on, problems_on
 from .vtk import bezier_cells, breaks_of, save
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def write_view(
         shown = breaks_of(part.volume, part.solution)
         most = MOST_VIEWED // len(parts)
         rows = _fitting(shown, most)[0] if samples is None else [divided_spans(row, samples) for row in shown]
-        grids.append(_sampled(part.volume, rows, _of_map(part.volume, rows) | _of(part, rows, quantities)))
+        grids.append(_sampled(part.volume, rows, _of_map(part, rows) | _of(part, rows, quantities)))
     save(path, _joined(body, grids))
 
 
@@ -107,15 +106,19 @@ def grid(
     grids = []
     for part in _parts(body, solution, problem):
         rows = [divided_spans(row, samples) for row in breaks_of(part.volume, part.solution)]
-        grids.append(_sampled(part.volume, rows, _of_map(part.volume, rows) | _of(part, rows, quantities)))
+        grids.append(_sampled(part.volume, rows, _of_map(part, rows) | _of(part, rows, quantities)))
     return _joined(body, grids)
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Hold a patch of a body, the solution on it, and the problem there, with X, Y, Z measured in the body."""
+    """Hold a patch of a body, the solution on it, and the problem there, with X, Y, Z measured in the body.
+
+    arap: the function that gives the distortion on a tensor grid.
+    """
 
     volume: BSplineVolume
+    arap: Callable[[Grid], Array]
     solution: SplineField | None
     problem: BoundaryValueProblem | None
 
@@ -124,7 +127,7 @@ def _parts(body: Body, solution: Solved | None, problem: BoundaryValueProblem | 
     volumes = as_multipatch(body).patches
     fields = [None] * len(volumes) if solution is None else fields_on(solution)
     problems = [None] * len(volumes) if problem is None else problems_on(problem, body)
-    return [_Part(*part) for part in zip(volumes, fields, problems, strict=True)]
+    return [_Part(*part) for part in zip(volumes, arap_of(body), fields, problems, strict=True)]
 
 
 def _joined(body: Body, grids: Sequence[pyvista.UnstructuredGrid]) -> pyvista.UnstructuredGrid:
@@ -169,10 +172,9 @@ def _sampled(volume: BSplineVolume, rows: Rows, fields: Mapping[str, Array]) -> 
     return grid
 
 
-def _of_map(volume: BSplineVolume, rows: Rows) -> dict[str, Array]:
+def _of_map(part: _Part, rows: Rows) -> dict[str, Array]:
     u, v, w = rows
-    distortion = arap_on(volume, u, v, w, 1.0 / UnitFrame.of(volume).length)
-    return {"arap": distortion, "det J": np.linalg.det(volume.grid_jacobian(u, v, w))}
+    return {"arap": part.arap((u, v, w)), "det J": np.linalg.det(part.volume.grid_jacobian(u, v, w))}
 
 
 def _of(part: _Part, rows: Rows, quantities: Quantities | None) -> dict[str, Array]:

@@ -49,25 +49,38 @@ def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
 
     mapping: the options of the map, where they are known.
     """
-    if is_certified(report) or "patches" in report["parameterization"]:  # several patches come from another program
+    quality, remedies = report["parameterization"], list[str]()
+    if is_certified(report) or ("patches" in quality and mapping is None):  # several patches of a file
         return []
-    quality, remedies = report["parameterization"], []
+    if "patches" in quality and mapping is not None:
+        return [*_of_the_surface(report), *_more_control_points(mapping.most_control_points)]
     if mapping is not None and mapping.steps_factor < 1.0:
         remedies.append("the whole training: leave out --steps-factor")
-    if crossing := report.get("input", {}).get("self_intersections", {}).get("pairs", 0):
-        remedies.append(f"a surface that does not intersect itself: {crossing} pairs of its faces do (`iga-nn check`)")
-    if quality["bijective"] == "certified":  # then the boundary meets itself, without a fold
-        remedies.append("a surface whose parts are farther apart there, or more faces around that gap")
-    more = min(max(quality["control_points"]) + 10, MAX_CONTROL_POINTS)
-    if more > max(quality["control_points"]):
-        is_limit = quality.get("refinement", {}).get("stopped") == "limit reached"
-        remedies.append(f"more control points: --{'max-' * is_limit}control-points {more}")
+    remedies += _of_the_surface(report)
+    is_limit = quality.get("refinement", {}).get("stopped") == "limit reached"
+    remedies += _more_control_points(max(quality["control_points"]), "max-" * is_limit)
     if mapping is None or mapping.corners is None:
         remedies.append("your own corners, away from those places: --corners FILE")
     else:
         remedies.append("other corners, farther apart and away from those places: --corners FILE")
     remedies.append(f"another seed: --seed {mapping.seed + 1 if mapping else 1}")
     return remedies
+
+
+def _of_the_surface(report: Report) -> list[str]:
+    """Return remedies that another surface is."""
+    remedies = []
+    if crossing := report.get("input", {}).get("self_intersections", {}).get("pairs", 0):
+        remedies.append(f"a surface that does not intersect itself: {crossing} pairs of its faces do (`iga-nn check`)")
+    if report["parameterization"]["bijective"] == "certified":  # then the boundary meets itself, without a fold
+        remedies.append("a surface whose parts are farther apart there, or more faces around that gap")
+    return remedies
+
+
+def _more_control_points(known: int, kind: str = "") -> list[str]:
+    """Return the remedy of more control points a direction than the known number, where there may be more."""
+    more = min(known + 10, MAX_CONTROL_POINTS)
+    return [f"more control points: --{kind}control-points {more}"] if more > known else []
 
 
 def in_words(report: Report) -> list[str]:

@@ -68,6 +68,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("meeting.png", "map", "where the boundary meets itself", "map.draw_meeting", ("volume", "meeting")),
     Artifact("folds.png", "map", "where det J > 0 is not proved", "map.draw_folds", ("volume", "places")),
     Artifact("faces.png", "map", "images of the cube's faces", "map.draw_faces", ("volume", "marks")),
+    Artifact("blocks.png", "map", "the blocks drawn apart, and their interfaces", "blocks.draw_blocks", ("blocks",)),
     Artifact("lines.png", "map", "parameter lines on the cube's faces", "map.draw_lines", ("volume",)),
     Artifact("cut.png", "map", "the volume cut open, with the distortion inside", "map.draw_cut", ("volume",)),
     Artifact("distortion.png", "map", "distortion on three sections", "map.draw_distortion", ("volume",)),

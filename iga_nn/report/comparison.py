@@ -55,7 +55,8 @@ def _of_map(report: reports.Report) -> dict[str, Cell]:
     quality = report["parameterization"]
     found: dict[str, Cell] = {"control points": (None, reports.size_in_words(quality))}
     if arap := quality.get("arap", {}).get("unit_volume"):
-        found |= {f"ARAP distortion, {name}": (arap[name], f"{arap[name]:.4g}") for name in ("mean", "max")}
+        where = " of own boxes" if "patches" in quality else ""
+        found |= {f"ARAP distortion{where}, {name}": (arap[name], f"{arap[name]:.4g}") for name in ("mean", "max")}
     distance = reports.surface_distance(report)
     return found | {
         f"distance / box's diagonal, {name}": (distance[name], f"{distance[name]:.3g}")

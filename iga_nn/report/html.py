@@ -16,7 +16,7 @@ from parameterize.files import save_text
 from ..errors import one_line
 from ..level_table import TITLES, as_rows, capitalized
 from ..rounding import rounded
-from . import balance, extremes
+from . import balance, extremes, patches
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, REGIONS, SOLVED, figures_of
@@ -40,6 +40,7 @@ ORIGINS = {
     "network": ("the network", "trained on the surface"),
     "growth": ("a growing cube", "the surface laid on its faces without the network"),
     "extension": ("the surface's layout on a cube", "extended into the solid without the network"),
+    "blocks": ("blocks along the skeleton", "glued by whole faces, and drawn to the surface"),
 }
 
 
@@ -82,6 +83,7 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         regions=regions_of(report),
         levels=_levels(section),
         extremes=extremes.table(section),
+        patches=patches.table(report["parameterization"]),
         notices=notices(report),
         figures=[(heading, image) for file, heading, image in drawn if file != REGIONS],
         where=[(heading, image) for file, heading, image in drawn if file == REGIONS],
@@ -140,7 +142,8 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
     facts = []
     if "arap" in quality:
         arap = quality["arap"]["unit_volume"]
-        facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; at volume 1"))
+        measured = "each block in its own box" if "patches" in quality else "at volume 1"
+        facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; {measured}"))
     if distance := reports.surface_distance(report):
         remark = f"rms over the box's diagonal, surface to spline and back; largest {distance['max']:.3g}"
         facts.append(("Distance to the surface", f"{distance['rms']:.3g}", remark))

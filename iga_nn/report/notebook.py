@@ -12,9 +12,10 @@ from parameterize.certificate.jacobian import Certificate
 from parameterize.quality.distortion import BoxDistortion
 from parameterize.quality.quality import BothScales, QualityReport
 from parameterize.spline.bspline import breakpoints
+from parameterize.spline.multipatch import MultiPatch, all_control_points, shared_numbers
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
-from solve.solution import Solution
+from solve.solution import MultiPatchSolution, Solution
 from solve.study import Convergence
 
 from ..level_table import as_rows
@@ -23,7 +24,7 @@ from . import document as reports
 
 @singledispatch
 def as_html(result: object) -> str:
-    """Return the table of a surface, volume, certificate, quality, solution or convergence study as HTML."""
+    """Return the table of a surface, volume, body, certificate, quality, solution or convergence study as HTML."""
     raise TypeError(f"there is no table of a {type(result).__name__}")
 
 
@@ -50,6 +51,19 @@ def _volume(volume: BSplineVolume) -> str:
         ("lies within", _ends(net.min(axis=0), net.max(axis=0))),
     ]
     return _table("Spline volume", facts)
+
+
+@as_html.register
+def _body(body: MultiPatch) -> str:
+    net = all_control_points(body)
+    facts = [
+        ("patches", str(len(body))),
+        ("interfaces", str(len(body.interfaces))),
+        ("outer faces", str(sum(map(len, body.outer)))),
+        ("control points", f"{shared_numbers([patch.shape for patch in body], body.interfaces)[1]:,}"),
+        ("lies within", _ends(net.min(axis=0), net.max(axis=0))),
+    ]
+    return _table("Body of several patches", facts)
 
 
 @as_html.register
@@ -104,8 +118,9 @@ def _patches(patches: Sequence[BoxDistortion]) -> str:
     return _table("Patches, as given", rows, head) if rows else ""
 
 
-@as_html.register
-def _solution(solution: Solution) -> str:
+@as_html.register(Solution)
+@as_html.register(MultiPatchSolution)
+def _solution(solution: Solution | MultiPatchSolution) -> str:
     report = solution.report
     head, *rows = as_rows([report.as_dict()])
     title = "Solution" if report.converged else f"Solution, NOT CONVERGED (residual {report.residual:.1e})"

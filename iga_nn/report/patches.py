@@ -1,4 +1,4 @@
-"""Adds the places without a proof to the section `parameterization` of report.json, of a volume or several patches."""
+"""Adds the places without a proof to the section `parameterization`, and makes the table of several patches from it."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 from .advice import span_places, unproved
-from .document import Report
+from .document import Report, size_in_words
 
 
 def with_unproved(
@@ -43,3 +43,24 @@ def unproved_places(body: BSplineVolume | MultiPatch, certificate: Certificate |
     assert isinstance(body, MultiPatch)
     parts = zip(body, certificate.patches, strict=True)
     return np.concatenate([span_places(patch, own.unproved) for patch, own in parts])
+
+
+def table(section: Report) -> list[list[str]]:
+    """Return the table of several patches: the titles of what is known, then a row a patch; no row for a volume."""
+    rows = [{"patch": f"p{number}", **_row(patch)} for number, patch in enumerate(section.get("patches", ()))]
+    return [list(rows[0]), *(list(row.values()) for row in rows)] if rows else []
+
+
+def _row(patch: Report) -> dict[str, str]:
+    """Return what is proved of a patch and, where it was measured against its own box, how much it distorts this."""
+    bound = patch["det_lower_bound"]
+    proof = "–" if patch["bijective"] != "certified" or bound is None else f"≥ {bound:.3g} of its mean"
+    found = {"control points": size_in_words(patch), "det J": patch["bijective"], "|det J|": proof}
+    if "own_box" not in patch:
+        return found
+    return found | {
+        "own box": " × ".join(f"{side:.3g}" for side in patch["own_box"]),
+        "ARAP, mean": f"{patch['arap']['mean']:.3g}",
+        "largest": f"{patch['arap']['max']:.3g}",
+        "least scaled det J": f"{patch['scaled_jacobian']:.3g}",
+    }

@@ -16,6 +16,7 @@ from parameterize.arrays import Array, IntArray
 from parameterize.compilation import compilation_told
 from parameterize.files import save_arrays
 from parameterize.progress import Progress, ProgressCallback
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_normals
 from parameterize.surface.surface import Surface
@@ -268,10 +269,10 @@ def _write(
 
 
 def _draw(state: RunFolder, given: MapInput, result: Parameterization) -> None:
-    """Draw the map, and the places without a proof and the places where it meets itself, if there are any."""
-    defects: dict[str, Any] = {}
+    """Draw the map, its blocks, the places without a proof and the places where it meets itself, if there are any."""
+    known: dict[str, Any] = {"blocks": result.volume} if isinstance(result.volume, MultiPatch) else {}
     if len(places := unproved_places(result.volume, result.certificate)):
-        defects["places"] = places
+        known["places"] = places
     if meeting := result.quality.boundary_check.meeting:
-        defects["meeting"] = meeting
-    state.draw("map", volume=result.volume, history=result.history, marks=given.marks, **defects)
+        known["meeting"] = meeting
+    state.draw("map", volume=result.volume, history=result.history, marks=given.marks, **known)
