@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import iga_nn
-from parameterize.quality.quality import arap_grid
+from parameterize.quality.distortion import arap_grid
 from solve.study import benchmark_volume
 
 PROBLEM = iga_nn.Poisson(exact="exp(x+z)*sin(y)")

@@ -25,7 +25,7 @@ from .optimization.rounds import optimize
 from .optimization.surface_distance import SurfaceFit
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
-from .quality.quality import arap_grid
+from .quality.distortion import arap_grid
 from .quality.two_sided import two_sided
 from .spline.bspline import breakpoints, midpoints
 from .spline.spline_map import SplineMap

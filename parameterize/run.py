@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray
 from .attempts import attempts
-from .certificate.body import certify
+from .certificate.body import BodyCertificate, certify
 from .certificate.boundary import check_boundary
 from .certificate.jacobian import Certificate
 from .checkpoint import Checkpoints
@@ -24,6 +24,7 @@ from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback, ignore, timed
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
+from .spline.multipatch import MultiPatch
 from .spline.volume import BSplineVolume
 from .starts.start import Origin, Task
 from .starts.tried import AttemptReport, best_of
@@ -40,11 +41,11 @@ class Parameterization(Brief):
 
     Attributes
     ----------
-    volume : BSplineVolume
-        The map F.
+    volume : BSplineVolume or MultiPatch
+        The map F of a cube, or of several blocks that are glued.
     boundary : BoundaryMap
-        Every surface vertex with its parameters.
-    certificate : Certificate
+        Every surface vertex with its parameters, and the block that they belong to.
+    certificate : Certificate or BodyCertificate
         What is proved of det J.
     quality : QualityReport
         What is measured; printed, a table.
@@ -73,9 +74,9 @@ class Parameterization(Brief):
     (True, ['certify', 'fit', 'optimize', 'train'])
     """
 
-    volume: BSplineVolume
+    volume: BSplineVolume | MultiPatch
     boundary: BoundaryMap
-    certificate: Certificate
+    certificate: Certificate | BodyCertificate
     quality: QualityReport
     history: dict[str, NDArray[Any]]
     seconds: dict[str, float]

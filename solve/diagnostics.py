@@ -6,7 +6,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import INDEFINITE, LinearResult
-from parameterize.quality.quality import scaled_jacobian
+from parameterize.quality.distortion import scaled_jacobian
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 

@@ -117,7 +117,7 @@ class SplineField(Brief):
                 raise ValueError(
                     f"a point lies more than {FARTHEST:g} times the volume's size away: its nearest point is not found"
                 )
-            where[outside], _ = nearest_on_boundary(beyond, self.geometry, SampledBoundary.of(self.geometry))
+            _, where[outside], _ = nearest_on_boundary(beyond, self.geometry, SampledBoundary.of(self.geometry))
             outside[:] = False
         values = np.full((len(where), *self.coefficients.shape[3:]), np.nan)
         values[~outside] = self(where[~outside])

@@ -35,6 +35,31 @@ def test_turned_triangles_are_flipped():
     assert len(BoundaryMap(mapping.vertices, CORNERS, mapping.faces[:, ::-1]).flipped()) == 12
 
 
+def test_vertices_of_several_blocks_say_on_which_they_lie(tmp_path):
+    cube, patches = cube_map(), np.arange(8) % 3
+    assert cube.patches.tolist() == [0] * 8
+    several = BoundaryMap(cube.vertices, CORNERS, cube.faces, cube.faces, {"top": np.array([3])}, patches)
+    several.save(tmp_path / "boundary.npz")
+    again = BoundaryMap.load(tmp_path / "boundary.npz")
+    assert again.patches.tolist() == patches.tolist() and again.part.group("top").tolist() == [3]
+    for ask in (lambda: several.cube_faces, several.flipped):
+        with pytest.raises(ValueError, match="lies on 3 blocks, and is not cut along their edges"):
+            ask()
+    for wrong in (patches[:7], patches - 1, patches / 2.0):
+        with pytest.raises(ValueError, match="patches must have a whole number from 0 on for each of the 8 vertices"):
+            BoundaryMap(cube.vertices, CORNERS, cube.faces, patches=wrong)
+
+
+def test_a_file_without_blocks_lies_on_one(tmp_path):
+    cube = cube_map()
+    arrays = {"vertices": cube.vertices, "parameters": CORNERS, "faces": cube.faces}
+    np.savez(tmp_path / "old.npz", **arrays)
+    assert BoundaryMap.load(tmp_path / "old.npz").patches.tolist() == [0] * 8
+    np.savez(tmp_path / "bad.npz", **arrays, patches=np.zeros(3, dtype=int))
+    with pytest.raises(ValueError, match=r"bad.npz: patches must have"):
+        BoundaryMap.load(tmp_path / "bad.npz")
+
+
 @pytest.mark.parametrize(
     "triangle",
     [

@@ -6,14 +6,18 @@ import re
 
 import numpy as np
 import pytest
+from blocks import outer_surface
 from conftest import formula_parameterization
 from matplotlib.image import imread
+from patches import cells as boxes
 from rational_shapes import quarter_ring
 
 import iga_nn
 from iga_nn.figures.map import draw_distortion
 from iga_nn.figures.render import can_draw
 from iga_nn.report.notebook import as_html
+from parameterize.certificate.boundary import check_boundary
+from parameterize.quality.quality import measure
 from parameterize.surface.surface import surface_from_arrays
 from solve import Convergence, Poisson, convergence, solve_problem
 from solve.study import benchmark_volume
@@ -69,6 +73,16 @@ def test_a_certificate_of_several_patches_lists_its_defects():
     assert "2 patches: certified" in shown and "<ul>" not in shown
     folded = iga_nn.certify(iga_nn.MultiPatch((benchmark_volume(2), benchmark_volume(4, amplitude=0.4))))
     assert "2 patches: folded" in folded._repr_html_() and "<li>p1: folded at (" in folded._repr_html_()
+
+
+def test_the_quality_of_several_patches_has_a_row_for_each():
+    body = iga_nn.MultiPatch.from_patches(boxes([(0, 0, 0), (1, 0, 0)], 4, 3))
+    outer = outer_surface(body)
+    quality = measure(body, outer.vertices, outer.faces, 0.5, outer, iga_nn.certify(body), check_boundary(body))
+    shown = quality._repr_html_()
+    assert "det J &gt; 0: certified; one-to-one: yes" in shown and "Patches, as given" in shown
+    found = cells(shown)
+    assert found[found.index("p1") + 1] == "1 × 1 × 1" and found[-1] == "1"
 
 
 def test_a_solution_shows_relative_errors_before_absolute_ones(solution):

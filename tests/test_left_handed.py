@@ -10,7 +10,7 @@ import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.figures import cutaway
 from iga_nn.figures.fields import distortion_of, points_of
-from parameterize.quality.quality import arap, arap_grid, arap_on
+from parameterize.quality.distortion import arap, arap_grid, arap_on
 from parameterize.spline.orientation import mirrored, orientation
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Elasticity, Form, Poisson, Problem, benchmark_volume, solve_problem

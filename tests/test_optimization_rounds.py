@@ -16,7 +16,7 @@ from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
 from parameterize.optimization.term import RoundWeights, Weights
 from parameterize.progress import History
-from parameterize.quality.quality import arap
+from parameterize.quality.distortion import arap
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
 from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume

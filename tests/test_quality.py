@@ -1,18 +1,25 @@
-"""Distortion and distances, on maps whose values can be worked out by hand."""
+"""Quality reports and distances, on maps whose values can be worked out by hand."""
 
 import json
+from dataclasses import replace
 
 import igl
 import numpy as np
 import pytest
+from blocks import outer_surface
+from patches import patch as from_function
+from patches import plate_with_hole
 from shapes import CORNERS, CUBE_FACES
 
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.quality.distances import Distances, nearest_on_boundary
-from parameterize.quality.quality import arap, arap_grid, measure, scaled_jacobian
+from parameterize.quality.distortion import arap_grid
+from parameterize.quality.quality import measure
+from parameterize.quality.two_sided import two_sided
 from parameterize.spline.bspline import collocation, greville, open_uniform_knots
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.nearest import distance_to_mesh
@@ -38,79 +45,9 @@ def ball(n=14):
     return BSplineVolume.uniform(np.einsum("ai,bj,ck,ijkx->abcx", inverse, inverse, inverse, values))
 
 
-def rotations(n, seed=0):
-    q, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((n, 3, 3)))
-    return q * np.sign(np.linalg.det(q))[:, None, None]
-
-
-def test_distortion_agrees_with_the_singular_values_of_lapack():
-    matrices = np.random.default_rng(0).standard_normal((4, 500, 3, 3))
-    sigma = np.linalg.svd(matrices, compute_uv=False)
-    sigma[..., 2] *= np.sign(np.linalg.det(matrices))
-    np.testing.assert_allclose(arap(matrices), np.sum((sigma - 1.0) ** 2, axis=-1), rtol=1e-12)
-    graded = rotations(100) @ np.diag([1.0, 1e-3, 1e-10]) @ rotations(100, 2)
-    np.testing.assert_allclose(arap(graded), (1.0 - 1e-3) ** 2 + (1.0 - 1e-10) ** 2, rtol=1e-14)
-
-
-@pytest.mark.parametrize("size", [1e-200, 1e100])
-def test_distortion_is_right_in_any_unit(size):
-    assert arap(size * np.diag([3.0, 2.0, 1.0])) == pytest.approx(np.sum((size * np.array([3.0, 2.0, 1.0]) - 1.0) ** 2))
-    assert arap(np.zeros((3, 3))) == 3.0
-
-
-@pytest.mark.parametrize(
-    ("bad", "message"), [(np.zeros((3, 2)), r"shape \(..., 3, 3\)"), (np.full((3, 3), np.nan), "finite")]
-)
-def test_bad_jacobians_are_refused(bad, message):
-    with pytest.raises(ValueError, match=message):
-        arap(bad)
-
-
-def test_arap_by_hand():
-    assert arap(np.diag([2.0, 1.0, 0.5])) == pytest.approx(1.25)  # 1 + 0 + 1/4
-    assert arap(np.diag([0.5, 3.0, -1.0])) == pytest.approx(0.0 + 4.0 + 2.25)  # the smallest, 0.5, takes the sign
-    np.testing.assert_allclose(arap(rotations(20)), 0.0, atol=1e-28)
-    np.testing.assert_allclose(arap(-rotations(20)), 4.0, rtol=1e-14)  # mirrored: (-1 - 1)^2
-
-
-def test_arap_agrees_with_the_polar_rotation():
-    rng = np.random.default_rng(3)
-    matrices = rng.standard_normal((200, 3, 3))
-    u, _, vt = np.linalg.svd(matrices)
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
-    closest = u @ vt  # rotation closest to J: ARAP is the squared distance to it
-    np.testing.assert_allclose(arap(matrices), np.sum((matrices - closest) ** 2, axis=(1, 2)), rtol=1e-9)
-
-
-def test_scaled_jacobian():
-    assert scaled_jacobian(np.diag([2.0, 5.0, 0.1])) == pytest.approx(1.0)
-    assert scaled_jacobian(np.diag([2.0, 5.0, -0.1])) == pytest.approx(-1.0)
-    assert scaled_jacobian(np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])) == pytest.approx(0.5**0.5)
-    assert scaled_jacobian(np.diag([1.0, 1.0, 0.0])) == 0.0
-
-
-def test_arap_grid_integrates_over_the_cube():
-    points = greville_grid(5)
-    points[..., 0] += 0.5 * np.linspace(0.0, 1.0, 5)[:, None, None] ** 2  # x = x(u): ARAP is (x' - 1)^2
-    (u, v, w), (values,), weights = arap_grid(BSplineVolume.uniform(points), n_gauss=4)
-    assert values.shape == weights.shape == (8, 8, 8) == (len(u), len(v), len(w))
-    assert weights.sum() == pytest.approx(1.0, rel=1e-14)
-    rate = BSplineVolume.uniform(points).grid_jacobian(u, [0.5], [0.5])[:, 0, 0, 0, 0]
-    np.testing.assert_allclose(values, np.broadcast_to((rate[:, None, None] - 1.0) ** 2, values.shape), atol=1e-13)
-    _, (plain, scaled), _ = arap_grid(BSplineVolume.uniform(points), n_gauss=1, scales=(1.0, 3.0))
-    np.testing.assert_allclose(plain, arap_grid(BSplineVolume.uniform(points), n_gauss=1)[1][0], rtol=1e-12)
-    np.testing.assert_allclose(scaled, arap_grid(BSplineVolume.uniform(3.0 * points), n_gauss=1)[1][0], rtol=1e-12)
-
-
-def test_slabs_do_not_show(monkeypatch):
-    volume = ball(8)
-    whole = arap_grid(volume)[1]
-    monkeypatch.setattr("parameterize.quality.quality._SLAB_POINTS", 500)
-    np.testing.assert_allclose(arap_grid(volume)[1], whole, rtol=1e-13)
-
-
 def to_boundary(points, volume, boundary):
-    where, distances = nearest_on_boundary(points, volume, boundary)
+    patches, where, distances = nearest_on_boundary(points, volume, boundary)
+    assert not patches.any()
     np.testing.assert_allclose(np.linalg.norm(volume(where) - points, axis=1), distances, atol=1e-14)
     assert np.all(np.any((where == 0.0) | (where == 1.0), axis=1))
     return distances
@@ -264,3 +201,71 @@ def test_scale_must_be_positive(scale):
     boundary = BoundaryMap(CORNERS, CORNERS, CUBE_FACES)
     with pytest.raises(ValueError, match="scale must be positive"):
         measure(volume, CORNERS, CUBE_FACES, scale, boundary, *proofs(volume))
+
+
+def test_a_body_of_patches_by_hand():
+    """Two straight bars of 2 x 1 x 1 and 1 x 1 x 1 are not distorted; their surface is moved by 0.1 along z."""
+    bars = [from_function(lambda u, v, w: (2.0 * u, v, w)), from_function(lambda u, v, w: (2.0 + w, v, 1.0 - u))]
+    body = MultiPatch.from_patches(bars)
+    outer = outer_surface(body)
+    moved = replace(outer, vertices=outer.vertices + [0.0, 0.0, 0.1])
+    report = measure(body, moved.vertices, moved.faces, 2.0, moved, certify(body), check_boundary(body))
+    section = report.as_dict()
+    assert json.loads(json.dumps(section)) == section
+    assert section["control_points"] == report.control_points == 2 * 4**3 - 4**2 and report.degrees == (3,)
+    assert (section["bijective"], section["boundary_injective"], section["euler_number"]) == ("certified", True, 2)
+    for scale in ("unit_volume", "as_given"):
+        assert section["arap"][scale]["max"] < 1e-20
+    assert [part["own_box"] for part in section["patches"]] == [pytest.approx([2, 1, 1]), pytest.approx([1, 1, 1])]
+    assert [part["volume"] for part in section["patches"]] == pytest.approx([2.0, 1.0])
+    assert [part["bijective"] for part in section["patches"]] == ["certified"] * 2
+    assert section["boundary"]["as_given"] == {name: pytest.approx(0.1) for name in ("rms", "mean", "max")}
+    for pair in section["surface_distance"].values():
+        assert pair["as_given"]["max"] == pytest.approx(0.1) and pair["unit_volume"]["max"] == pytest.approx(0.2)
+    # the surface's top is 0.1 above the body's; its bottom is inside, near the walls closer to them; a strip sticks out
+    top, bottom, strip = 0.03, 2.8 * 0.8 * 0.01 + 8.0 * (0.001 / 3.0 - 0.0001 / 4.0), 8.0 * 0.001 / 3.0
+    there = section["surface_distance"]["mesh_to_spline"]["as_given"]
+    assert there["rms"] == pytest.approx(((top + bottom + strip) / 14.0) ** 0.5, rel=5e-3)
+    text = str(report)
+    assert "112 control points of degree 3 in 2 patches: certified, |det J| >=" in text and "2 x 1 x 1" in text
+
+
+def test_the_distortion_of_a_body_is_weighted_by_volume():
+    bars = [from_function(lambda u, v, w: (2.0 * u, v, w)), from_function(lambda u, v, w: (2.0 + u, v + u / 2.0, w))]
+    body = MultiPatch.from_patches(bars)
+    outer = outer_surface(body)
+    report = measure(body, outer.vertices, outer.faces, 1.0, outer, certify(body), check_boundary(body))
+    sheared = report.patches[1].arap
+    assert sheared.mean > 0.05 and report.arap.as_given.max == sheared.max
+    assert report.arap.as_given.mean == pytest.approx(sheared.mean / 3.0)
+    assert [part["scaled_jacobian"] for part in report.as_dict()["patches"]] == pytest.approx([1.0, 1.25**-0.5])
+    assert report.surface_distance.as_given.max < 1e-9 and report.boundary.as_given.max < 1e-12
+
+
+def test_distances_of_a_body_know_their_patch():
+    body = plate_with_hole()
+    found = two_sided(body, *surface_arrays(outer_surface(body, 9)))
+    for way in (found.mesh_to_spline, found.spline_to_mesh):
+        assert set(way.patches.tolist()) == set(range(8)) and way.shares.sum() == pytest.approx(1.0)
+        for number, names in enumerate(body.outer):
+            where = way.parameters[way.patches == number]
+            faces = np.stack([where[:, "uvw".index(name[0])] == float(name[1]) for name in names])
+            assert faces.any(axis=0).all()
+    assert len(SampledBoundary.of(body).points) < 1.2 * 6 * 160**2  # as many as on a cube, though the faces are 32
+
+
+def surface_arrays(boundary):
+    return boundary.vertices, boundary.faces
+
+
+def test_what_is_no_body_with_its_boundary_is_refused():
+    body = MultiPatch.from_patches([from_function(lambda u, v, w, a=a: (a + u, v, w)) for a in (0, 1)])
+    outer = outer_surface(body)
+    given = (outer.vertices, outer.faces, 1.0)
+    with pytest.raises(TypeError, match=r"certificate is not that of this body"):
+        measure(body, *given, outer, certify(body.patches[0]), check_boundary(body))
+    inside = replace(outer, parameters=np.where(outer.patches[:, None] == 0, [1.0, 0.5, 0.5], outer.parameters))
+    with pytest.raises(ValueError, match=r"no outer face of their patch, the first is vertex 0 at \(1, 0.5, 0.5\)"):
+        measure(body, *given, inside, certify(body), check_boundary(body))
+    with pytest.raises(ValueError, match="there is no patch 2"):
+        measure(body, *given, replace(outer, patches=outer.patches + 1), certify(body), check_boundary(body))

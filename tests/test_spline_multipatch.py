@@ -154,3 +154,12 @@ def test_points_are_located_in_their_patches():
     owners, where = plate().locate([[0.25, 0.5, 0.5], [2.5, 2.5, 0.1], [1.5, 1.5, 0.5]])
     assert owners.tolist() == [0, 7, -1]
     assert where[:2] == pytest.approx(np.array([[0.25, 0.5, 0.5], [0.5, 0.5, 0.1]])) and np.isnan(where[2]).all()
+
+
+def test_points_of_patches_are_what_locate_finds():
+    body, places = plate(), np.array([[2.5, 2.5, 0.1], [0.25, 0.5, 0.5], [0.75, 0.5, 0.5]])
+    assert body.points(*body.locate(places)) == pytest.approx(places)
+    with pytest.raises(ValueError, match="there is no patch 8: the body has 8, from 0 on"):
+        body.points([0, 8], places[:2])
+    with pytest.raises(ValueError, match=r"got shapes \(2,\) and \(3, 3\)"):
+        body.points([0, 1], places)

@@ -10,7 +10,7 @@ from iga_nn.report.viewer import scene_of
 from iga_nn.workflow.verdict import certified_facts
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
-from parameterize.quality.quality import arap_grid
+from parameterize.quality.distortion import arap_grid
 from parameterize.spline.bspline import breakpoints, greville
 from parameterize.spline.volume import BSplineVolume
 from solve import Elasticity, Poisson, benchmark_volume, solve_problem

@@ -4,14 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from bodies import ring
 from volumes import mapped
 
 import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.figures import render as rendering
 from iga_nn.options import texts
-from iga_nn.report.patches import euler_number
 from solve.field import MultiPatchField
 
 
@@ -78,11 +76,6 @@ def test_figures_and_page_of_a_body(in_folder):
         assert (in_folder / "out" / f"{name}.png").stat().st_size > 5000
     page = (in_folder / "out" / "report.html").read_text()
     assert "2 interfaces, 14 outer faces" in page and "flux κ ∂u/∂n on p1_u1" in page
-
-
-@pytest.mark.parametrize(("body", "number"), [(ell(), 2), (ring(3), 0), (ring(1), 0), (rod(), 2)])
-def test_the_euler_number_counts_holes(body, number):
-    assert euler_number(body) == number
 
 
 def test_a_solution_is_written_and_read_back(in_folder):

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.quality.quality import arap_on
+from parameterize.quality.distortion import arap_on
 from parameterize.spline.multipatch import as_multipatch
 from solve.field import Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem

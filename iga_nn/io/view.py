@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.quality.quality import arap_on
+from parameterize.quality.distortion import arap_on
 from parameterize.spline.bspline import divided_spans
 from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import orientation

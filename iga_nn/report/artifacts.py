@@ -47,7 +47,7 @@ class Artifact:
 
 
 _KNOTS = ("degrees", "knots_u", "knots_v", "knots_w")
-_BOUNDARY = ("vertices", "parameters", "faces")
+_BOUNDARY = ("vertices", "parameters", "faces", "patches")
 _VALUES = ("volume", "solution", "units")
 _ERROR = ("volume", "solution", "problem", "units")
 

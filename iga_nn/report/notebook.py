@@ -9,6 +9,7 @@ from typing import Any
 from parameterize.arrays import Array, in_brackets
 from parameterize.certificate.body import BodyCertificate
 from parameterize.certificate.jacobian import Certificate
+from parameterize.quality.distortion import BoxDistortion
 from parameterize.quality.quality import BothScales, QualityReport
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import BSplineVolume
@@ -75,7 +76,7 @@ def _body_certificate(certificate: BodyCertificate) -> str:
 
 @as_html.register
 def _quality(quality: QualityReport) -> str:
-    answer = reports.one_to_one({"parameterization": quality.as_dict()})
+    report = {"parameterization": quality.as_dict()}
     rows = [
         ("ARAP distortion: mean, max", *_both(quality.arap)),
         ("boundary at the mesh's vertices: rms, mean, max", *_both(quality.boundary)),
@@ -83,8 +84,24 @@ def _quality(quality: QualityReport) -> str:
         ("spline to mesh: rms, mean, max", *_both(quality.spline_to_mesh)),
         ("both ways: rms, mean, max", *_both(quality.surface_distance)),
     ]
-    title = f"{quality.certificate.claim}: {quality.certificate.verdict}; one-to-one: {answer}"
-    return _table(title, rows, head=("", "at volume 1", "as given"))
+    title = f"{reports.claim(report)}: {quality.certificate.verdict}; one-to-one: {reports.one_to_one(report)}"
+    return _table(title, rows, head=("", "at volume 1", "as given")) + _patches(quality.patches)
+
+
+def _patches(patches: Sequence[BoxDistortion]) -> str:
+    """Return the table of several patches, each measured against its own box; "" for none."""
+    rows = [
+        (
+            f"p{i}",
+            _times([f"{side:.3g}" for side in one.box]),
+            f"{one.arap.mean:.4g}",
+            f"{one.arap.max:.4g}",
+            f"{one.scaled_jacobian:.3g}",
+        )
+        for i, one in enumerate(patches)
+    ]
+    head = ("", "own box", "ARAP, mean", "ARAP, max", "least scaled det J")
+    return _table("Patches, as given", rows, head) if rows else ""
 
 
 @as_html.register
@@ -107,7 +124,7 @@ def _both(measure: BothScales[Any]) -> list[str]:
     return [", ".join(f"{value:.4g}" for value in asdict(m).values()) for m in (measure.unit_volume, measure.as_given)]
 
 
-def _times(counts: Sequence[int]) -> str:
+def _times(counts: Sequence[object]) -> str:
     return " × ".join(map(str, counts))
 
 

@@ -27,8 +27,8 @@ from solve.forms.frame import UnitFrame
 from ..errors import InputError, input_errors
 from ..models import resolve
 from ..options import MapOptions
-from ..report import advice
 from ..report import document as reports
+from ..report.patches import unproved_places, with_unproved
 from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
@@ -260,10 +260,9 @@ def _write(
         seed=mapping.seed,
         device=result.device,
         versions=reports.versions(),
-        parameterization=result.quality.as_dict()
+        parameterization=with_unproved(result.quality.as_dict(), result.volume, result.certificate)
         | {"origin": result.origin, "attempts": [asdict(attempt) for attempt in result.attempts]}
-        | ({"refinement": asdict(result.refinement)} if result.refinement else {})
-        | advice.unproved(result.volume, result.certificate),
+        | ({"refinement": asdict(result.refinement)} if result.refinement else {}),
     )
     tell(state, mapping)
 
@@ -271,8 +270,8 @@ def _write(
 def _draw(state: RunFolder, given: MapInput, result: Parameterization) -> None:
     """Draw the map, and the places without a proof and the places where it meets itself, if there are any."""
     defects: dict[str, Any] = {}
-    if len(unproved := result.certificate.unproved):
-        defects["places"] = advice.span_places(result.volume, unproved)
+    if len(places := unproved_places(result.volume, result.certificate)):
+        defects["places"] = places
     if meeting := result.quality.boundary_check.meeting:
         defects["meeting"] = meeting
     state.draw("map", volume=result.volume, history=result.history, marks=given.marks, **defects)

@@ -9,14 +9,14 @@ from parameterize.arrays import in_brackets
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.compilation import compilation_told
-from parameterize.quality.quality import proved
+from parameterize.quality.proved import proved, proved_of
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
-from ..report.patches import proved_of
+from ..report.patches import with_unproved
 from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
@@ -26,10 +26,11 @@ def certified_facts(body: BSplineVolume | MultiPatch) -> dict[str, Any]:
     """Certify a body and return the section `parameterization` of report.json."""
     with compilation_told():
         if isinstance(body, MultiPatch):
-            return proved_of(body, certify(body), check_boundary(body))
+            whole = certify(body)
+            return with_unproved(proved_of(body, whole, check_boundary(body)), body, whole)
         certificate = certify(body)
         facts = proved(body.shape, body.degrees, certificate, check_boundary(body))
-    return facts | advice.unproved(body, certificate)
+    return with_unproved(facts, body, certificate)
 
 
 def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiPatch, command: str) -> None:

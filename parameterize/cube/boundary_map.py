@@ -1,8 +1,12 @@
-"""Defines BoundaryMap: the surface laid one-to-one on the faces of the cube, cut along its edges (boundary.npz)."""
+"""Defines BoundaryMap: the surface laid one-to-one on the faces of the cube, cut along its edges (boundary.npz).
+
+On the outer faces of several blocks it is not cut, see `BoundaryMap.patches`.
+"""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +23,7 @@ from .flips import orientation, untangle_whole
 from .layout import CubeLayout
 
 PART = ("part_faces", "group_names", "group_sizes", "group_faces")  # arrays of boundary.npz that older files lack
+PATCHES = "patches"  # another one
 _SAME = 1e-7  # share of an edge's length: a cut this close to a vertex takes the vertex
 _NUDGE = 1e-4  # by which vertices move where a mesh edge runs through a corner of the cube
 _NUDGES = 10  # at most
@@ -30,7 +35,7 @@ _UNDO_ROUNDS = 10  # in which such a step is undone at flipped triangles, before
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BoundaryMap(Brief):
-    """Every vertex of a closed surface with its place on the boundary of the unit cube.
+    """Every vertex of a closed surface with its place on the boundary of the unit cube, or of one of several blocks.
 
     Parameters
     ----------
@@ -44,6 +49,11 @@ class BoundaryMap(Brief):
         The triangles of the surface before they were cut along the cube's edges; its vertices come first.
     groups : dict of str to array of int
         Triangles of the surface by the names of their groups; numbers are rows of part_faces.
+    patches : (n,) array of int, optional
+        The block that each vertex lies on, where a body has several; its parameters are those of that block, on one of
+        its outer faces. By default all lie on block 0. A vertex on an edge between two blocks belongs to one of them.
+        The triangles of several blocks are not cut along the blocks' edges: their corners may lie on different blocks
+        or faces, and part_faces are the same triangles.
 
     Raises
     ------
@@ -64,6 +74,7 @@ class BoundaryMap(Brief):
     faces: IntArray
     part_faces: IntArray | None = None
     groups: Groups = field(default_factory=dict)
+    patches: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         vertices = _rows_of_three(self.vertices, "vertices")
@@ -76,7 +87,7 @@ class BoundaryMap(Brief):
         part_faces = None if self.part_faces is None else _checked_faces(self.part_faces, "part_faces", len(vertices))
         groups = checked(self.groups, len(faces if part_faces is None else part_faces))
         inside = np.all((parameters >= 0.0) & (parameters <= 1.0), axis=1)
-        off = np.flatnonzero(~(inside & np.any(_on_faces(parameters), axis=1)))
+        off = np.flatnonzero(~(inside & np.any(on_faces(parameters), axis=1)))
         if off.size:
             raise ValueError(
                 f"parameters must lie on the faces of the unit cube: {off.size} do not, the first is vertex {off[0]} "
@@ -87,6 +98,7 @@ class BoundaryMap(Brief):
         object.__setattr__(self, "faces", faces)
         object.__setattr__(self, "part_faces", part_faces)
         object.__setattr__(self, "groups", groups)
+        object.__setattr__(self, "patches", _checked_patches(self.patches, len(vertices)))
 
     @cached_property
     def part(self) -> PartSurface:
@@ -99,9 +111,10 @@ class BoundaryMap(Brief):
         """Return the cube face of each triangle, (m,) indices into FACE_NAMES.
 
         A triangle on an edge of the cube has the first of its two faces. Raises ValueError where the corners of a
-        triangle share no face.
+        triangle share no face, and for several blocks, along whose edges the surface is not cut.
         """
-        shared = np.all(_on_faces(self.parameters)[self.faces], axis=1)  # (m, 6)
+        self._demand_cube()
+        shared = np.all(on_faces(self.parameters)[self.faces], axis=1)  # (m, 6)
         homeless = np.flatnonzero(~np.any(shared, axis=1))
         if homeless.size:
             raise ValueError(
@@ -113,26 +126,35 @@ class BoundaryMap(Brief):
     def flipped(self) -> IntArray:
         """Return the numbers (k,) of the triangles that do not face outwards, seen from the cube's centre.
 
-        A triangle without area, within rounding error, counts as flipped.
+        A triangle without area, within rounding error, counts as flipped. Raises ValueError for several blocks.
         """
+        self._demand_cube()
         triple, noise = orientation(self.parameters, self.faces)
         return np.flatnonzero(triple <= noise)
+
+    def _demand_cube(self) -> None:
+        if self.patches.any():
+            raise ValueError(
+                f"the surface lies on {len(np.unique(self.patches))} blocks, and is not cut along their edges: its "
+                "triangles have no face of a cube; `patches` and `parameters` say where its vertices are"
+            )
 
     def save(self, path: str | Path) -> None:
         """Write boundary.npz atomically."""
         part = {} if self.part_faces is None else {"part_faces": self.part_faces, **as_arrays(self.groups)}
-        save_arrays(path, vertices=self.vertices, parameters=self.parameters, faces=self.faces, **part)
+        places = {"vertices": self.vertices, "parameters": self.parameters, "faces": self.faces}
+        save_arrays(path, **places, patches=self.patches, **part)
 
     @classmethod
     def load(cls, path: str | Path) -> "BoundaryMap":
         """Read boundary.npz. Raises FileNotFoundError, or a ValueError that names the defect of the file."""
-        data = load_arrays(path, ("vertices", "parameters", "faces"), PART)
-        places = data["vertices"], data["parameters"], data["faces"]
+        data = load_arrays(path, ("vertices", "parameters", "faces"), (*PART, PATCHES))
+        given: dict[str, Any] = {name: data[name] for name in data if name not in PART}
         try:
             if any(name not in data for name in PART):
-                return cls(*places)
+                return cls(**given)
             part_faces, names, sizes, numbers = (data[name] for name in PART)
-            return cls(*places, part_faces, from_arrays(names, sizes, numbers, len(part_faces)))
+            return cls(**given, part_faces=part_faces, groups=from_arrays(names, sizes, numbers, len(part_faces)))
         except (TypeError, ValueError) as error:
             raise ValueError(f"{path}: {error}") from None
 
@@ -155,6 +177,16 @@ def _checked_faces(values: IntArray, name: str, count: int) -> IntArray:
     return faces.astype(np.int64)
 
 
+def _checked_patches(values: IntArray, count: int) -> IntArray:
+    """Return the blocks (count,) of vertices; all are on block 0 where none are given."""
+    patches = np.asarray(values)
+    if not patches.size:
+        return np.zeros(count, dtype=np.int64)
+    if patches.shape != (count,) or patches.dtype.kind not in "iu" or patches.min() < 0:
+        raise ValueError(f"patches must have a whole number from 0 on for each of the {count} vertices")
+    return patches.astype(np.int64)
+
+
 def _rows_of_three(values: Array, name: str) -> Array:
     rows = real_array(values, name)
     if rows.ndim != 2 or rows.shape[1] != 3:
@@ -164,7 +196,7 @@ def _rows_of_three(values: Array, name: str) -> Array:
     return rows
 
 
-def _on_faces(parameters: Array) -> Mask:
+def on_faces(parameters: Array) -> Mask:
     """Return the mask (n, 6) of the cube faces on which each parameter lies, in the order of FACE_NAMES."""
     return np.stack([parameters == 0.0, parameters == 1.0], axis=-1).reshape(-1, len(FACE_NAMES))
 

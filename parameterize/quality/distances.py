@@ -1,11 +1,12 @@
-"""Distances of points to the boundary of a trivariate spline, and their root mean square, mean and maximum."""
+"""Distances of points to the boundary of a body of trivariate splines, and their rms, mean and maximum."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..cube.cube import axis_and_side, damped_fit, tangent_axes
+from ..spline.multipatch import MultiPatch, as_multipatch
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.nearest import closest_triangles
@@ -39,10 +40,14 @@ class Distances:
         return Distances(scale * self.rms, scale * self.mean, scale * self.max)
 
 
-def nearest_on_boundary(points: Array, volume: BSplineVolume, boundary: SampledBoundary) -> tuple[Array, Array]:
-    """Return the parameters (m, 3) of the spline's boundary points nearest to points (m, 3), and the distances (m,).
+def nearest_on_boundary(
+    points: Array, body: BSplineVolume | MultiPatch, boundary: SampledBoundary
+) -> tuple[IntArray, Array, Array]:
+    """Return the points of a body's outer boundary that are nearest to points (m, 3): patches, parameters, distances.
 
-    The nearest point of the sampled triangles gives a cube face and parameters on it; Gauss-Newton steps in that face
+    patches (m,), all 0 for a volume; parameters (m, 3), on an outer face of that patch; distances (m,).
+
+    The nearest point of the sampled triangles gives a face and parameters on it; Gauss-Newton steps in that face
     then lower the distance to the spline itself. It is the distance of a point on the spline's boundary, so never less
     than the true one.
     """
@@ -50,8 +55,23 @@ def nearest_on_boundary(points: Array, volume: BSplineVolume, boundary: SampledB
     corners = boundary.triangles[triangle]  # (m, 3)
     where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
     axis, _ = axis_and_side(boundary.cube_faces[triangle])
+    every = np.arange(len(points))
+    where[every, axis] = boundary.parameters[corners[:, 0], axis]
+    patches, distances = boundary.patches[corners[:, 0]], np.empty(len(points))
+    for number, patch in enumerate(as_multipatch(body)):
+        own = np.flatnonzero(patches == number)
+        if not own.size:
+            continue
+        where[own], distances[own] = _closer(patch, points[own], where[own], axis[own])
+    return patches, where, distances
+
+
+def _closer(volume: BSplineVolume, points: Array, where: Array, axis: IntArray) -> tuple[Array, Array]:
+    """Return parameters (m, 3) nearer to points (m, 3), and their distances (m,), after Gauss-Newton steps in faces.
+
+    where: the parameters (m, 3) from which the steps begin; axis: (m,) the one that is constant on the face.
+    """
     active = np.arange(len(points))
-    where[active, axis] = boundary.parameters[corners[:, 0], axis]
     best: Array = np.linalg.norm(volume(where) - points, axis=1)
     for _ in range(_NEWTON_STEPS):
         trial, (a, b), rows = where[active], tangent_axes(axis[active]), np.arange(len(active))

@@ -1,5 +1,6 @@
-"""QualityReport: how much a trivariate spline distorts, and how well it fits the mesh it came from."""
+"""QualityReport: how much a trivariate spline, or a body of several, distorts, and how well it fits its mesh."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any, Generic, TypeVar
@@ -8,27 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, in_brackets
+from ..certificate.body import BodyCertificate
 from ..certificate.boundary import BoundaryCheck
 from ..certificate.jacobian import Certificate
-from ..cube.boundary_map import BoundaryMap
+from ..cube.boundary_map import BoundaryMap, on_faces
 from ..display import Shown
-from ..spline.bspline import gauss_points
-from ..spline.orientation import mirrored, orientation
-from ..spline.volume import BSplineVolume
+from ..spline.multipatch import MultiPatch
+from ..spline.volume import FACE_NAMES, BSplineVolume
 from .distances import Distances
-from .rotations import closest_rotations
+from .distortion import BoxDistortion, Distortion, arap_grid, in_own_box
+from .proved import proved, proved_of
 from .two_sided import two_sided
-
-_SLAB_POINTS = 100_000
-
-
-@dataclass(frozen=True)
-class Distortion:
-    """ARAP distortion: mean is the integral over the cube, max the largest at the quadrature points."""
-
-    mean: float
-    max: float
-
 
 Measure = TypeVar("Measure", Distortion, Distances)
 
@@ -49,15 +40,18 @@ class QualityReport(Shown):
 
     Attributes
     ----------
-    control_points : three int
-    degrees : three int
-    certificate : Certificate
-        Whether det J > 0 on the whole cube, its lower bound, the witness of a fold.
+    control_points : three int, or int
+        Of a volume by direction; of several patches their number, shared ones once.
+    degrees : tuple of int
+        Of a volume by direction; of several patches those that occur.
+    certificate : Certificate or BodyCertificate
+        Whether det J > 0 on the whole cube, its lower bound, the witness of a fold; or the same of each patch.
     boundary_check : BoundaryCheck
-        Whether the six boundary surfaces meet only at their common edges, and a point where they meet elsewhere.
+        Whether the outer faces meet only at their common edges, and a point where they meet elsewhere.
     arap : BothScales of Distortion
         Mean and max of the sum of (sigma_i - 1)^2, the smallest sigma signed with det J, over `arap_points` Gauss
-        points.
+        points. Each of several patches is measured against its own box, in which no unit is left: both measures are the
+        mean over the patches, weighted by their volumes, and the largest of all.
     arap_points : int
     boundary : BothScales of Distances
         Rms, mean and max of the distance from F(v_p) to v over the mesh's own `mesh_vertices` vertices; cuts and
@@ -71,6 +65,10 @@ class QualityReport(Shown):
     diagonal : float
         Of the mesh's bounding box, in the user's units.
     mesh_samples, spline_samples : int
+    proof : dict
+        The entries of report.json on what is proved.
+    patches : tuple of BoxDistortion
+        Of each of several patches its box, volume, distortion and smallest scaled Jacobian.
 
     Examples
     --------
@@ -81,9 +79,9 @@ class QualityReport(Shown):
     (1538, True)
     """
 
-    control_points: tuple[int, int, int]
-    degrees: tuple[int, int, int]
-    certificate: Certificate
+    control_points: tuple[int, int, int] | int
+    degrees: tuple[int, ...]
+    certificate: Certificate | BodyCertificate
     arap: BothScales[Distortion]
     arap_points: int
     boundary: BothScales[Distances]
@@ -95,10 +93,12 @@ class QualityReport(Shown):
     mesh_samples: int
     spline_samples: int
     boundary_check: BoundaryCheck
+    proof: dict[str, Any]
+    patches: tuple[BoxDistortion, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the section in plain Python types, ready for JSON; a bound that is not finite is None."""
-        return proved(self.control_points, self.degrees, self.certificate, self.boundary_check) | {
+        return self.proof | {
             "arap": asdict(self.arap),
             "boundary": asdict(self.boundary),
             "surface_distance": {
@@ -112,7 +112,21 @@ class QualityReport(Shown):
                 "mesh_to_spline": self.mesh_samples,
                 "spline_to_mesh": self.spline_samples,
             },
+            **({"patches": self._each_patch()} if self.patches else {}),
         }
+
+    def _each_patch(self) -> list[dict[str, Any]]:
+        """Return what is proved and measured of each patch."""
+        return [
+            known
+            | {
+                "own_box": list(found.box),
+                "volume": found.volume,
+                "arap": asdict(found.arap),
+                "scaled_jacobian": found.scaled_jacobian,
+            }
+            for known, found in zip(self.proof["patches"], self.patches, strict=True)
+        ]
 
     @property
     def relative_distance(self) -> Distances:
@@ -120,15 +134,8 @@ class QualityReport(Shown):
         return self.surface_distance.as_given.scaled(1.0 / self.diagonal)
 
     def __str__(self) -> str:
-        certificate = self.certificate
-        verdict = f"{certificate.verdict}, det J >= {certificate.lower_bound:.3g} of its mean"
-        if certificate.witness is not None:
-            verdict = f"folded at {in_brackets(certificate.witness)}"
-        if self.boundary_check.meeting is not None:
-            verdict += f"; the boundary {self.boundary_check.meeting}"
-        size = " x ".join(map(str, self.control_points))
         lines = [
-            f"{size} control points of degree {', '.join(str(p) for p in self.degrees)}: {verdict}",
+            f"{self._size}: {self._verdict}",
             f"{'':16}  {'at volume 1':<32}  as given",
             _line("ARAP mean, max", self.arap),
             f"{'':16}  {'rms, mean, max':<32}  rms, mean, max",
@@ -137,29 +144,35 @@ class QualityReport(Shown):
             _line("spline to mesh", self.spline_to_mesh),
             _line("both ways", self.surface_distance),
         ]
-        return "\n".join(lines)
+        return "\n".join([*lines, *_lines_of(self.patches)])
+
+    @property
+    def _size(self) -> str:
+        points, degrees = self.control_points, ", ".join(map(str, self.degrees))
+        if isinstance(points, int):
+            return f"{points} control points of degree {degrees} in {len(self.patches)} patches"
+        return f"{' x '.join(map(str, points))} control points of degree {degrees}"
+
+    @property
+    def _verdict(self) -> str:
+        found = self.certificate
+        verdict = f"{found.verdict}, det J >= {found.lower_bound:.3g} of its mean"
+        if isinstance(found, BodyCertificate):
+            verdict = str(found)
+        elif found.witness is not None:
+            verdict = f"folded at {in_brackets(found.witness)}"
+        meeting = self.boundary_check.meeting
+        return verdict if meeting is None else f"{verdict}; the boundary {meeting}"
 
 
-def proved(
-    shape: tuple[int, int, int],
-    degrees: tuple[int, int, int],
-    certificate: Certificate,
-    check: BoundaryCheck | None = None,
-) -> dict[str, Any]:
-    """Return the section's entries for a volume that was certified, but not measured.
-
-    check: None for one patch of several, whose boundary is checked as a whole.
-    """
-    bound = certificate.lower_bound
-    return {
-        "control_points": list(shape),
-        "degrees": list(degrees),
-        "bijective": certificate.verdict,
-        "orientation": certificate.orientation,
-        **({} if check is None else check.as_dict()),
-        "det_lower_bound": bound if isfinite(bound) else None,
-        "witness": None if certificate.witness is None else list(certificate.witness),
-    }
+def _lines_of(patches: Sequence[BoxDistortion]) -> list[str]:
+    """Return a table of patches, a line each; no line for no patches."""
+    rows = [
+        f"{f'p{number}':16}  {' x '.join(f'{side:.3g}' for side in found.box):<32}  "
+        f"{found.arap.mean:.4g}, {found.arap.max:.4g}, {found.scaled_jacobian:.4g}"
+        for number, found in enumerate(patches)
+    ]
+    return [f"{'':16}  {'own box':<32}  ARAP mean, max, scaled det J", *rows] if rows else []
 
 
 def _line(name: str, measure: BothScales[Any]) -> str:
@@ -168,21 +181,22 @@ def _line(name: str, measure: BothScales[Any]) -> str:
 
 
 def measure(
-    volume: BSplineVolume,
+    body: BSplineVolume | MultiPatch,
     surface_vertices: ArrayLike,
     surface_faces: ArrayLike,
     scale: float,
     boundary: BoundaryMap,
-    certificate: Certificate,
+    certificate: Certificate | BodyCertificate,
     boundary_check: BoundaryCheck,
 ) -> QualityReport:
-    """Measure a volume against the mesh it came from; return the measures together with its certificate.
+    """Measure a volume or several patches against their mesh; return the measures together with the certificate.
 
-    volume, surface_vertices (n, 3), surface_faces (m, 3) and boundary: all in the user's units. The boundary map starts
+    body, surface_vertices (n, 3), surface_faces (m, 3) and boundary: all in the user's units. The boundary map starts
     with the surface's vertices, in their order.
     scale: the factor that brings the model to volume 1 (Surface.scale).
-    certificate, boundary_check: from `certify` and `check_boundary`.
-    Raises ValueError for a scale that is not positive or a boundary map of fewer vertices.
+    certificate, boundary_check: from `certify` and `check_boundary`, of the same body.
+    Raises ValueError for a scale that is not positive, and for a boundary map of fewer vertices or with vertices on no
+    outer face of the body; TypeError for the certificate of another kind of body.
     """
     if not (isfinite(scale) and scale > 0.0):
         raise ValueError(f"scale must be positive, got {scale}; pass Surface.scale")
@@ -191,26 +205,73 @@ def measure(
     n = len(vertices)
     if len(boundary.vertices) < n:
         raise ValueError(f"boundary must start with the surface's {n} vertices, it has {len(boundary.vertices)}")
-    found = two_sided(volume, vertices, faces)
-    _, (unit_volume, as_given), weights = arap_grid(volume, scales=(scale, 1.0))
+    gaps = np.linalg.norm(_placed(body, boundary, n) - boundary.vertices[:n], axis=1)
+    found = two_sided(body, vertices, faces)
+    measured: dict[str, Any] = {
+        "boundary": _both(Distances.of(gaps), scale),
+        "mesh_vertices": n,
+        "mesh_to_spline": _both(found.mesh_to_spline.summary(), scale),
+        "spline_to_mesh": _both(found.spline_to_mesh.summary(), scale),
+        "surface_distance": _both(found.summary(), scale),
+        "diagonal": float(np.linalg.norm(np.ptp(vertices, axis=0))),
+        "mesh_samples": len(found.mesh_to_spline.distances),
+        "spline_samples": len(found.spline_to_mesh.distances),
+    }
+    if isinstance(body, MultiPatch) and isinstance(certificate, BodyCertificate):
+        return _of_patches(body, certificate, boundary_check, measured)
+    if isinstance(body, MultiPatch) or isinstance(certificate, BodyCertificate):
+        raise TypeError("certificate is not that of this body: pass certify(body)")
+    _, (unit_volume, as_given), weights = arap_grid(body, scales=(scale, 1.0))
     return QualityReport(
-        control_points=volume.shape,
-        degrees=volume.degrees,
+        control_points=body.shape,
+        degrees=body.degrees,
         certificate=certificate,
         arap=BothScales(_distortion(unit_volume, weights), _distortion(as_given, weights)),
         arap_points=weights.size,
-        boundary=_both(
-            Distances.of(np.linalg.norm(volume(boundary.parameters[:n]) - boundary.vertices[:n], axis=1)), scale
-        ),
-        mesh_vertices=n,
-        mesh_to_spline=_both(found.mesh_to_spline.summary(), scale),
-        spline_to_mesh=_both(found.spline_to_mesh.summary(), scale),
-        surface_distance=_both(found.summary(), scale),
-        diagonal=float(np.linalg.norm(np.ptp(vertices, axis=0))),
-        mesh_samples=len(found.mesh_to_spline.distances),
-        spline_samples=len(found.spline_to_mesh.distances),
         boundary_check=boundary_check,
+        proof=proved(body.shape, body.degrees, certificate, boundary_check),
+        **measured,
     )
+
+
+def _of_patches(
+    body: MultiPatch, certificate: BodyCertificate, boundary_check: BoundaryCheck, measured: dict[str, Any]
+) -> QualityReport:
+    """Return the report on several patches, each measured against its own box."""
+    patches, proof = tuple(map(in_own_box, body)), proved_of(body, certificate, boundary_check)
+    mean = np.average([one.arap.mean for one in patches], weights=[abs(one.volume) for one in patches])
+    whole = Distortion(float(mean), max(one.arap.max for one in patches))
+    return QualityReport(
+        control_points=proof["control_points"],
+        degrees=tuple(sorted({degree for patch in body for degree in patch.degrees})),
+        certificate=certificate,
+        arap=BothScales(whole, whole),
+        arap_points=sum(one.points for one in patches),
+        boundary_check=boundary_check,
+        proof=proof,
+        patches=patches,
+        **measured,
+    )
+
+
+def _placed(body: BSplineVolume | MultiPatch, boundary: BoundaryMap, count: int) -> Array:
+    """Return the points (count, 3) of a body at the places of the first vertices of a boundary map.
+
+    Raises ValueError where a vertex lies on a patch that does not exist, or on no outer face of its patch.
+    """
+    patches, parameters = boundary.patches[:count], boundary.parameters[:count]
+    if not isinstance(body, MultiPatch):
+        return body(parameters)
+    points = body.points(patches, parameters)
+    outer = np.array([[name in names for name in FACE_NAMES] for names in body.outer])
+    lost = np.flatnonzero(~np.any(on_faces(parameters) & outer[patches], axis=1))
+    if lost.size:
+        first = lost[0]
+        raise ValueError(
+            f"{lost.size} vertices of the boundary lie on no outer face of their patch, the first is vertex {first} "
+            f"at {in_brackets(parameters[first])} of patch {patches[first]}"
+        )
+    return points
 
 
 def _both(as_given: Distances, scale: float) -> BothScales[Distances]:
@@ -219,66 +280,3 @@ def _both(as_given: Distances, scale: float) -> BothScales[Distances]:
 
 def _distortion(values: Array, weights: Array) -> Distortion:
     return Distortion(float(np.sum(weights * values)), float(values.max()))
-
-
-def arap_grid(
-    volume: BSplineVolume, n_gauss: int = 3, scales: tuple[float, ...] = (1.0,)
-) -> tuple[tuple[Array, Array, Array], list[Array], Array]:
-    """Return the ARAP distortion of scale * F, for each of the scales, at `n_gauss` Gauss points a direction and span.
-
-    Returns the points of each axis, the values (m_u, m_v, m_w) for each scale, and the weights of the integral over the
-    cube.
-    """
-    rules = [gauss_points(k, n_gauss) for k in volume.knots]
-    u, v, w = (points.ravel() for points, _ in rules)
-    values = [np.empty((len(u), len(v), len(w))) for _ in scales]
-    step = max(1, _SLAB_POINTS // (len(v) * len(w)))
-    for start in range(0, len(u), step):  # slabs bound the memory
-        slab = slice(start, start + step)
-        for row, found in zip(values, _arap(_unmirrored(volume, u[slab], v, w), scales), strict=True):
-            row[slab] = found
-    weights = np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
-    return (u, v, w), values, weights
-
-
-def arap_on(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike, scale: float = 1.0) -> Array:
-    """Return the ARAP distortion of scale * F on a tensor grid: (len(u), len(v), len(w)).
-
-    A left-handed volume is as distorted as its mirror image.
-    """
-    return _arap(_unmirrored(volume, u, v, w), (scale,))[0]
-
-
-def _unmirrored(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
-    """Return the Jacobian on a tensor grid, of a left-handed volume that of its mirror image."""
-    return (volume if orientation(volume) > 0 else mirrored(volume)).grid_jacobian(u, v, w)
-
-
-def arap(jacobians: ArrayLike) -> Array:
-    """Return the as-rigid-as-possible distortion sum (sigma_i - 1)^2, sigma_3 signed like det: (..., 3, 3) -> (...).
-
-    (Paper, section 3.2, which leaves the sign open: with it the mirror image of a rigid map costs 4, not 0.)
-    Raises ValueError for another shape or entries that are not finite.
-    """
-    matrices = np.asarray(jacobians, dtype=np.float64)
-    if matrices.shape[-2:] != (3, 3):
-        raise ValueError(f"jacobians must have shape (..., 3, 3), got {matrices.shape}")
-    if not np.all(np.isfinite(matrices)):
-        raise ValueError("jacobians must be finite")
-    return _arap(matrices, (1.0,))[0]
-
-
-def _arap(jacobians: Array, scales: tuple[float, ...]) -> list[Array]:
-    """Return the distortion of scale * J for each scale: the squared distance to the rotation closest to J."""
-    columns = np.ascontiguousarray(np.moveaxis(jacobians.reshape(-1, 3, 3), 0, -1))
-    rotations = closest_rotations(columns)
-    values = [((scale * columns - rotations) ** 2).sum(axis=(0, 1)) for scale in scales]
-    return [value.reshape(jacobians.shape[:-2]) for value in values]
-
-
-def scaled_jacobian(jacobians: ArrayLike) -> Array:
-    """Return det J over the product of its columns' lengths, -1 to 1, 0 where one vanishes: (..., 3, 3) -> (...)."""
-    matrices = np.asarray(jacobians, dtype=np.float64)
-    lengths = np.linalg.norm(matrices, axis=-2, keepdims=True)
-    units = np.divide(matrices, lengths, out=np.zeros_like(matrices), where=lengths > 0.0)
-    return np.linalg.det(units)

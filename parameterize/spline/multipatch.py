@@ -156,6 +156,23 @@ class MultiPatch(Brief, Shown):
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
+    def points(self, patches: ArrayLike, parameters: ArrayLike) -> Array:
+        """Return the points (m, 3) in space of parameters (m, 3) of patches (m,): what `locate` finds.
+
+        Raises ValueError for other shapes, and for the number of a patch that does not exist.
+        """
+        owners, where = np.asarray(patches), np.asarray(parameters, dtype=np.float64)
+        if owners.shape != (len(where),) or where.shape[1:] != (3,):
+            raise ValueError(f"give patches (m,) and parameters (m, 3), got shapes {owners.shape} and {where.shape}")
+        if unknown := sorted(set(np.unique(owners).tolist()) - set(range(len(self)))):
+            raise ValueError(f"there is no patch {unknown[0]}: the body has {len(self)}, from 0 on")
+        found = np.empty(where.shape)
+        for number, patch in enumerate(self.patches):
+            own = np.flatnonzero(owners == number)
+            if own.size:
+                found[own] = patch(where[own])
+        return found
+
     def locate(self, points: ArrayLike) -> tuple[IntArray, Array]:
         """Return the patches (m,) and the parameters (m, 3) of points (m, 3) in space, -1 and NaN outside of the body.
 
